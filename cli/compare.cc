@@ -174,6 +174,12 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
     return result.code;
   }
   comparison.notes.insert(comparison.notes.begin(), compared.notes.begin(), compared.notes.end());
+  if (!compared.beyond_budget.empty()) {
+    for (DecompositionStep& step : comparison.decomposition) {
+      const bool missing = step.from.empty() || step.to.empty();
+      if (missing) step.withheld += "; " + compared.beyond_budget;
+    }
+  }
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
   WithWhatIsKept(recorder, [&] {
     AddFiles(recorder, comparison);
@@ -313,7 +319,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       .add_option("--budget", arguments.options.budget_s,
                   "begin no run that would end later; of one run, add nothing that takes longer")
       ->option_text("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check(IsNumber(1e-9, 1e9));
   AddSeed(command, arguments.seed)->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
           "set a key of the config, in dotted form; may be repeated");

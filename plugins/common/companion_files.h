@@ -21,6 +21,7 @@ class TimestampRows {
       : rows_(path, place, key) {}
 
   const std::string& name() const { return rows_.name(); }
+  int line() const { return rows_.line(); }
   /// The next frame; false at the end.
   bool Next(std::int64_t& frame, Timestamp& timestamp) {
     if (!rows_.Next()) {

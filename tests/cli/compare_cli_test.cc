@@ -431,6 +431,8 @@ TEST_F(CompareCli, AddsNothingBeyondTheBudget) {
   EXPECT_TRUE(Contains(little.out, "foretold from 10 of 152 frames: ")) << little.out;
   EXPECT_TRUE(Contains(little.out, " s, the budget is 1e-09 s")) << little.out;
   EXPECT_FALSE(Contains(little.out, "added '")) << little.out;
+  const std::string shown = little.out.substr(little.out.find("Error decomposition"));
+  EXPECT_TRUE(Contains(shown, "the budget of 1e-09 s left out what is named above")) << shown;
   const Outcome much = Call({"compare", "config.yaml", "--budget", "1e6", "-o", "much"});
   ASSERT_EQ(much.code, 0) << much.err;
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "all"}).code, 0);
@@ -484,7 +486,10 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");
   fails({"compare", "config.yaml", "--first-seed", "3"}, 2, "--first-seed requires --runs");
   fails({"compare", "config.yaml", "--jobs", "3"}, 2, "--jobs requires --runs");
-  fails({"compare", "config.yaml", "--budget", "0"}, 2, "--budget");
+  for (const char* budget : {"0", "-3", "abc", "nan", "1e308"}) {
+    fails({"compare", "config.yaml", "--budget", budget}, 2,
+          "--budget: '" + std::string(budget) + "' is not a number from 1e-09 to 1e+09");
+  }
   fails({"compare", "a", "--budget", "3"}, 2, "a finished run is not run again");
   fails({"compare", "config.yaml", "--runs", "2", "--seed", "7", "--first-seed", "20"}, 2,
         "--first-seed");

@@ -410,6 +410,12 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   expect({"--set", "source.target=[200, 45, 90, 90]"}, 65, "the target is not on this image");
   expect({"--set", "source.stereo=pair.yaml"}, 65, "not a calibration");
   expect({"--set", "source.warp=homography"}, 78, "camera.fx");
+  expect({"--set", "source.start_frame=21"}, 78,
+         "source.start_frame: 21, but there are 21 images, counted from 0");
+  expect({"--set", "camera={width: 320, height: 180}"}, 65,
+         "000000.png: 240x180 px, but the camera of --set");
+  Write("times.csv", "0,0\n1,1\n2,2\n4,4\n");
+  expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: has no time for image 3");
   Write("boxes.csv", "frame,x,y,width,height\n0,75,45,2,90\n");
   expect({"--set", "source.boxes=boxes.csv"}, 65, "boxes.csv:2:");
   Write("boxes.csv", "0,165,45,75,45,75,134,165,134\n");
@@ -434,7 +440,7 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   std::filesystem::remove(Image("left", 20));
   cv::Mat small(90, 120, CV_8U, cv::Scalar(9));
   ASSERT_TRUE(cv::imwrite(Image("right", 10), small));
-  expect({}, 65, "000010.png: 120x90 px");
+  expect({"--set", "source.rate_hz=20"}, 65, "000010.png: 120x90 px");
 }
 
 TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {

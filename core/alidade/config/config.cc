@@ -108,14 +108,22 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
-/// `source.path`; null where it is not given.
-ConfigTree* SourcePath(const ConfigTree& root) {
+/// The keys of `source` that are a path to read from, as far as they are one value and not `-`.
+std::vector<ConfigTree*> SourcePaths(const ConfigTree& root) {
+  std::vector<ConfigTree*> paths;
   const ConfigTree* const source = Child(root, "source");
-  return source == nullptr ? nullptr : Child(*source, "path");
+  if (source == nullptr) return paths;
+  for (const char* key :
+       {"path", "known", "left", "right", "stereo", "boxes", "timestamps", "truth"}) {
+    ConfigTree* const node = Child(*source, key);
+    if (node == nullptr || node->kind != Node::Kind::kScalar) continue;
+    if (!node->text.empty() && node->text != "-") paths.push_back(node);
+  }
+  return paths;
 }
 
-/// Makes the relative paths of a config absolute, `source.path` and the items of `plugins`, without
-/// the `.` of a config that is named so. A `..` stays, as it may stand behind a link.
+/// Makes the relative paths of a config absolute, those of `source` and the items of `plugins`,
+/// without the `.` of a config that is named so. A `..` stays, as it may stand behind a link.
 void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   const auto anchor = [&](ConfigTree* node) {
     if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
@@ -126,7 +134,7 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
     }
     if (!error) node->text = anchored.string();
   };
-  if (ConfigTree* const path = SourcePath(root)) anchor(path);
+  for (ConfigTree* const path : SourcePaths(root)) anchor(path);
   const ConfigTree* plugins = Child(root, "plugins");
   if (plugins == nullptr) return;
   for (const auto& plugin : plugins->children) anchor(plugin.get());
@@ -309,9 +317,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
 
 std::vector<std::string> Config::inputs() const {
   std::vector<std::string> all = files_;
-  const ConfigTree* const path = SourcePath(*tree_);
-  if (path != nullptr && path->kind == Node::Kind::kScalar && path->text != "-")
-    all.push_back(path->text);
+  for (const ConfigTree* const path : SourcePaths(*tree_)) all.push_back(path->text);
   return all;
 }
 

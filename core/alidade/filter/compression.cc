@@ -43,8 +43,13 @@ std::string WhyNotCompressed(const System& system) {
   for (const SensorBinding& sensor : system.sensors) {
     for (const Space& role : sensor.model.roles()) {
       if (!role.landmark() || IsFlat(role.geometry)) continue;
-      return "role '" + role.name + "' of sensor '" + sensor.name + "' is of geometry " +
-             ToString(role.geometry) + ", where many small corrections are not one";
+      const auto representation = RepresentationOf(sensor.model.roles());
+      const std::string why = "the role '" + role.name + "', of geometry " +
+                              ToString(role.geometry) +
+                              ", where many small corrections are not one";
+      if (!representation) return "sensor '" + sensor.name + "' has " + why;
+      return std::string("those of `landmarks.representation: ") + ToString(*representation) +
+             "` have " + why + "; those of `inverse_depth` can";
     }
   }
   return {};

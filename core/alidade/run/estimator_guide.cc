@@ -22,8 +22,13 @@ EstimatorGuide::EstimatorGuide(Experiment& experiment, std::function<void(bool)>
   if (experiment.guide != nullptr) experiment.source->LendGuide(this);
 }
 
+// A source that throws here keeps a guide that is gone; the run has ended, and asks it no more.
 EstimatorGuide::~EstimatorGuide() {
-  if (experiment_.guide != nullptr) experiment_.source->LendGuide(nullptr);
+  try {
+    if (experiment_.guide != nullptr) experiment_.source->LendGuide(nullptr);
+  } catch (...) {
+    return;
+  }
 }
 
 std::vector<Expected> EstimatorGuide::Expect(int stream, Timestamp timestamp,

@@ -131,6 +131,16 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
   return static_cast<int>(found - estimators.begin());
 }
 
+/// What may stand under `guide`: the recursive filters of the config.
+std::string GuidesOf(const std::vector<NamedEstimator>& estimators) {
+  std::vector<std::string> names;
+  for (const NamedEstimator& one : estimators) {
+    if (dynamic_cast<const Filter*>(one.estimator.get()) != nullptr) names.push_back(one.name);
+  }
+  return names.empty() ? "none, for `estimators` has no recursive filter, as of type ekf"
+                       : "a recursive filter of `estimators`: " + internal::Join(names);
+}
+
 /// The filter that guides the source, by its key `guide`; null: none does.
 const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   const std::string name = experiment.source->guided_by();
@@ -144,12 +154,12 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
   if (found == estimators.end()) {
     const std::vector<std::string> names = NamesOf(estimators);
-    guide.Fail("no estimator '" + name + "'", "a filter: " + internal::Join(names),
-               Nearest(name, names));
+    guide.Fail("no estimator '" + name + "'", GuidesOf(estimators), Nearest(name, names));
   }
   const auto* const filter = dynamic_cast<const Filter*>(found->estimator.get());
   if (filter == nullptr) {
-    guide.Fail("estimator '" + name + "' predicts no measurements", "a recursive filter of core");
+    guide.Fail("estimator '" + name + "' (" + found->type + ") predicts no measurements",
+               GuidesOf(estimators));
   }
   const std::vector<StreamInfo>& streams = experiment.source->streams();
   const bool can = std::ranges::any_of(streams, [&](const StreamInfo& stream) {

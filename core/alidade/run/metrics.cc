@@ -186,6 +186,19 @@ struct Metrics::Impl {
   void WriteBounds(std::map<std::string, double>& metrics) const;
 };
 
+namespace {
+
+/// That of the block; the error of an orientation or a direction is an angle.
+std::string UnitOfError(const System& system, BlockId id) {
+  bool is_angle = true;
+  system.layout[id].geometry().ForEachPart([&](const Geometry& part, int, int) {
+    is_angle = is_angle && part.kind != GeometryKind::kVector;
+  });
+  return is_angle ? "rad" : internal::UnitOf(system, id);
+}
+
+}  // namespace
+
 void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = internal::MatchTruths(system.layout, truths);
   for (BlockId id = 0; id < static_cast<int>(match.size()); ++id) {
@@ -195,7 +208,7 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
     one.id = id;
     one.truth = static_cast<std::size_t>(match[id]);
     one.name = block.name;
-    one.unit = internal::UnitOf(system, id);
+    one.unit = UnitOfError(system, id);
     one.geometry = block.geometry();
     one.elements = internal::TangentNames(block.name, block.space);
     one.outside.assign(block.geometry().tangent, 0);

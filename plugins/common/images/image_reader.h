@@ -17,6 +17,7 @@
 #include "alidade/base/error.h"
 #include "alidade/base/read_file.h"
 #include "alidade/config/config.h"
+#include "plugins/common/images/camera_size.h"
 
 namespace alidade {
 
@@ -75,9 +76,9 @@ class ImageReader {
     if (is_video()) return {path_.string() + ", image " + std::to_string(number_)};
     return {number_ < 0 ? path_.string() : files_[static_cast<std::size_t>(number_)].string()};
   }
-  /// Of the file of the image that was read last; empty: of a video.
-  std::string name() const {
-    return is_video() ? "" : files_[static_cast<std::size_t>(number_)].filename().string();
+  /// Of the file of image k; empty: of a video.
+  std::string name(std::int64_t k) const {
+    return is_video() ? "" : files_[static_cast<std::size_t>(k)].filename().string();
   }
   /// How many there are; of a video as it says; 0 of a camera.
   std::int64_t size() const {
@@ -89,10 +90,6 @@ class ImageReader {
   double rate_hz() const { return is_video() && !is_live_ ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
 
  private:
-  static std::string SizeText(cv::Size size) {
-    return std::to_string(size.width) + "x" + std::to_string(size.height) + " px";
-  }
-
   /// By the name alone: an empty or broken image is an error, and not passed over.
   static bool EndsLikeAnImage(const std::filesystem::path& file) {
     constexpr const char* kEnds[] = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
@@ -142,7 +139,8 @@ class ImageReader {
     const std::string bytes = internal::ReadFile(files_[next], [&](ExitCode code, int error) {
       throw Error(code, ErrorLine({files_[next].string()}, {}, std::strerror(error)));
     });
-    if (!bytes.empty()) {
+    const bool is_cut = IsCutShort(bytes);
+    if (!bytes.empty() && !is_cut) {
       const cv::Mat all(1, static_cast<int>(bytes.size()), CV_8UC1,
                         const_cast<char*>(bytes.data()));
       try {
@@ -152,20 +150,25 @@ class ImageReader {
         image.release();
       }
     }
-    if (bytes.empty()) image.release();
-    if (image.empty() || IsCutShort(bytes)) {
+    if (bytes.empty() || is_cut) image.release();
+    if (image.empty()) {
       ++number_;
-      Fail(bytes.empty()   ? "an empty file"
-           : image.empty() ? "not an image that OpenCV reads"
-                           : "the image is cut short",
+      Fail(bytes.empty() ? "an empty file"
+           : is_cut      ? "the image is cut short"
+                         : "not an image that OpenCV reads",
            "a whole image; `images` says which files are");
     }
     return true;
   }
 
-  /// The decoder of JPEG fills up what is not there, and says nothing.
+  /// The decoder of JPEG fills up what is not there, and says nothing; that of PNG writes a line of
+  /// its own to stderr, as it does of one that is damaged otherwise.
   static bool IsCutShort(std::string_view bytes) {
-    return bytes.starts_with("\xff\xd8") && bytes.find("\xff\xd9", bytes.size() / 2) == bytes.npos;
+    const auto lacks_end = [&](std::string_view end) {
+      return bytes.find(end, bytes.size() / 2) == bytes.npos;
+    };
+    if (bytes.starts_with("\x89PNG")) return lacks_end("IEND");
+    return bytes.starts_with("\xff\xd8") && lacks_end("\xff\xd9");
   }
 
   [[noreturn]] void Fail(const std::string& what, std::string_view expected) const {

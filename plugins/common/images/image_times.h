@@ -1,32 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "alidade/base/error.h"
 #include "plugins/common/companion_files.h"
+#include "plugins/common/images/image_reader.h"
 
 namespace alidade {
 
 /// When images were taken: by a table `frame,t_s` that has each of them, by a table of their names,
-/// at a rate, or as they come.
+/// at a rate, or as they come. Tables are read whole when this is made.
 ///
-/// Errors       kBadData: an image without a time; times that do not increase; a time without an
-///              image in a table by number, for an image that is gone would give those after it the
-///              times of others.
+/// Errors       kBadData, with file and line: an image without a time; times that do not increase;
+///              a time without an image in a table by number, for an image that is gone would give
+///              those after it the times of others.
 class ImageTimes {
  public:
   /// By the clock, counted from the first image: a camera.
   ImageTimes() = default;
   explicit ImageTimes(double rate_hz) : rate_hz_(rate_hz) {}
   ImageTimes(const std::filesystem::path& table, const Node& key) {
-    rows_ = std::make_unique<TimestampRows>(table, key.place(), key.path());
+    TimestampRows rows(table, key.place(), key.path());
+    table_ = rows.name();
+    std::int64_t number = 0;
+    for (Timestamp t = 0; rows.Next(number, t);) {
+      by_number_.emplace_hint(by_number_.end(), number, Row{t, rows.line()});
+    }
   }
 
   /// The table of a folder of images where one of these has it; none where none has.
@@ -60,30 +68,44 @@ class ImageTimes {
     return times;
   }
 
-  /// Of image `number`, from 0, of that file name; asked for in order.
-  Timestamp At(std::int64_t number, const std::string& name = {}) {
-    if (!table_.empty()) return InTable(number, name);
+  /// Whether each of the images of a folder from `first` on, `most` of them or all if that is 0,
+  /// has a time, after that of the one before. Of a video that is seen as they come.
+  void Check(const ImageReader& images, std::int64_t first, std::int64_t most) const {
+    if (table_.empty() || images.is_video()) return;
+    const std::int64_t end = most > 0 ? std::min(images.size(), first + most) : images.size();
+    for (std::int64_t k = first; k < end; ++k) {
+      const Row& row = RowOf(k, images.name(k));
+      if (k == first || by_name_.empty()) continue;  // those by number increase
+      const Row& before = RowOf(k - 1, images.name(k - 1));
+      if (row.t > before.t) continue;
+      Fail(row.line,
+           "has a time for image " + images.name(k) + " that is not after that of " +
+               images.name(k - 1) + ", line " + std::to_string(before.line),
+           "times that increase, in the order of the names of the images");
+    }
+    End(images.size());
+  }
+  /// Of image `number`, from 0, of that file name.
+  Timestamp At(std::int64_t number, const std::string& name) {
+    if (!table_.empty()) return RowOf(number, name).t;
     if (rate_hz_ > 0.0) return TimestampFromSeconds(static_cast<double>(number) / rate_hz_);
-    if (!rows_) return ByTheClock();
-    std::int64_t frame = -1;
-    Timestamp timestamp = 0;
-    while (frame < number && rows_->Next(frame, timestamp)) continue;
-    if (frame != number) Fail(rows_->name(), "has no time for image " + std::to_string(number));
-    return timestamp;
+    return ByTheClock();
   }
   /// After the last of all images.
-  void End(std::int64_t count) {
-    const std::string found = ", but there are " + std::to_string(count) + " images";
-    if (std::ssize(by_number_) > count) {
-      Fail(table_, "has " + std::to_string(by_number_.size()) + " times" + found);
-    }
-    std::int64_t frame = 0;
-    Timestamp timestamp = 0;
-    if (!rows_ || !rows_->Next(frame, timestamp)) return;
-    Fail(rows_->name(), "has a time for image " + std::to_string(frame) + found);
+  void End(std::int64_t count) const {
+    const auto surplus = by_number_.lower_bound(count);
+    if (surplus == by_number_.end()) return;
+    Fail(surplus->second.line, "has a time for image " + std::to_string(surplus->first) +
+                                   ", but there are " + std::to_string(count) +
+                                   " images, counted from 0");
   }
 
  private:
+  struct Row {
+    Timestamp t;
+    int line;
+  };
+
   void ReadNamed(NumberRows&& rows, bool in_ns) {
     table_ = rows.name();
     const char* const columns = in_ns ? "t_ns,name" : "t_s name";
@@ -91,7 +113,7 @@ class ImageTimes {
       rows.ExpectColumns(2, columns);
       const Timestamp t = in_ns ? rows.Index(0, "t_ns") : rows.Time(0, "t_s");
       const std::string name = std::filesystem::path(rows.text(1)).filename().string();
-      if (!by_name_.emplace(name, t).second) {
+      if (!by_name_.emplace(name, Row{t, rows.line()}).second) {
         rows.FailCell(1, "name", "is there twice", "each once");
       }
     }
@@ -101,42 +123,43 @@ class ImageTimes {
     table_ = rows.name();
     while (rows.Next()) {
       rows.ExpectColumns(1, "t_s");
-      by_number_.push_back(rows.Time(0, "t_s"));
+      const Timestamp t = rows.Time(0, "t_s");
+      if (!by_number_.empty() && t <= by_number_.rbegin()->second.t) {
+        rows.FailCell(
+            0, "t_s",
+            "is not after that of line " + std::to_string(by_number_.rbegin()->second.line),
+            "times that increase");
+      }
+      by_number_.emplace_hint(by_number_.end(), std::ssize(by_number_), Row{t, rows.line()});
     }
     if (by_number_.empty()) rows.FailLine("no rows", "a row `t_s` for each image");
   }
 
-  Timestamp InTable(std::int64_t number, const std::string& name) {
-    const bool by_name = !by_name_.empty();
-    const auto found = by_name_.find(name);
-    const std::string image = by_name ? name : std::to_string(number);
-    if (by_name ? found == by_name_.end() : number >= std::ssize(by_number_)) {
-      Fail(table_, "has no time for image " + image);
+  const Row& RowOf(std::int64_t number, const std::string& name) const {
+    if (!by_name_.empty()) {
+      const auto found = by_name_.find(name);
+      if (found == by_name_.end()) Fail(0, "has no time for image " + name);
+      return found->second;
     }
-    const Timestamp t = by_name ? found->second : by_number_[static_cast<std::size_t>(number)];
-    if (last_ && t <= *last_) {
-      Fail(table_, "has a time for image " + image + " that is not after that of the one before",
-           "times that increase");
-    }
-    last_ = t;
-    return t;
+    const auto found = by_number_.lower_bound(number);
+    if (found != by_number_.end() && found->first == number) return found->second;
+    const auto near = found == by_number_.end() ? std::prev(found) : found;
+    Fail(near->second.line, "has no time for image " + std::to_string(number));
   }
   Timestamp ByTheClock() {
     const auto now = std::chrono::steady_clock::now();
     if (!first_) first_ = now;
     return std::chrono::nanoseconds(now - *first_).count();
   }
-  [[noreturn]] void Fail(const std::string& table, const std::string& what,
+  [[noreturn]] void Fail(int line, const std::string& what,
                          const char* expected = "a time for each image") const {
-    throw Error(ExitCode::kBadData, ErrorLine({table}, {}, what, expected));
+    throw Error(ExitCode::kBadData, ErrorLine({table_, line}, {}, what, expected));
   }
 
   double rate_hz_ = 0.0;
-  std::unique_ptr<TimestampRows> rows_;
-  std::string table_;  ///< file of the times below
-  std::map<std::string, Timestamp> by_name_;
-  std::vector<Timestamp> by_number_;
-  std::optional<Timestamp> last_;  ///< given out of them
+  std::string table_;  ///< file of the times below; empty: there is none
+  std::map<std::string, Row> by_name_;
+  std::map<std::int64_t, Row> by_number_;
   std::optional<std::chrono::steady_clock::time_point> first_;
 };
 

@@ -14,9 +14,11 @@
 #include "alidade/model/camera.h"
 #include "disparity.h"
 #include "plugins/common/companion_files.h"
+#include "plugins/common/images/camera_size.h"
 #include "plugins/common/images/grey_image.h"
 #include "plugins/common/images/image_reader.h"
 #include "plugins/common/images/image_times.h"
+#include "plugins/common/images/start_frame.h"
 #include "rectification.h"
 #include "target_tables.h"
 #include "target_tracker.h"
@@ -44,12 +46,13 @@ namespace alidade {
 class ImageTarget : public Source {
  public:
   explicit ImageTarget(const SourceArguments& arguments)
-      : options_(arguments.params), disparity_options_(arguments.params) {
+      : options_(arguments.params),
+        disparity_options_(arguments.params),
+        start_(arguments.params, arguments.entry) {
     Params& p = arguments.params;
     const Node& entry = arguments.entry;
     rate_hz_ = p.Number("rate_hz", "Hz", "images a second; 0: by `timestamps`, or as a video says",
                         {0.0, 1e6}, 0.0);
-    start_ = p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0);
     max_frames_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(p.Number(
         "truth_tolerance_s", "s", "a true value is at most so far off in time", {0.0, 1e3}, 1e-3));
@@ -67,6 +70,8 @@ class ImageTarget : public Source {
     }
     folder_ = arguments.folder;
     Open(entry);
+    start_.Check(*left_);
+    times_->Check(*left_, start_.number(), max_frames_);
     const bool given = entry.Find("target").has_value();
     if (given && !(box[2] >= 8.0 && box[3] >= 8.0)) {
       entry.At("target").Fail("less than 8 px wide or high", "[x, y, width, height], px");
@@ -82,7 +87,6 @@ class ImageTarget : public Source {
       if (camera.model != CameraModel::kPinhole) {
         p.Fail("camera.model", "not 'pinhole', but the images are taken as free of distortion");
       }
-      size_ = cv::Size(camera.width, camera.height);
       intrinsics = cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
     }
     if (const auto stereo = entry.Find("stereo")) {
@@ -99,13 +103,14 @@ class ImageTarget : public Source {
     if (truth_) {
       for (const std::string& name : truth_->names()) truths_.push_back({name, 1});
     }
+    camera_ = CameraSize(arguments, *this);
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return left_->place(); }
   std::int64_t size() const override {
-    const std::int64_t left = std::max<std::int64_t>(0, left_->size() - start_);
+    const std::int64_t left = start_.Left(left_->size());
     return max_frames_ > 0 ? std::min(max_frames_, left) : left;
   }
   bool sees() const override { return true; }
@@ -124,7 +129,7 @@ class ImageTarget : public Source {
   bool Next(SourceFrame& frame) override {
     if (frames_ == max_frames_ && max_frames_ > 0) return false;
     if (!std::exchange(has_read_, false) && !ReadPair()) return false;
-    frame.timestamp = times_->At(left_->number());
+    frame.timestamp = times_->At(left_->number(), left_->name(left_->number()));
     frame.measurements.clear();
     frame.truth.clear();
     if (truth_) frame.truth = truth_->At(frame.timestamp, tolerance_);
@@ -133,10 +138,7 @@ class ImageTarget : public Source {
         image_[view] = rectification_->Rectify(image_[view], view);
       }
     }
-    if (!size_.empty() && size_ != image_[0].size()) {
-      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "not as large as the config's camera",
-                                                "camera.width and camera.height of the images"));
-    }
+    if (frames_ == 0) camera_.Check(image_[0].size(), place());
     Measure(frame);
     ++frames_;
     return true;
@@ -188,12 +190,13 @@ class ImageTarget : public Source {
   bool ReadPair() {
     do {
       if (!ReadOnePair()) return false;
-    } while (left_->number() < start_);
+    } while (left_->number() < start_.number());
     return true;
   }
 
   bool ReadOnePair() {
     if (!left_->Next(image_[0])) {
+      start_.Check(left_->number() + 1);
       times_->End(left_->number() + 1);
       if (!started_) {
         throw Error(ExitCode::kBadData,
@@ -262,9 +265,11 @@ class ImageTarget : public Source {
 
   TargetOptions options_;
   DisparityOptions disparity_options_;
+  StartFrame start_;
+  CameraSize camera_;
   double rate_hz_ = 0.0, sigma_px_ = 0.0;
   bool estimate_noise_ = true, has_read_ = false, started_ = false;
-  std::int64_t start_ = 0, max_frames_ = 0, frames_ = 0;
+  std::int64_t max_frames_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::filesystem::path folder_, stereo_file_;
   std::vector<StreamInfo> streams_, truths_;
@@ -275,7 +280,6 @@ class ImageTarget : public Source {
   std::optional<BoxRows::Corners> first_;  ///< the config's `target`
   std::optional<Rectification> rectification_;
   std::optional<TargetTracker> tracker_;
-  cv::Size size_;  ///< of the config's camera, where it is needed
   cv::Mat image_[2];
 };
 

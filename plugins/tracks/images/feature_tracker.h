@@ -66,6 +66,7 @@ class FeatureTracker {
   void Add(const std::vector<cv::Point2f>& points) { given_ = points; }
   /// How far from the rim of an image a point is that can be followed, px.
   int margin() const { return options_.margin(); }
+  int window_px() const { return options_.window_px; }
   /// Those of the last image, by id.
   const std::vector<Feature>& features() const { return features_; }
 
@@ -212,8 +213,10 @@ class FeatureTracker {
     for (const auto& [response, at] : finder_.Find(image, missing)) {
       if (std::ssize(features_) == options_.features) break;
       if (taken_.at<unsigned char>(at) != 0 || count[cell_of(at)] >= share) continue;
-      take(at);
-      add(StablePoint(image, options_, cv::Point2f(at)));
+      const cv::Point2f stable = StablePoint(image, options_, cv::Point2f(at));
+      if (taken_.at<unsigned char>(cv::Point(stable)) != 0) continue;  // that of another corner
+      take(cv::Point(stable));
+      add(stable);
     }
   }
 

@@ -11,9 +11,11 @@
 #include "alidade/host/source.h"
 #include "feature_tracker.h"
 #include "plugins/common/companion_files.h"
+#include "plugins/common/images/camera_size.h"
 #include "plugins/common/images/grey_image.h"
 #include "plugins/common/images/image_reader.h"
 #include "plugins/common/images/image_times.h"
+#include "plugins/common/images/start_frame.h"
 #include "plugins/tracks/calibration_file.h"
 
 namespace alidade {
@@ -44,17 +46,18 @@ namespace alidade {
 class ImageTracks : public Source {
  public:
   explicit ImageTracks(const SourceArguments& arguments)
-      : tracker_(TrackerOptions(arguments.params)) {
+      : tracker_(TrackerOptions(arguments.params)), start_(arguments.params, arguments.entry) {
     Params& p = arguments.params;
     rate_hz_ = p.Number("rate_hz", "Hz",
                         "images a second, where there is no table of times; 0: there is, or the "
                         "video says",
                         {0.0, 1e6}, 0.0);
-    start_ = p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0);
     most_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(
         p.Number("truth_tolerance_s", "s",
-                 "the true pose of an image is at most so far off in time", {0.0, 1e3}, 1e-3));
+                 "the true pose of an image is at most so far off in time; of the layout of TUM "
+                 "default 5e-3",
+                 {0.0, 1e3}, 1e-3));
     estimate_noise_ =
         p.Flag("estimate_noise",
                "each measurement brings its covariance; false: that of the sensors", false);
@@ -69,6 +72,9 @@ class ImageTracks : public Source {
       return node ? node->Text() : fallback;
     };
     Open(arguments.entry.At("path", "images"), text("images", ""), arguments.folder);
+    start_.Check(*images_);
+    times_->Check(*images_, start_.number(), most_);
+    if (is_tum_ && !arguments.entry.Find("truth_tolerance_s")) tolerance_ = kTumTolerance;
     if (const auto known = arguments.entry.Find("known")) {
       ReadKnown(arguments.folder / known->Text(), *known);
     }
@@ -76,6 +82,7 @@ class ImageTracks : public Source {
     if (guided_by_ == "none") guided_by_.clear();
     const std::string state = text("state_entry", "cam");
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
+    camera_ = CameraSize(arguments, *this);
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -83,8 +90,8 @@ class ImageTracks : public Source {
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
     if (images_->size() <= 0) return most_ > 0 ? most_ : -1;  // a camera, or a video that is silent
-    const std::int64_t left = std::max<std::int64_t>(0, images_->size() - start_);
-    return most_ > 0 ? std::min<std::int64_t>(most_, left) : left;
+    const std::int64_t left = start_.Left(images_->size());
+    return most_ > 0 ? std::min(most_, left) : left;
   }
   bool sees() const override { return true; }
   SeenImage Seen() const override { return {ToGreyImage(image_)}; }
@@ -100,11 +107,13 @@ class ImageTracks : public Source {
     if (frames_ == most_ && most_ > 0) return false;
     do {
       if (!images_->Next(image_)) {
+        start_.Check(images_->number() + 1);
         times_->End(images_->number() + 1);
         return false;
       }
-    } while (images_->number() < start_);
-    frame.timestamp = times_->At(images_->number(), images_->name());
+    } while (images_->number() < start_.number());
+    if (frames_ == 0) CheckSize();
+    frame.timestamp = times_->At(images_->number(), images_->name(images_->number()));
     frame.measurements.clear();
     if (frames_ == 0 && !known_.empty()) GiveKnown();
     for (const FeatureTracker::Feature& feature :
@@ -130,6 +139,21 @@ class ImageTracks : public Source {
   }
 
  private:
+  /// Of TUM's poses, 100 a second: half of what is between two.
+  static constexpr Timestamp kTumTolerance = 5'000'000;
+
+  /// The first image is as large as the camera, and has room for a feature.
+  void CheckSize() const {
+    camera_.Check(image_.size(), place());
+    const int least = 2 * tracker_.margin() + 1;
+    if (std::min(image_.cols, image_.rows) >= least) return;
+    throw Error(ExitCode::kBadData,
+                ErrorLine(place(), {},
+                          SizeText(image_.size()) + ", smaller than the patch that is followed, " +
+                              std::to_string(tracker_.window_px()) + " px, and its rim",
+                          std::to_string(least) + " px or more, or a smaller source.window_px"));
+  }
+
   /// Where the filter that guides expects each feature.
   FeatureTracker::Expectations ExpectedAt(Timestamp timestamp) const {
     if (guide_ == nullptr) return {};
@@ -225,12 +249,15 @@ class ImageTracks : public Source {
     const auto truth =
         first_of({home / "groundtruth.tum", home / "truth.tum", above / "groundtruth.txt"});
     if (truth) truth_.emplace(*truth, key.place(), key.path());
+    is_tum_ = truth && truth->filename() == "groundtruth.txt";
   }
 
   FeatureTracker tracker_;
+  StartFrame start_;
+  CameraSize camera_;
   double rate_hz_ = 0.0, systematic_px_ = 0.0;
-  bool estimate_noise_ = false;
-  std::int64_t start_ = 0, most_ = 0, frames_ = 0;
+  bool estimate_noise_ = false, is_tum_ = false;
+  std::int64_t most_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::vector<StreamInfo> streams_ = {{"tracks", 2}}, truths_;
   std::vector<Known> known_;

@@ -35,6 +35,13 @@ TEST(ConfigSet, RelativePathsAreTakenFromTheCurrentFolder) {
   EXPECT_EQ(path(), "/x.csv");
   config.Set("source.path", "-", "--set");
   EXPECT_EQ(path(), "-");
+  for (const char* key : {"known", "left", "right", "stereo", "boxes", "timestamps", "truth"}) {
+    config.Set(std::string("source.") + key, "tables/t.csv", "--set");
+    EXPECT_EQ(config.root().At("source").At(key).Text(),
+              (std::filesystem::current_path() / "tables/t.csv").string());
+  }
+  config.Set("source.truth", "{depth: z}", "--set");
+  EXPECT_EQ(config.root().At("source").At("truth").At("depth").Text(), "z");
   config.Set("plugins", "[p.so]", "--set");
   EXPECT_EQ(config.root().At("plugins").Items()[0].Text(),
             (std::filesystem::current_path() / "p.so").string());

@@ -177,6 +177,31 @@ TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
   EXPECT_THROW(filter.ExpectEach("stereo", later, {-1}), Error);
 }
 
+// As seen from where the camera then is. One that is not in the map has none.
+TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
+  Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), WithPrior()));
+  ekf.Process(FrameOf(0.0, {{3, {0.1, 0.2}}, {8, {-0.3, 0.0}}, {5, {0.0, -0.1}}}));
+  ekf.Process(FrameOf(0.1, {{3, {0.11, 0.2}}, {8, {-0.28, 0.0}}, {5, {0.01, -0.1}}}));
+  const State before = ekf.state();
+  const Timestamp later = ekf.timestamp() + 50'000'000;
+  const std::string& sensor = ekf.system().sensors[0].name;
+  const auto each = ekf.ExpectEach(sensor, later, {5, 99, 3, 8, -1});
+  ASSERT_EQ(each.size(), 5u);
+  EXPECT_FALSE(each[1]);
+  EXPECT_FALSE(each[4]);
+  for (const auto& [place, id] : {std::pair{0, 5}, {2, 3}, {3, 8}}) {
+    const auto& one = each[static_cast<std::size_t>(place)];
+    const auto alone = ekf.Expect(sensor, later, id);
+    ASSERT_TRUE(one && alone);
+    EXPECT_EQ(one->z, alone->z);
+    EXPECT_EQ(one->s, alone->s);
+  }
+  EXPECT_NEAR(each[0]->z[0], 0.01, 0.02);
+  EXPECT_NEAR(each[2]->z[1], 0.2, 0.02);
+  EXPECT_NEAR(each[3]->z[0], -0.28, 0.02);
+  ExpectSame(ekf.state(), before);
+}
+
 TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
   const Ekf ekf = MakeLive<Ekf>();
   EXPECT_EQ(ekf.stream("inverse_scale"), 1);

@@ -111,6 +111,19 @@ TEST(Metrics, TakesErrorsByHand) {
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
 
+// The error of an orientation and of a direction, whose elements have no unit.
+TEST(Metrics, ErrorsOfRotationsAreInRad) {
+  StateLayout layout;
+  layout.Declare("a.q", "a", SpaceOf("q", "", Geometry::UnitQuaternion()));
+  layout.Declare("a.m", "a", SpaceOf("m", "", Geometry::UnitVector()));
+  layout.Declare("a.share", "a", SpaceOf("share", "", Geometry::Vector(2)));
+  const MetricsOf one(layout, {{"q", 4}, {"m", 3}, {"share", 2}}, 0);
+  const std::map<std::string, std::string> units = one.metrics().units();
+  EXPECT_EQ(units.at("a.q"), "rad");
+  EXPECT_EQ(units.at("a.m"), "rad");
+  EXPECT_FALSE(units.contains("a.share"));
+}
+
 TEST(Metrics, TakesSegmentsApart) {
   MetricsOf one = OneScalar(2);
   one.in_segment() = {true, false};

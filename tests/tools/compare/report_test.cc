@@ -53,5 +53,18 @@ TEST(CompareReport, NamesNoRowsIfNoneIsLeftOut) {
   EXPECT_FALSE(Contains(CompareReport(comparison, TableStyle::kText, ReportRows::kMain), "--all"));
 }
 
+// Three runs decide nothing, wherever their interval lies; ten may.
+TEST(CompareReport, IntervalsOfFewRunsAreSaidToBeSo) {
+  for (const std::int64_t runs : {3, 9, 10}) {
+    Comparison comparison = Compared("truth", {"rmse:p.x"});
+    comparison.runs = runs;
+    comparison.estimators[0].ratios["rmse:p.x"] = {2.0, 1.0, runs, Interval{1.9, 2.1}};
+    const std::string text = CompareReport(comparison, TableStyle::kText);
+    EXPECT_TRUE(Contains(text, "2.0000 [1.9000, 2.1000]")) << text;
+    EXPECT_EQ(Contains(text, "2.1000] too few runs"), runs < 10) << text;
+    EXPECT_EQ(Contains(text, "too few runs: of fewer than 10"), runs < 10) << text;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

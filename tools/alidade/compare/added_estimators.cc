@@ -249,6 +249,10 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
   const auto beyond = BeyondBudget(compared, *options.budget_s, note);
   compared = Build(config, host, options, beyond);  // the source has been read
   compared.notes.push_back(note);
+  if (!beyond.empty()) {
+    compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
+                             " s left out what is named above";
+  }
   return compared;
 }
 

@@ -102,6 +102,7 @@ struct ComparedExperiment {
   std::string filter;              ///< whose error it is; "": there is no filter
   std::vector<std::string> added;  ///< names
   std::vector<std::string> notes;  ///< what was added and what could not be, with the reason
+  std::string beyond_budget = {};  ///< of steps of the decomposition that lack it; "": nothing was
 };
 
 /// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of

@@ -322,6 +322,16 @@ std::string CalibrationText(const Config& config, const Source& source) {
   return "  calibration of the data\n" + TextTable(rows, kIndent);
 }
 
+/// A row for each key of the source that is one value.
+std::string SourceKeys(const Node& source) {
+  std::vector<TextRow> rows;
+  for (const auto& [key, value] : source.Entries()) {
+    if (value.kind() != Node::Kind::kScalar || key == "type" || key == "seed") continue;
+    rows.push_back({key, value.Text()});
+  }
+  return rows.empty() ? "" : "  keys\n" + TextTable(rows, kIndent);
+}
+
 std::string SourceText(const Config& config, const Experiment& experiment) {
   const Node source = config.root().At("source");
   std::string text = "source " + source.At("type").Text();
@@ -339,7 +349,10 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
     rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
   }
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
-  text += TextTable(rows, kIndent);
+  text += TextTable(rows, kIndent) + SourceKeys(source);
+  if (const std::string guide = experiment.source->guided_by(); !guide.empty()) {
+    text += "  guide: filter '" + guide + "' says where to look for what is measured\n";
+  }
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
          CalibrationText(config, *experiment.source) +
          OutOfSequenceText(experiment.out_of_sequence);

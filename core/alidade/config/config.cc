@@ -109,15 +109,25 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
 }
 
 /// The keys of `source` that are a path to read from, as far as they are one value and not `-`.
-std::vector<ConfigTree*> SourcePaths(const ConfigTree& root) {
+/// Another plugin may call something else by a name that is usual for files: what has no slash and
+/// is none in `folder` is left alone.
+std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& folder) {
   std::vector<ConfigTree*> paths;
   const ConfigTree* const source = Child(root, "source");
   if (source == nullptr) return paths;
-  for (const char* key :
-       {"path", "known", "left", "right", "stereo", "boxes", "timestamps", "truth"}) {
+  const auto add = [&](const char* key, bool is_sure) {
     ConfigTree* const node = Child(*source, key);
-    if (node == nullptr || node->kind != Node::Kind::kScalar) continue;
-    if (!node->text.empty() && node->text != "-") paths.push_back(node);
+    if (node == nullptr || node->kind != Node::Kind::kScalar) return;
+    std::error_code error;
+    const std::string& text = node->text;
+    if (text.empty() || text == "-") return;
+    if (is_sure || text.find('/') != text.npos || fs::exists(folder / text, error)) {
+      paths.push_back(node);
+    }
+  };
+  add("path", true);
+  for (const char* key : {"known", "left", "right", "stereo", "boxes", "timestamps", "truth"}) {
+    add(key, false);
   }
   return paths;
 }
@@ -134,7 +144,7 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
     }
     if (!error) node->text = anchored.string();
   };
-  for (ConfigTree* const path : SourcePaths(root)) anchor(path);
+  for (ConfigTree* const path : SourcePaths(root, folder)) anchor(path);
   const ConfigTree* plugins = Child(root, "plugins");
   if (plugins == nullptr) return;
   for (const auto& plugin : plugins->children) anchor(plugin.get());
@@ -317,7 +327,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
 
 std::vector<std::string> Config::inputs() const {
   std::vector<std::string> all = files_;
-  for (const ConfigTree* const path : SourcePaths(*tree_)) all.push_back(path->text);
+  for (const ConfigTree* const path : SourcePaths(*tree_, {})) all.push_back(path->text);
   return all;
 }
 

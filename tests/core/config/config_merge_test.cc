@@ -40,6 +40,8 @@ TEST(ConfigSet, RelativePathsAreTakenFromTheCurrentFolder) {
     EXPECT_EQ(config.root().At("source").At(key).Text(),
               (std::filesystem::current_path() / "tables/t.csv").string());
   }
+  config.Set("source.left", "3", "--set");  // some other plugin's: no such file
+  EXPECT_EQ(config.root().At("source").At("left").Text(), "3");
   config.Set("source.truth", "{depth: z}", "--set");
   EXPECT_EQ(config.root().At("source").At("truth").At("depth").Text(), "z");
   config.Set("plugins", "[p.so]", "--set");

@@ -294,6 +294,7 @@ class CondensedRun {
   bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
              const std::vector<Point>& points, Inverse& place) const;
   bool FreezeLandmarks(const std::vector<Point>& points);
+  static constexpr double kSettledLandmark = 1e-10;  ///< sigma
   bool NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
                 const std::vector<Point>& points, Undefined undefined, Normal& normal,
                 Information* information) const;
@@ -301,7 +302,7 @@ class CondensedRun {
                       const Inverse& place, const Point& point, Normal& normal,
                       Information* information) const;
   bool OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
-                        Undefined undefined) const;
+                        Undefined undefined, double within = kSettledLandmark) const;
   bool Project(const Eigen::VectorXd& e, const std::vector<Point>& points, Undefined undefined,
                bool derivatives, Reduced& reduced);
   bool AddPlain(const std::vector<Point>& points, Undefined undefined, Information* information,

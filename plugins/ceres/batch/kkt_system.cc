@@ -87,7 +87,9 @@ std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
   return change;
 }
 
-bool KktSystem::Settle(Eigen::VectorXd& z, bool all) {
+bool KktSystem::Settle(Eigen::VectorXd& z, bool all, double left) {
+  const double each = std::sqrt(left / std::max(1.0, static_cast<double>(points_.size())));
+  const double within = std::max(CondensedRun::kSettledLandmark, each);
   using Undefined = CondensedRun::Undefined;
   std::vector<Point> points;
   if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
@@ -95,7 +97,8 @@ bool KktSystem::Settle(Eigen::VectorXd& z, bool all) {
     MapLandmark& landmark = run_.landmarks_[i];
     auto l = z.segment(points_[i].column, landmark.from.size());
     landmark.from = l;
-    if (!run_.OptimiseLandmark(landmark, points, all ? Undefined::kFails : Undefined::kSkipped)) {
+    const Undefined undefined = all ? Undefined::kFails : Undefined::kSkipped;
+    if (!run_.OptimiseLandmark(landmark, points, undefined, within)) {
       return false;
     }
     l = landmark.l;

@@ -59,8 +59,9 @@ class KktSystem {
   /// phi(z). Nothing where a model is not defined.
   std::optional<double> Cost(const Eigen::VectorXd& z);
   /// Moves the landmarks of z to where they cost least given e, by the observations that are
-  /// defined there, or by all: false then where one is not.
-  bool Settle(Eigen::VectorXd& z, bool all);
+  /// defined there, or by all: false then where one is not. Together they stop where less than
+  /// about `left` of the cost is to gain.
+  bool Settle(Eigen::VectorXd& z, bool all, double left);
   /// At z, on the states that it gives. False where a model is not defined.
   bool Linearise(const Eigen::VectorXd& z, double damping);
   /// About `trajectory` instead, freezing there, with landmarks where they cost least, in z too.

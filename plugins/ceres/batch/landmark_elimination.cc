@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "condensed_run.h"
 
@@ -239,25 +240,29 @@ bool CondensedRun::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& 
   return true;
 }
 
-/// Puts the landmark where it costs least, seen from the points: Gauss-Newton steps, halved until
-/// the cost falls.
+/// Puts the landmark where it costs least, seen from the points, to `within` sigma: Gauss-Newton
+/// steps, halved until the cost falls. One that the cost cannot show is taken as it is.
 bool CondensedRun::OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
-                                    Undefined undefined) const {
+                                    Undefined undefined, double within) const {
   constexpr int kMostSteps = 50, kMostHalvings = 20;
-  constexpr double kSettled = 1e-10;  // sigma of what is left to go
+  constexpr double kRounding = 1e-14;  // of the cost
   Normal now, next;
   landmark.l = landmark.from;
   if (!NormalOf(landmark, landmark.l, points, undefined, now, nullptr)) {
     landmark.l.setZero();
     if (!NormalOf(landmark, landmark.l, points, undefined, now, nullptr)) return false;
   }
+  double before = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMostSteps && landmark.l.size() > 0; ++i) {
     Eigen::VectorXd step = -now.c.llt().solve(now.b);
-    if (!(-step.dot(now.b) > kSettled * kSettled)) break;
+    const double decrement = -step.dot(now.b), rounding = kRounding * (1.0 + now.cost);
+    const bool unseen = decrement <= rounding;
+    if (!(decrement > within * within) || (unseen && decrement > 0.5 * before)) break;
+    before = decrement;
     bool fell = false;
-    for (int k = 0; k < kMostHalvings && !fell; ++k, step *= 0.5) {
+    for (int k = 0; k < (unseen ? 1 : kMostHalvings) && !fell; ++k, step *= 0.5) {
       fell = NormalOf(landmark, landmark.l + step, points, undefined, next, nullptr) &&
-             next.cost < now.cost;
+             (next.cost < now.cost || (unseen && next.cost <= now.cost + rounding));
       if (fell) landmark.l += step;
     }
     if (!fell) break;

@@ -62,9 +62,9 @@ bool SparseSolve::Start(const Trajectory& about) {
     if (!shape.has_unit_vector || kkt_.step().norm() <= kSettled) break;
     kkt_.Move(trajectory);
   }
-  if (linearised && kkt_.Settle(z_, false) && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
+  if (linearised && kkt_.Settle(z_, false, 0.0) && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
   z_.setZero();
-  return kkt_.Freeze(z_) && kkt_.Settle(z_, false) && kkt_.Freeze(z_) && kkt_.Cost(z_);
+  return kkt_.Freeze(z_) && kkt_.Settle(z_, false, 0.0) && kkt_.Freeze(z_) && kkt_.Cost(z_);
 }
 
 /// Until Q and R settle, and no observation that is defined is left out. In summary_, why it
@@ -99,16 +99,19 @@ constexpr double kRounding = 1e-13;  // of the cost
 /// cost least given e.
 SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
   constexpr double kLinear = 0.75;  // gain ratio below which landmarks are settled on their own
+  constexpr double kLeft = 1e-4;    // of what the step promises, to the next one
   const double cost = kkt_.cost();
   Trial next;
   next.z = z_ + kkt_.step();
   next.cost = kkt_.Cost(next.z);
+  if (!next.cost) ++undefined_;
   if (!run_.shape().has_landmarks || predicted <= kRounding * (1.0 + cost)) return next;
   if (next.cost && cost - *next.cost > kLinear * predicted) return next;
   Trial settled = next;
   const Eigen::Index map = z_.size() - run_.shape().inputs;
   if (!next.cost) settled.z.tail(map) = z_.tail(map);
-  settled.cost = kkt_.Settle(settled.z, true) ? kkt_.Cost(settled.z) : std::nullopt;
+  const double left = kLeft * predicted;
+  settled.cost = kkt_.Settle(settled.z, true, left) ? kkt_.Cost(settled.z) : std::nullopt;
   return settled.cost && !(next.cost && *next.cost < *settled.cost) ? settled : next;
 }
 
@@ -176,7 +179,14 @@ bool SparseSolve::EndUnsettled(double left, bool spent) {
                          " sigma long; " + larger
                    : "not converged: no step lowers the cost although the gradient is not zero; "
                      "check the models' Jacobians with alidade check";
-  if (!run_.problem().empty()) summary_ += ". A step was refused: " + run_.problem();
+  if (undefined_ > 0) {
+    summary_ += ". Of " + std::to_string(iterations_) + " steps " + std::to_string(undefined_) +
+                " led to where a model is not defined: " + run_.problem();
+    if (2 * undefined_ > iterations_) {
+      summary_ +=
+          "; the optimum is probably at the edge of its domain: more iterations do not help";
+    }
+  }
   return false;
 }
 

@@ -56,6 +56,7 @@ class SparseSolve {
   std::function<bool()> stop_;
   Eigen::VectorXd z_;
   int iterations_ = 0, solves_ = 0;
+  int undefined_ = 0;  ///< of the iterations, whose full step led to where a model is not defined
   std::string summary_, note_;
   bool failed_ = false;
 };

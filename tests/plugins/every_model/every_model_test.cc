@@ -50,7 +50,9 @@ TEST_P(EveryModel, GivesTheBatchItsFactors) {
 
 TEST_P(EveryModel, PassesTheChecker) {
   for (const PluginEntry& entry : FindModels(Shipped(), row_.model)) {
-    const std::vector<Finding> findings = CheckModel(Shipped(), entry, parameters_.root());
+    CheckOptions options;
+    options.timeout_s = 300.0;  // a busy machine, sanitizers
+    const std::vector<Finding> findings = CheckModel(Shipped(), entry, parameters_.root(), options);
     EXPECT_FALSE(AnyFailure(findings)) << CheckText(entry, findings);
   }
 }

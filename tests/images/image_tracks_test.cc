@@ -903,8 +903,8 @@ TEST_F(ImageTracks, PointsOfKnownDepthGiveTheMapItsScale) {
   std::ostringstream known;
   int count = 0;
   known << "u,v,depth_m\n";
-  const auto rows = Rows("scene/tracks.csv");
-  for (const Seen& one : rows.at(0)) {
+  const auto drawn = Rows("scene/tracks.csv");
+  for (const Seen& one : drawn.at(0)) {
     if (one.u < 30 || one.v < 30 || one.u > 290 || one.v > 210 || count == 6) continue;
     known << one.u << ',' << one.v << ',' << depth_m.at(one.feature) << '\n';
     ++count;

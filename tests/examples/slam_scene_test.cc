@@ -74,7 +74,7 @@ TEST(SlamScene, WithoutNoiseTheMapIsExactButForLinearisation) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 0.05);
 }
 
-// docs/why_filters_fail.md: the depths of 3 of these 20 are reversed where landmarks do not wait.
+// docs/why_filters_fail.md: 3 of these 20 are inconsistent where landmarks do not wait.
 TEST(SlamScene, WhoseMotionIsSlowKeepsItsDepthWhereLandmarksWaitForTheMotion) {
   const SweepSummary waits = Twenty("slow_sweep.yaml");
   EXPECT_EQ(waits.diverged + waits.inconsistent, 0);

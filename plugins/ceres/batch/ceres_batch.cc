@@ -72,9 +72,9 @@ class CeresBatch : public Estimator {
   void Smooth(const Emit& emit) override {
     const std::size_t frames = run_.shape().frames;
     if (!refused_ && frames == 0) return;
-    const auto put = [&](std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p) {
+    const SparseSolve::Take put = [&](std::size_t k, const auto& x, const auto& covariance) {
       solve_.HeedStop();
-      run_.Put(k, x, p, state_, report_);
+      run_.Put(k, x, covariance(), state_, report_);
       if (k + 1 == frames) {
         Note(report_.events);
         report_.events.push_back({run_.timestamp(), "solution", WhyFailed()});
@@ -101,7 +101,7 @@ class CeresBatch : public Estimator {
 
   bool SmoothDense(const SparseSolve::Take& put) {
     return solve_.SolveAll(run_, filtered_, e_) && PutAll([&](std::size_t k, const Point& point) {
-             put(k, point.x, CovarianceOf(point, solve_.u()));
+             put(k, point.x, [&] { return CovarianceOf(point, solve_.u()); });
            });
   }
 
@@ -113,18 +113,18 @@ class CeresBatch : public Estimator {
   }
 
   void Note(std::vector<Event>& events) const {
-    if (!sparse_) {
+    if (sparse_) {
+      sparse_->Note(run_.timestamp(), events);
+    } else {
       solve_.Note(run_.timestamp(), events);
-    } else if (!sparse_->note().empty()) {
-      events.push_back({run_.timestamp(), "not_converged", sparse_->note()});
     }
   }
 
   void SolveSoFar() {
     const std::size_t last = run_.shape().frames - 1;
     if (IsSparse()) {
-      SmoothSparse([&](std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p) {
-        if (k == last) run_.Put(k, x, p, state_, report_);
+      SmoothSparse([&](std::size_t k, const auto& x, const auto& covariance) {
+        if (k == last) run_.Put(k, x, covariance(), state_, report_);
       });
     } else if (solve_.SolveAnew(run_, filtered_, e_)) {
       PutAll([&](std::size_t k, const Point& point) {

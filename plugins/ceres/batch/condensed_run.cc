@@ -24,28 +24,35 @@ Eigen::MatrixXd CovarianceOf(const Point& point, const Eigen::MatrixXd& u) {
   return y.transpose() * y;
 }
 
+/// All blocks that have a place, with a value.
+State CondensedRun::Filled(State state) {
+  for (std::size_t i = 0; i < state.layout().blocks().size(); ++i) {
+    const Block block = state.layout().blocks()[i];
+    if (block.present || block.value_offset < 0) continue;
+    const Geometry& geometry = block.geometry();
+    std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
+    geometry.Identity(value.data());
+    state.Add(static_cast<BlockId>(i), value.data(),
+              Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
+  }
+  return state;
+}
+
 CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s,
                            int most_inputs)
     : binding_(std::move(system), streams),
-      initial_(binding_.initial),
+      initial_(Filled(binding_.initial)),
       time_(binding_.system, streams, max_dt_s),
       most_inputs_(most_inputs) {
-  for (const Block& block : initial_.layout().blocks()) {
+  for (const Block& block : binding_.initial.layout().blocks()) {
     present_.push_back(block.present);
     if (block.has_covariance()) inputs_ += block.geometry().tangent;
   }
+  prior_ = present_;
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
-  internal::SquareRootOf(initial_.covariance().Dense(), ldlt, l0_);
+  internal::SquareRootOf(binding_.initial.covariance().Dense(), ldlt, l0_);
   l0_ = l0_.leftCols(inputs_).eval();  // the others are zero
   d0_ = Eigen::VectorXd::Zero(l0_.rows());
-  for (std::size_t i = 0; i < present_.size(); ++i) {
-    const BlockId id = static_cast<BlockId>(i);
-    if (present_[i] || initial_.layout()[id].value_offset < 0) continue;
-    const Geometry geometry = initial_.layout()[id].geometry();
-    std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
-    geometry.Identity(value.data());
-    initial_.Add(id, value.data(), Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
-  }
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
@@ -54,12 +61,18 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   });
   held_.assign(binding_.motion_places.size(), -1);
   held_l_.resize(binding_.motion_places.size());
+  PutPlaces();
+  if (has_landmarks()) AddKnown();
+}
+
+void CondensedRun::PutPlaces() {
+  places_.clear();
+  xyz_places_.clear();
   for (std::size_t i = 0; i < binding_.sensor_places.size(); ++i) {
     const SensorBinding& sensor = binding_.system.sensors[i];
     places_.push_back(PlaceBehind(i, sensor.model));
     xyz_places_.push_back(PlaceBehind(i, sensor.xyz.value_or(sensor.model)));
   }
-  if (has_landmarks()) AddKnown();
 }
 
 /// The place of a sensor in x and S; that of a landmark which it observes lies behind them.
@@ -407,87 +420,6 @@ bool CondensedRun::StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e,
   return true;
 }
 
-// The first frame becomes part of the prior.
-
-/// Of the inputs up to the first frame, c of them, with its residuals r(e^) and A = dr/de, weighed:
-///
-///   [I; A] = Q U,   e ~ N(e^ + s, (U'U)^-1),   s = -(U'U)^-1 (e^ + A' r)
-///   x      = x^ (+) (S s + S U^-1 n),   n ~ N(0, I)
-///   L'     = triangle of U^-T S' = Q_L L',   e_0 = -Q_L' U s   is where x = x^
-bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
-  ALIDADE_EXPECTS(!has_landmarks() && !epochs_.empty() && e.size() == inputs_);
-  if (!epochs_.front().ends) {
-    PassOnFirst();
-    return true;
-  }
-  const Eigen::Index c = epochs_.size() > 1 ? epochs_[1].column : inputs_;
-  const Eigen::Index n = initial_.covariance().size();
-  Point point;
-  if (!Begin(e.data(), inputs_, point) || !Advance(0, e.data(), point)) return false;
-  const Eigen::MatrixXd s = point.s.leftCols(c);
-  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(c, c), a;
-  Eigen::VectorXd r = e.head(c), residual;
-  for (const Factor& factor : epochs_.front().factors) {
-    if (factor.row < 0) continue;
-    if (!Residual(factor, point.x, residual, &a)) return false;
-    const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
-    const Eigen::Index rows = residual.size(), before = j.rows();
-    j.conservativeResize(before + rows, Eigen::NoChange);
-    r.conservativeResize(before + rows);
-    j.bottomRows(rows) = root * a * s;
-    r.tail(rows) = root * residual;
-  }
-  const internal::LeastSquares newest = internal::SolveLeastSquares(j, r);
-  const Eigen::MatrixXd& u = newest.r;
-  const Eigen::VectorXd step = -newest.x;
-  Eigen::MatrixXd y = Eigen::MatrixXd::Zero(std::max(c, n), n);
-  if (n > 0) y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
-  Eigen::VectorXd e0 = Eigen::VectorXd::Zero(y.rows());
-  e0.head(c) = -u * step;
-  const internal::LeastSquares of_y = internal::SolveLeastSquares(y, e0);
-  if (!step.allFinite() || !y.allFinite()) return Fail("the prior of the window is not finite");
-
-  initial_.values() = point.x;
-  d0_ = s * step;
-  l0_ = of_y.r.transpose();
-  Eigen::VectorXd moved(n + e.size() - c);
-  moved << of_y.q_adjoint_b.head(n), e.tail(e.size() - c);
-  e = std::move(moved);
-  epochs_.erase(epochs_.begin());
-  Shift(static_cast<int>(n - c));
-  return true;
-}
-
-/// Drops the first frame, which tells nothing; the steps to it lead to the next one.
-void CondensedRun::PassOnFirst() {
-  passed_on_.swap(epochs_.front().steps);
-  epochs_.erase(epochs_.begin());
-  if (epochs_.empty()) return;
-  Epoch& next = epochs_.front();
-  next.column = 0;
-  next.steps.insert(next.steps.begin(), passed_on_.begin(), passed_on_.end());
-  passed_on_.clear();
-}
-
-/// The places of inputs and residuals, once those of the first frame are gone.
-void CondensedRun::Shift(int columns) {
-  inputs_ += columns;
-  for (int& column : held_) column += column < 0 ? 0 : columns;
-  residuals_ = 0;
-  parts_.clear();
-  for (Epoch& epoch : epochs_) {
-    epoch.column = &epoch == &epochs_.front() ? 0 : epoch.column + columns;
-    for (Step& step : epoch.steps) {
-      step.column += columns;
-      step.columns += columns;
-    }
-    for (FirstValue& first : epoch.first_values) first.column += columns;
-    for (Factor& factor : epoch.factors) {
-      if (factor.row >= 0) AddPart(factor);
-    }
-  }
-}
-
 // Estimates and reports.
 
 void CondensedRun::Put(std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p,
@@ -497,8 +429,8 @@ void CondensedRun::Put(std::size_t k, const std::vector<double>& x, const Eigen:
     const int t = block.geometry().tangent;
     state.Add(first.block, x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
   }
-  state.values() = x;
-  if (p.rows() > 0) state.covariance().SetBlock(0, 0, p);  // else all blocks are constant
+  std::copy_n(x.begin(), state.values().size(), state.values().begin());  // no landmarks
+  if (p.rows() > 0) state.covariance().SetBlock(0, 0, p);                 // else all are constant
   Report(k, x, report);
 }
 
@@ -512,7 +444,8 @@ void CondensedRun::Report(std::size_t k, const std::vector<double>& values,
     MeasurementReport& entry = report.measurements()[i];
     entry.outcome = factor.left_out ? Outcome::kOutOfDomain : factor.outcome;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
-    const bool of_landmark = factor.landmark >= 0 && entry.outcome == Outcome::kAccepted;
+    const bool of_landmark =
+        factor.row < 0 && factor.landmark >= 0 && entry.outcome == Outcome::kAccepted;
     if (factor.row < 0 && !of_landmark) continue;
     std::vector<double> x = values;
     if (of_landmark) {

@@ -37,7 +37,7 @@ struct Factor {
   bool xyz = false;  ///< a known landmark: the sensor's model of one that is xyz
   Measurement measurement;
   Outcome outcome = Outcome::kAccepted;
-  int row = -1;           ///< of r; -1: not in use, or of a landmark
+  int row = -1;           ///< of r; -1: not in use, or of a landmark that has inputs
   int landmark = -1;      ///< index of the one that it sees
   bool left_out = false;  ///< of a landmark: not defined at the start, nor since
   Eigen::MatrixXd l;      ///< frozen
@@ -80,6 +80,9 @@ using TakePoint = std::function<void(std::size_t frame, const Point&)>;
 ///
 /// So it has the information of the filter's initialisation: the observation k is consumed by it,
 /// an anchor is the camera itself, and the prior of the inverse distance counts once.
+///
+/// Once the frame of that observation has left the window, y is one more block of the state, and
+/// has no inputs of its own: see CondensedRun::MarginaliseFirst.
 struct MapLandmark {
   /// A factor of a frame.
   struct Observation {
@@ -87,14 +90,22 @@ struct MapLandmark {
   };
   std::int64_t id = -1;
   int generation = 0;                     ///< landmarks of this id before it
+  int sensor = -1;                        ///< that saw it first
+  bool xyz = false;                       ///< by its model of one that is xyz: known
+  int observed = 0;                       ///< how often, without the first
   std::optional<Observation> first;       ///< none: known
-  std::vector<Observation> observations;  ///< in their order, without the first
+  std::vector<Observation> observations;  ///< in their order, without the first; of the window
   double prior = 0.0;                     ///< rho0, 1/m
   double sigma = 0.0;                     ///< of rho0; known: of m; 0: exact
   std::vector<double> mean;               ///< m, where known
   Eigen::VectorXd from;                   ///< l that a search starts from
   Eigen::VectorXd l;                      ///< found last
   std::vector<double> y;                  ///< its value there, ambient, one role after the other
+
+  // Of one that is in the state.
+  std::vector<BlockId> blocks;                ///< by role; empty: it is not
+  std::vector<internal::SensorPlace> places;  ///< by sensor
+  bool in_state() const { return !blocks.empty(); }
 };
 
 /// The values x of a state and, behind, y of a landmark.
@@ -177,11 +188,15 @@ class CondensedRun {
   bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter,
            Trajectory& about);
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
-  /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
-  /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks. A
-  /// frame after which noise goes on being held has no measurement: its steps become those of the
-  /// next one. False where a model is not defined: nothing has changed.
-  bool MarginaliseFirst(Eigen::VectorXd& e);
+  /// that frame; e becomes the same trajectory in the inputs that are left, and `about` one of the
+  /// frames that are left. L_0 is a square root: P_0 may stay singular. Q, R and the weights of
+  /// losses are those at e. A frame after which noise goes on being held has no measurement: its
+  /// steps become those of the next one. False where a model is not defined: nothing has changed.
+  ///
+  /// Landmarks that began in that frame become blocks of the state, as long as a frame that is left
+  /// sees them, or `map`, what a filter has, names them. The dense solver does not know such ones.
+  bool MarginaliseFirst(Eigen::VectorXd& e, const std::vector<LandmarkEstimate>& map,
+                        Trajectory& about);
   /// Its parts are good until one of these is called.
   RunShape shape() const {
     return {inputs_,          residuals_, epochs_.size(), has_landmarks(),
@@ -247,7 +262,9 @@ class CondensedRun {
   bool Begin(const double* e, int columns, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
+  static State Filled(State state);
   std::vector<double> ValuesOf(const State& state) const;
+  std::vector<double> ValuesOf(const MapLandmark& landmark, const std::vector<double>& x) const;
   bool AddSteps(Timestamp from, Timestamp to, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
@@ -257,10 +274,27 @@ class CondensedRun {
   void AddPart(Factor& factor);
   bool has_landmarks() const { return binding_.system.landmarks.has_value(); }
   internal::SensorPlace PlaceBehind(std::size_t sensor, const SensorModel& model) const;
+  void PutPlaces();
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
   bool ObservesLandmarks(const SensorBinding& sensor) const {
     return has_landmarks() && sensor.model.has_landmark();
   }
+  /// A landmark with inputs that the first frame sees, and where these are in (e, l).
+  struct Leaving {
+    std::size_t landmark;
+    Eigen::Index column;
+    Inverse place;
+  };
+  bool FindLeaving(const std::vector<Point>& first, std::vector<Leaving>& leaving) const;
+  bool LineariseFirst(const Point& point, const std::vector<Leaving>& leaving, Eigen::MatrixXd& j,
+                      Eigen::VectorXd& r) const;
+  std::vector<bool> FindGoingOn(const std::vector<Leaving>& leaving,
+                                const std::vector<LandmarkEstimate>& map) const;
+  Eigen::MatrixXd PutInState(const Point& point, std::vector<Leaving>& leaving,
+                             const std::vector<bool>& goes_on, Eigen::Index columns);
+  void AddBlocks(MapLandmark& landmark, State& state) const;
+  void LetGo(const std::vector<bool>& goes_on);
+  void DropFirst(Trajectory& about);
   void Shift(int columns);
   bool Present(BlockId id) const { return id < 0 || present_[static_cast<std::size_t>(id)]; }
   bool Move(const Step& step, const double* e, Point& point) const;
@@ -271,7 +305,7 @@ class CondensedRun {
   bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
   void EndInterval(Epoch& epoch);
-  void PassOnFirst();
+  void PassOnFirst(Trajectory& about);
   // Of a factor of a landmark x has the landmark's values behind.
   bool FreezeFactor(Factor& factor, const std::vector<double>& x);
   bool Residual(const Factor& factor, const std::vector<double>& x, Eigen::VectorXd& r,
@@ -283,13 +317,22 @@ class CondensedRun {
   const SensorBinding& SensorOf(const Factor& factor) const {
     return binding_.system.sensors[static_cast<std::size_t>(factor.sensor)];
   }
+  const SensorModel& ModelOf(int sensor, bool xyz) const {
+    const SensorBinding& binding = binding_.system.sensors[static_cast<std::size_t>(sensor)];
+    return xyz ? *binding.xyz : binding.model;
+  }
   const SensorModel& ModelOf(const Factor& factor) const {
-    return factor.xyz ? *SensorOf(factor).xyz : SensorOf(factor).model;
+    return ModelOf(factor.sensor, factor.xyz);
   }
-  /// y of a landmark lies behind x, its rows behind S.
+  /// y of a landmark that has inputs lies behind x, its rows behind S.
   const internal::SensorPlace& PlaceOf(const Factor& factor) const {
-    return (factor.xyz ? xyz_places_ : places_)[static_cast<std::size_t>(factor.sensor)];
+    const auto sensor = static_cast<std::size_t>(factor.sensor);
+    if (IsOfState(factor))
+      return landmarks_[static_cast<std::size_t>(factor.landmark)].places[sensor];
+    return (factor.xyz ? xyz_places_ : places_)[sensor];
   }
+  /// Whether it sees a landmark that is in the state.
+  static bool IsOfState(const Factor& factor) { return factor.row >= 0 && factor.landmark >= 0; }
   bool PointsOf(const Eigen::VectorXd& e, bool sensitivity, std::vector<Point>& points) const;
   bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
              const std::vector<Point>& points, Inverse& place) const;
@@ -321,15 +364,19 @@ class CondensedRun {
   internal::Binding binding_;
   std::vector<internal::SensorPlace> places_, xyz_places_;  ///< by sensor
   State initial_;                 ///< all blocks that have a place have a value
-  std::vector<bool> present_;     ///< at the last frame, by block
+  std::vector<bool> present_;     ///< at the last frame, by block of the system
+  std::vector<bool> prior_;       ///< likewise, before the first one
   std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1
   std::vector<RowMajor> held_l_;  ///< by motion: L of the last step that begins
   Eigen::MatrixXd l0_;            ///< n x the rows of blocks with a prior, later n x n
   Eigen::VectorXd d0_;            ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
   std::vector<Epoch> epochs_;
   std::vector<MapLandmark> landmarks_;
-  std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_
-  std::vector<int> read_;                ///< tangent rows of a state that sensors read
+  struct Current {
+    int landmark, generation;  ///< -1: it is gone
+  };
+  std::map<std::int64_t, Current> current_;  ///< by id: the last one
+  std::vector<int> read_;                    ///< tangent rows of a state that sensors read
   std::vector<Part> parts_;
   Timestamp timestamp_ = kNoTimestamp;
   internal::Timeline time_;

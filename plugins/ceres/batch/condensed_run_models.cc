@@ -173,7 +173,7 @@ bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, 
   if (a != nullptr) {
     const internal::SensorPlace& place = PlaceOf(factor);
     const Eigen::Map<const RowMajor> j_h(jacobian.data(), m, place.width);
-    const int width = ObservesLandmarks(sensor)
+    const int width = factor.row < 0 && ObservesLandmarks(sensor)
                           ? place.parts.back().offset + place.parts.back().size
                           : initial_.covariance().size();
     a->setZero(m, width);

@@ -3,12 +3,14 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "condensed_run.h"
 #include "initialising_filter.h"
 #include "map_solve.h"
+#include "sparse_solve.h"
 
 namespace alidade::ceres_batch {
 namespace {
@@ -23,10 +25,12 @@ Timestamp LagOf(double lag_s) {
 /// of CondensedRun, given a prior that holds all that came before.
 ///
 ///   window   frames j with t_k - t_j <= lag_s, k the newest
-///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left
+///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left, and of the
+///            landmarks that began in it or before
 ///
 /// A frame that leaves is linearised at the last solution, and stays so: see
 /// CondensedRun::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
+/// With landmarks it is solved by SparseSolve, else by MapSolve: a window has few inputs.
 ///
 /// Source       [Sibley2010].
 class FixedLag : public Estimator {
@@ -35,6 +39,7 @@ class FixedLag : public Estimator {
            const std::vector<StreamInfo>& streams)
       : lag_(LagOf(lag_s)),
         lagged_(lagged),
+        options_(options),
         run_(system, streams, options.max_dt_s),
         solve_(options),
         state_(system.InitialState(/*reserved=*/true)),
@@ -46,9 +51,12 @@ class FixedLag : public Estimator {
   }
   bool offline() const override { return lagged_; }
   const State& state() const override { return state_; }
+  std::vector<LandmarkEstimate> landmarks() const override { return map_; }
   Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed(); }
-  bool failed() const override { return refused_ || solve_.failed(); }
+  bool failed() const override {
+    return refused_ || solve_.failed() || (sparse_ && sparse_->failed());
+  }
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
@@ -76,7 +84,10 @@ class FixedLag : public Estimator {
     UpdateReport report;
   };
 
-  const std::string& WhyFailed() const { return refused_ ? run_.problem() : solve_.summary(); }
+  const std::string& WhyFailed() const {
+    if (refused_) return run_.problem();
+    return sparse_ ? sparse_->summary() : solve_.summary();
+  }
 
   bool Leaves(Timestamp timestamp, Timestamp newest) const {
     Timestamp age = 0;
@@ -89,48 +100,72 @@ class FixedLag : public Estimator {
     while (leaving < timestamps_.size() && Leaves(timestamps_[leaving], newest)) ++leaving;
     if (offline() && !Keep(leaving)) return false;
     for (std::size_t i = 0; i < leaving; ++i) {
-      if (!run_.MarginaliseFirst(e_)) return false;
+      if (!run_.MarginaliseFirst(e_, map_, about_)) return false;
     }
-    const auto count = static_cast<std::ptrdiff_t>(leaving);
-    timestamps_.erase(timestamps_.begin(), timestamps_.begin() + count);
-    about_.erase(about_.begin(), about_.begin() + count);
+    timestamps_.erase(timestamps_.begin(),
+                      timestamps_.begin() + static_cast<std::ptrdiff_t>(leaving));
     return true;
   }
 
   /// Keeps the estimates of the first `count` frames of the window.
   bool Keep(std::size_t count) {
-    return run_.ForEachFrame(e_, count, [&](std::size_t k, const Point& point) {
-      Kept kept;
-      run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, kept.report);
-      kept.state = state_;
-      kept_.push_back(std::move(kept));
+    return count == 0 || ForEachFrame([&](std::size_t k, const auto& x, const auto& covariance) {
+             if (k >= count) return;
+             Kept kept;
+             run_.Put(k, x, covariance(), state_, kept.report);
+             kept.state = state_;
+             kept_.push_back(std::move(kept));
+           });
+  }
+
+  /// Gives the estimates of the last solution, and makes its map.
+  bool ForEachFrame(const SparseSolve::Take& take) {
+    if (sparse_) return sparse_->PutAll(take, map_);
+    return run_.ForEachFrame(e_, run_.shape().frames, [&](std::size_t k, const Point& point) {
+      take(k, point.x, [&] { return CovarianceOf(point, solve_.u()); });
     });
+  }
+
+  /// The inputs become those of the solution. False, and WhyFailed, where there is none.
+  bool Solve() {
+    if (!run_.shape().has_landmarks) return solve_.SolveAnew(run_, about_, e_);
+    map_ = initialiser_.filter().landmarks();
+    sparse_.emplace(run_, options_);
+    if (!sparse_->SolveAll(about_)) return false;
+    e_ = sparse_->inputs();
+    return true;
   }
 
   void SolveWindow(Timestamp timestamp) {
     timestamps_.push_back(run_.timestamp());
-    if (!solve_.SolveAnew(run_, about_, e_)) return;
+    if (!Solve()) return;
     about_.clear();
     const std::size_t frames = run_.shape().frames;
-    const auto take = [&](std::size_t k, const Point& point) {
-      about_.push_back(point.x);
-      if (!offline() && k + 1 == frames)
-        run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
-    };
-    solve_.FailUnless(run_.ForEachFrame(e_, frames, take), run_);
-    solve_.Note(timestamp, report_.events);
+    const bool all = ForEachFrame([&](std::size_t k, const auto& x, const auto& covariance) {
+      about_.push_back(x);
+      if (!offline() && k + 1 == frames) run_.Put(k, x, covariance(), state_, report_);
+    });
+    if (sparse_) {
+      sparse_->Note(timestamp, report_.events);
+    } else {
+      solve_.FailUnless(all, run_);
+      solve_.Note(timestamp, report_.events);
+    }
   }
 
   Timestamp lag_;
-  bool lagged_;       ///< the output, else current
+  bool lagged_;  ///< the output, else current
+  SolveOptions options_;
   CondensedRun run_;  ///< that of the window
   MapSolve solve_;
+  std::optional<SparseSolve> sparse_;  ///< with landmarks: of the last window
   State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter
       initialiser_;  ///< gives the newest frame a start, and blocks their first values
   std::vector<Timestamp> timestamps_;
   Trajectory about_;  ///< the last solution
   std::vector<Kept> kept_;
+  std::vector<LandmarkEstimate> map_;
   Eigen::VectorXd e_;
   UpdateReport report_;
   bool refused_ = false;  ///< a frame, or to let go of one; there is nothing to go on with

@@ -6,8 +6,9 @@
 
 namespace alidade::ceres_batch {
 
-/// No known roles, consider blocks, roles linearised at the measurement, landmarks.
-inline constexpr Support kFixedLagSupport = {.known = false, .from_measurement = true};
+/// No known roles, consider blocks, roles linearised at the measurement.
+inline constexpr Support kFixedLagSupport = {
+    .known = false, .from_measurement = true, .landmarks = true};
 
 /// The estimator type `fixed_lag`, from its entry in a config.
 EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments);

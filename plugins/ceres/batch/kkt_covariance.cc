@@ -46,6 +46,13 @@ void KktSystem::Invert() {
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const MapLandmark& landmark = run_.landmarks_[i];
+    const std::vector<int> own = ConstantsOf(landmark);
+    for (const int a : own) {
+      for (const int b : own) {
+        want(constants_[static_cast<std::size_t>(a)].value,
+             constants_[static_cast<std::size_t>(b)].value);
+      }
+    }
     want(points_[i].variable, points_[i].variable);
     if (!landmark.first) continue;
     want(points_[i].variable, nodes_[node_of_[landmark.first->epoch]].read);
@@ -62,7 +69,23 @@ Eigen::MatrixXd KktSystem::Found(int i, int j) const {
   return i >= j ? block : Eigen::MatrixXd(block.transpose());
 }
 
-/// P of node k.
+/// The covariance of variables side by side.
+Eigen::MatrixXd KktSystem::JointOf(const std::vector<int>& variables) const {
+  Eigen::Index size = 0, row = 0;
+  for (const int v : variables) size += ldl_.SizeOf(v);
+  Eigen::MatrixXd p(size, size);
+  for (const int a : variables) {
+    Eigen::Index column = 0;
+    for (const int b : variables) {
+      p.block(row, column, ldl_.SizeOf(a), ldl_.SizeOf(b)) = Found(a, b);
+      column += ldl_.SizeOf(b);
+    }
+    row += ldl_.SizeOf(a);
+  }
+  return p;
+}
+
+/// P of node k, with zeros for landmarks.
 Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
   const auto n = Eigen::Index{run_.initial_.covariance().size()};
   Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
@@ -85,7 +108,8 @@ Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
 Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
   const std::size_t k = node_of_[frame];
   const Node& node = nodes_[k];
-  if (frame == node.last) return Clipped(JointOf(k));
+  const auto system = run_.binding_.initial.covariance().size();
+  if (frame == node.last) return Clipped(JointOf(k).topLeftCorner(system, system));
   const auto n = Eigen::Index{run_.initial_.covariance().size()};
   std::vector<int> multipliers;
   if (node.multiplier >= 0) multipliers.push_back(node.multiplier);
@@ -115,11 +139,16 @@ Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
     const Eigen::MatrixXd f = s.leftCols(n), fc = f * cross * by_w.transpose();
     p += f * JointOf(k - 1) * f.transpose() + fc + fc.transpose();
   }
-  return Clipped(p);
+  return Clipped(p.topLeftCorner(system, system));
 }
 
 Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
   const MapLandmark& landmark = run_.landmarks_[i];
+  if (landmark.in_state()) {
+    std::vector<int> variables = ConstantsOf(landmark);
+    for (int& v : variables) v = constants_[static_cast<std::size_t>(v)].value;
+    return Clipped(JointOf(variables));
+  }
   const Point3& point = points_[i];
   const Eigen::MatrixXd own = Found(point.variable, point.variable);
   const Eigen::MatrixXd& by_l = point.place.by_d;
@@ -132,17 +161,7 @@ Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
   variables.insert(variables.begin(), point.variable);
   Eigen::MatrixXd j(by_l.rows(), by_l.cols() + point.c.cols());
   j << by_l, point.place.by_x - by_l * point.c;
-  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(j.cols(), j.cols());
-  Eigen::Index row = 0;
-  for (const int a : variables) {
-    Eigen::Index column = 0;
-    for (const int b : variables) {
-      p.block(row, column, ldl_.SizeOf(a), ldl_.SizeOf(b)) = Found(a, b);
-      column += ldl_.SizeOf(b);
-    }
-    row += ldl_.SizeOf(a);
-  }
-  return Clipped(j * p * j.transpose());
+  return Clipped(j * JointOf(variables) * j.transpose());
 }
 
 void KktSystem::PutMap(std::vector<LandmarkEstimate>& map) const {
@@ -150,7 +169,8 @@ void KktSystem::PutMap(std::vector<LandmarkEstimate>& map) const {
     const auto found = std::ranges::find_if(run_.landmarks_, [&](const MapLandmark& landmark) {
       return landmark.id == estimate.id && landmark.generation == estimate.generation;
     });
-    if (found == run_.landmarks_.end() || found->from.size() == 0) continue;  // known exactly
+    if (found == run_.landmarks_.end()) continue;
+    if (found->from.size() == 0 && !found->in_state()) continue;  // known exactly
     const auto i = static_cast<std::size_t>(found - run_.landmarks_.begin());
     run_.Describe(*found, LandmarkCovariance(i), estimate);
   }

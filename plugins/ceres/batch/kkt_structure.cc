@@ -29,7 +29,9 @@ void KktSystem::FindConstants() {
       std::fill_n(read.begin() + part.offset, part.size, true);
     }
   }
-  for (const Block& block : run_.initial_.layout().blocks()) {
+  const std::size_t system = run_.prior_.size();
+  for (std::size_t id = 0; id < run_.initial_.layout().blocks().size(); ++id) {
+    const Block& block = run_.initial_.layout().blocks()[id];
     if (!block.has_covariance()) continue;
     std::vector<int> rows(static_cast<std::size_t>(block.geometry().tangent));
     std::iota(rows.begin(), rows.end(), block.tangent_offset);
@@ -38,7 +40,9 @@ void KktSystem::FindConstants() {
       std::vector<int>& into = read[first] ? read_rows_ : rest_rows_;
       into.insert(into.end(), rows.begin(), rows.end());
     } else {
-      constants_.emplace_back().rows = std::move(rows);
+      Constant& constant = constants_.emplace_back();
+      constant.rows = std::move(rows);
+      constant.of_landmark = id >= system;
     }
   }
   rows_ = read_rows_;
@@ -72,7 +76,7 @@ void KktSystem::FindNodes() {
     Node& node = nodes_[k];
     node.columns = (k + 1 < nodes_.size() ? nodes_[k + 1].column : run_.inputs_) - node.column;
     for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
-      if (run_.binding_.initial.layout().blocks()[id].present) bear(static_cast<BlockId>(id), 0);
+      if (id >= run_.prior_.size() || run_.prior_[id]) bear(static_cast<BlockId>(id), 0);
     }
     for (std::size_t i = node.first; i <= node.last; ++i) {
       for (const FirstValue& first : epochs[i].first_values) bear(first.block, k);
@@ -103,9 +107,9 @@ void KktSystem::AddTerm(const std::vector<int>& variables) {
   terms_.push_back(term);
 }
 
-std::vector<int> KktSystem::ConstantsOf(std::size_t sensor) const {
+std::vector<int> KktSystem::ConstantsOf(const std::vector<JacobianPart>& parts) const {
   std::vector<int> found;
-  for (const JacobianPart& part : run_.binding_.sensor_places[sensor].parts) {
+  for (const JacobianPart& part : parts) {
     for (std::size_t i = 0; i < constants_.size(); ++i) {
       const int at = static_cast<int>(i);
       if (constants_[i].born && constants_[i].rows.front() == part.offset &&
@@ -117,6 +121,15 @@ std::vector<int> KktSystem::ConstantsOf(std::size_t sensor) const {
   return found;
 }
 
+/// Of one in the state, by block.
+std::vector<int> KktSystem::ConstantsOf(const MapLandmark& landmark) const {
+  std::vector<JacobianPart> parts;
+  for (const BlockId id : landmark.blocks) {
+    parts.push_back({run_.initial_.layout()[id].tangent_offset, 0, 0});
+  }
+  return ConstantsOf(parts);
+}
+
 bool KktSystem::ReadsStates(std::size_t sensor) const {
   const auto moves = [this](const JacobianPart& part) {
     return std::ranges::find(read_rows_, part.offset) != read_rows_.end();
@@ -124,13 +137,14 @@ bool KktSystem::ReadsStates(std::size_t sensor) const {
   return std::ranges::any_of(run_.binding_.sensor_places[sensor].parts, moves);
 }
 
-/// The variables of a state, and the rows of its tangent that each is.
+/// The variables of a state but its landmarks, and the rows of its tangent that each is.
 std::vector<KktSystem::Part> KktSystem::PartsOf(std::size_t k) const {
   std::vector<Part> parts;
   if (nodes_[k].read >= 0) parts.push_back({nodes_[k].read, &read_rows_});
   if (nodes_[k].rest >= 0) parts.push_back({nodes_[k].rest, &rest_rows_});
   for (const Constant& constant : constants_) {
-    if (constant.born && constant.node <= k) parts.push_back({constant.value, &constant.rows});
+    if (constant.of_landmark || !constant.born || constant.node > k) continue;
+    parts.push_back({constant.value, &constant.rows});
   }
   return parts;
 }
@@ -153,6 +167,11 @@ void KktSystem::Build() {
     if (!constant.born) continue;
     constant.value = add(constant.rows);
     constant.multiplier = add(constant.rows);
+  }
+  constant_of_.assign(ldl_.graph().size.size(), -1);
+  for (std::size_t i = 0; i < constants_.size(); ++i) {
+    if (!constants_[i].born) continue;
+    constant_of_[static_cast<std::size_t>(constants_[i].value)] = static_cast<int>(i);
   }
   inputs_ = run_.inputs_;
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -184,7 +203,8 @@ void KktSystem::AddConstraints(std::size_t k) {
   }
   for (const Part& part : PartsOf(k)) {
     for (const Constant& constant : constants_) {
-      if (constant.born && constant.node <= k) Tie(constant.value, part.variable);
+      if (constant.of_landmark || !constant.born || constant.node > k) continue;
+      Tie(constant.value, part.variable);
     }
   }
   // First values, a prior that ties blocks, and frames inside the node have all of it.
@@ -213,7 +233,7 @@ void KktSystem::AddTerms() {
   std::vector<std::vector<int>> constants(sensors);
   landmark_constants_.clear();
   for (std::size_t i = 0; i < sensors; ++i) {
-    constants[i] = ConstantsOf(i);
+    constants[i] = ConstantsOf(run_.binding_.sensor_places[i].parts);
     if (!run_.ObservesLandmarks(run_.binding_.system.sensors[i])) continue;
     for (const int constant : constants[i]) {
       if (std::ranges::find(landmark_constants_, constant) == landmark_constants_.end()) {
@@ -229,12 +249,21 @@ void KktSystem::AddTerms() {
     for (const Factor& factor : run_.epochs_[k].factors) {
       if (factor.row < 0) continue;
       const auto sensor = static_cast<std::size_t>(factor.sensor);
-      AddTerm(with({ReadsStates(sensor) ? nodes_[node_of_[k]].read : -1}, constants[sensor]));
+      const int here = ReadsStates(sensor) ? nodes_[node_of_[k]].read : -1;
+      AddTerm(with({here}, CondensedRun::IsOfState(factor) ? ConstantsOf(run_.PlaceOf(factor).parts)
+                                                           : constants[sensor]));
     }
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const MapLandmark& landmark = run_.landmarks_[i];
     const Point3& point = points_[i];
+    const std::vector<int> own = ConstantsOf(landmark);  // whose covariance is that of the landmark
+    for (const int a : own) {
+      for (const int b : own) {
+        Tie(constants_[static_cast<std::size_t>(a)].value,
+            constants_[static_cast<std::size_t>(b)].value);
+      }
+    }
     const int first = landmark.first ? nodes_[node_of_[landmark.first->epoch]].read : -1;
     AddTerm(landmark.first ? with({point.variable, first}, landmark_constants_)
                            : std::vector<int>{point.variable});

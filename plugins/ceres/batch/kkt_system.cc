@@ -60,7 +60,7 @@ bool KktSystem::TakeLandmarks(const Eigen::VectorXd& z) {
     MapLandmark& landmark = run_.landmarks_[i];
     landmark.l = landmark.from = z.segment(points_[i].column, landmark.from.size());
     if (!run_.Place(landmark, landmark.l, points, place)) return false;
-    landmark.y = place.y;
+    landmark.y = landmark.in_state() ? run_.ValuesOf(landmark, points.front().x) : place.y;
   }
   return true;
 }
@@ -73,13 +73,15 @@ std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
   if (!change || !TakeLandmarks(z) || !run_.PointsOf(e, false, points)) return {};
   joined_ = false;
   std::vector<double> h;
-  for (const MapLandmark& landmark : run_.landmarks_) {
-    for (const auto& [epoch, index] : landmark.observations) {
-      Factor& factor = run_.epochs_[epoch].factors[index];
-      if (chosen_ && !factor.left_out) continue;
-      factor.left_out = factor.l.size() == 0 ||
-                        run_.See(factor, WithLandmark(points[epoch].x, landmark.y), h, nullptr) !=
-                            Outcome::kAccepted;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    for (Factor& factor : run_.epochs_[k].factors) {
+      const bool seen = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
+      if (!seen || (chosen_ && !factor.left_out)) continue;
+      const MapLandmark& landmark = run_.landmarks_[static_cast<std::size_t>(factor.landmark)];
+      const std::vector<double> x =
+          factor.row < 0 ? WithLandmark(points[k].x, landmark.y) : points[k].x;
+      factor.left_out =
+          factor.l.size() == 0 || run_.See(factor, x, h, nullptr) != Outcome::kAccepted;
       joined_ = joined_ || (chosen_ && !factor.left_out);
     }
   }
@@ -308,9 +310,10 @@ bool KktSystem::LinearisePlain(std::size_t k, bool about) {
   for (Factor& factor : run_.epochs_[k].factors) {
     if (factor.row < 0) continue;
     // What is not defined about the filter tells nothing yet; it may be at the solution.
+    const bool out = !about && factor.left_out;
     const bool frozen = !about || run_.FreezeFactor(factor, at_[k].x);
-    if (!frozen || !run_.Residual(factor, at_[k].x, r, &a)) {
-      if (!about) return false;
+    if (out || !frozen || !run_.Residual(factor, at_[k].x, r, &a)) {
+      if (!out && !about) return false;
       ++term_;
       continue;
     }
@@ -321,10 +324,9 @@ bool KktSystem::LinearisePlain(std::size_t k, bool about) {
     j.resize(r.size(), 0);
     for (int i = 0; i < term.count; ++i) {
       const int v = variables_[term.variables + static_cast<std::size_t>(i)];
-      const std::vector<int>* rows = &read_rows_;
-      for (const Constant& constant : constants_) {
-        if (constant.value == v) rows = &constant.rows;
-      }
+      const int constant = constant_of_[static_cast<std::size_t>(v)];
+      const std::vector<int>* const rows =
+          constant < 0 ? &read_rows_ : &constants_[static_cast<std::size_t>(constant)].rows;
       const Eigen::Index before = j.cols();
       j.conservativeResize(Eigen::NoChange, before + std::ssize(*rows));
       j.rightCols(std::ssize(*rows)) = a(Eigen::all, *rows);
@@ -528,6 +530,11 @@ void KktSystem::Move(Trajectory& trajectory) const {
     now.setZero(n);
     for (const Part& part : PartsOf(k)) {
       now(*part.rows) = solution_.segment(ldl_.RowOf(part.variable), ldl_.SizeOf(part.variable));
+    }
+    for (const Constant& constant : constants_) {
+      if (!constant.of_landmark) continue;
+      now(constant.rows) =
+          solution_.segment(ldl_.RowOf(constant.value), ldl_.SizeOf(constant.value));
     }
     const auto w = step_.segment(node.column, node.columns);
     for (std::size_t i = node.first; i <= node.last; ++i) {

@@ -32,7 +32,7 @@ namespace alidade::ceres_batch {
 /// both are zero. So whatever the order, every pivot is nonsingular, without a threshold.
 ///
 /// - A constant block is one variable s; it is born at the first node or by a first value, with a
-///   multiplier of its own.
+///   multiplier of its own. So is each block of a landmark that is in the state.
 /// - A landmark is q = dl + C dx_f, where x_f is the camera of its first observation and C is such
 ///   that q moves the point but the camera alone does not: q is the point itself, in units of its
 ///   inputs, so later observations do not tie their cameras to the first one. Its prior is
@@ -103,6 +103,7 @@ class KktSystem {
     int value = -1, multiplier = -1;  ///< variables
     std::size_t node = 0;             ///< that it is born at
     bool born = false;
+    bool of_landmark = false;  ///< no part of the covariance of a frame
   };
   struct Point3 {           ///< a landmark
     int variable = -1;      ///< q
@@ -129,7 +130,8 @@ class KktSystem {
   void Set(int i, int j, const Eigen::MatrixXd& value);
   void Accumulate(const Eigen::MatrixXd& j, const Eigen::VectorXd& r);
   std::vector<Part> PartsOf(std::size_t k) const;
-  std::vector<int> ConstantsOf(std::size_t sensor) const;
+  std::vector<int> ConstantsOf(const std::vector<JacobianPart>& parts) const;
+  std::vector<int> ConstantsOf(const MapLandmark& landmark) const;
   bool ReadsStates(std::size_t sensor) const;
   bool LineariseStates(const Eigen::VectorXd& z, const Trajectory* about);
   bool LinearisePlain(std::size_t k, bool about);
@@ -144,11 +146,13 @@ class KktSystem {
   Eigen::MatrixXd Found(int i, int j) const;
   Eigen::VectorXd CameraOf(const MapLandmark& landmark, const Eigen::VectorXd& from) const;
   Eigen::MatrixXd LandmarkCovariance(std::size_t landmark) const;
+  Eigen::MatrixXd JointOf(const std::vector<int>& variables) const;
 
   CondensedRun& run_;
   std::vector<int> rows_;  ///< tangent rows that move: those that sensors read, then the rest
   std::vector<int> read_rows_, rest_rows_;
   std::vector<Constant> constants_;
+  std::vector<int> constant_of_;  ///< by variable; -1: it is none
   std::vector<Node> nodes_;
   std::vector<std::size_t> node_of_;  ///< by epoch
   std::vector<Point3> points_;        ///< by landmark

@@ -45,7 +45,7 @@ void CondensedRun::AddKnown() {
     if (reads[i]) read_.push_back(static_cast<int>(i));
   }
   for (const KnownLandmark& known : binding_.system.landmarks->known) {
-    current_[known.id] = static_cast<int>(landmarks_.size());
+    current_[known.id] = {static_cast<int>(landmarks_.size()), 0};
     MapLandmark& landmark = landmarks_.emplace_back();
     landmark.id = known.id;
     landmark.sigma = known.sigma;
@@ -70,14 +70,22 @@ void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& fil
     const bool lost = told == Outcome::kNotReady || told == Outcome::kOutOfDomain ||
                       told == Outcome::kInvalid || told == Outcome::kFailed ||
                       told == Outcome::kEnded;
-    if (lost || current == current_.end()) {
+    if (lost || current == current_.end() || current->second.landmark < 0) {
       factor.outcome = lost ? told : Outcome::kNotReady;
       continue;
     }
-    factor.landmark = current->second;
-    MapLandmark& landmark = landmarks_[static_cast<std::size_t>(current->second)];
-    landmark.observations.push_back({epochs_.size(), i});
-    factor.xyz = !landmark.first && SensorOf(factor).xyz;  // known landmarks are points
+    factor.landmark = current->second.landmark;
+    MapLandmark& landmark = landmarks_[static_cast<std::size_t>(factor.landmark)];
+    ++landmark.observed;
+    const bool known = !landmark.first && !landmark.in_state();
+    if (known) landmark.xyz = SensorOf(factor).xyz.has_value();  // known landmarks are points
+    if (known) landmark.sensor = factor.sensor;
+    factor.xyz = landmark.xyz;
+    if (landmark.in_state()) {
+      AddPart(factor);
+    } else {
+      landmark.observations.push_back({epochs_.size(), i});
+    }
   }
   for (const std::size_t i : begin) {
     Begin(epoch.factors[i], i, filter);
@@ -91,17 +99,16 @@ void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimato
   const auto before = current_.find(id);
   MapLandmark landmark;
   landmark.id = id;
+  landmark.sensor = factor.sensor;
   landmark.first = {epochs_.size(), index};
-  if (before != current_.end()) {
-    landmark.generation = landmarks_[static_cast<std::size_t>(before->second)].generation + 1;
-  }
+  if (before != current_.end()) landmark.generation = before->second.generation + 1;
   if (sensor.model.prior_size() > 0) {
     landmark.prior = PriorOf(id, sensor, *binding_.system.landmarks->prior, filter);
     landmark.sigma = binding_.system.landmarks->prior->sigma;
   }
   landmark.from = Eigen::VectorXd::Zero(sensor.model.measurement().geometry.tangent +
                                         sensor.model.prior_size());
-  current_[id] = static_cast<int>(landmarks_.size());
+  current_[id] = {static_cast<int>(landmarks_.size()), landmark.generation};
   landmarks_.push_back(std::move(landmark));
 }
 

@@ -36,7 +36,7 @@ bool CondensedRun::AddPlain(const std::vector<Point>& points, Undefined undefine
   Eigen::MatrixXd a;
   for (std::size_t k = 0; k < points.size(); ++k) {
     for (const Factor& factor : epochs_[k].factors) {
-      if (factor.row < 0) continue;
+      if (factor.row < 0 || factor.left_out) continue;
       if (!Residual(factor, points[k].x, r, information != nullptr ? &a : nullptr)) {
         if (undefined == Undefined::kFails) return false;
         continue;
@@ -177,15 +177,10 @@ bool CondensedRun::PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
 /// Place and covariance of a landmark whose blocks have the covariance p.
 void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
                             LandmarkEstimate& estimate) const {
-  const std::optional<MapLandmark::Observation> any =
-      landmark.first ? landmark.first
-                     : (landmark.observations.empty() ? std::nullopt
-                                                      : std::optional(landmark.observations[0]));
-  if (!any) return;
-  const Factor& factor = epochs_[any->epoch].factors[any->factor];
-  const std::vector<Space>& roles = ModelOf(factor).roles();
+  if (landmark.sensor < 0) return;
+  const std::vector<Space>& roles = ModelOf(landmark.sensor, landmark.xyz).roles();
   estimate.representation = RepresentationOf(roles);
-  estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
+  estimate.tried = estimate.accepted = landmark.observed;
   if (!estimate.representation) return;
   const auto last = p.rows() - 1;
   estimate.inverse_distance = IsXyz(*estimate.representation) ? std::nan("") : landmark.y.back();

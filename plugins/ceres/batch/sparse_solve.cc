@@ -16,6 +16,10 @@ void SparseSolve::HeedStop() const {
   if (stop_ && stop_()) throw Error(ExitCode::kStopped, "stopped while the batch was solved");
 }
 
+void SparseSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
+  if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
+}
+
 bool SparseSolve::TooLarge() {
   constexpr double kMostBytes = 16e9, kMostFlops = 1e13;
   if (kkt_.bytes() <= kMostBytes && flops() <= kMostFlops) return false;
@@ -193,7 +197,9 @@ bool SparseSolve::EndUnsettled(double left, bool spent) {
 bool SparseSolve::PutAll(const Take& take, std::vector<LandmarkEstimate>& map) {
   kkt_.Invert();
   const Eigen::VectorXd e = z_.head(run_.shape().inputs);
-  const auto put = [&](std::size_t k, const Point& point) { take(k, point.x, kkt_.Covariance(k)); };
+  const auto put = [&](std::size_t k, const Point& point) {
+    take(k, point.x, [&] { return kkt_.Covariance(k); });
+  };
   if (!kkt_.TakeLandmarks(z_) || !run_.ForEachFrame(e, run_.shape().frames, put, false)) {
     failed_ = true;
     summary_ += "; then " + run_.problem();

@@ -29,14 +29,18 @@ class SparseSolve {
   /// Flops of an iteration, known beforehand.
   double flops() const { return kkt_.elimination().flops; }
 
+  /// x of a frame, and a function that makes its P, while it is taken.
   using Take = std::function<void(std::size_t frame, const std::vector<double>& x,
-                                  const Eigen::MatrixXd& p)>;
+                                  const std::function<Eigen::MatrixXd()>& covariance)>;
   /// Gives the estimates of all frames, and `map`. False where a model is not defined.
   bool PutAll(const Take& take, std::vector<LandmarkEstimate>& map);
 
+  /// e of the solution.
+  Eigen::VectorXd inputs() const { return z_.head(run_.shape().inputs); }
   bool failed() const { return failed_; }
   const std::string& summary() const { return summary_; }
-  const std::string& note() const { return note_; }  ///< that the weights of losses did not settle
+  /// As MapSolve::Note.
+  void Note(Timestamp timestamp, std::vector<Event>& events) const;
 
  private:
   bool TooLarge();

@@ -22,6 +22,12 @@ inline std::unique_ptr<Estimator> MakeBatch(const System& system, const std::str
   return Shipped().CreateEstimator("ceres_batch", config.root())(system, StreamsOf(system));
 }
 
+/// A fixed-lag smoother likewise.
+inline std::unique_ptr<Estimator> MakeFixedLag(const System& system, const std::string& options) {
+  const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
+  return Shipped().CreateEstimator("fixed_lag", config.root())(system, StreamsOf(system));
+}
+
 /// A point with a linear sensor of 0.3 m; its second block is measured by none.
 inline System LinearSystem() {
   System system = MovingPoint(0.7);

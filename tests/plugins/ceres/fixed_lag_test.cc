@@ -13,12 +13,8 @@ namespace {
 using testing::AddSensor;
 using testing::FrameAt;
 using testing::MakeBatch;
+using testing::MakeFixedLag;
 using testing::Shipped;
-
-std::unique_ptr<Estimator> MakeFixedLag(const System& system, const std::string& options) {
-  const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
-  return Shipped().CreateEstimator("fixed_lag", config.root())(system, testing::StreamsOf(system));
-}
 
 /// An estimate of one frame.
 struct Estimate {

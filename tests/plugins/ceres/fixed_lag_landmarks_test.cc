@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The fixed-lag smoother with landmarks against the Kalman filter on a linear map, and against the
+// batch, from which it differs by where it linearises what has left the window.
+#include "batch_landmarks_fixture.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using testing::Found;
+using testing::FrameOf;
+using testing::kPixel;
+using testing::kRho;
+using testing::kRhoSigma;
+using testing::MakeBatch;
+using testing::MakeFixedLag;
+using testing::MapSystem;
+using testing::Observation;
+using testing::Problem;
+using testing::Solve;
+
+/// Whether two covariances, and what they are of, agree to so many sigmas.
+void ExpectNear(const Vector3d& found, const MatrixXd& found_p, const Vector3d& expected,
+                const MatrixXd& p, double sigmas, const std::string& what) {
+  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(found[i], expected[i], sigmas * sigma[i]) << what;
+    for (int j = 0; j < 3; ++j) {
+      EXPECT_NEAR(found_p(i, j), p(i, j), 100.0 * sigmas * sigma[i] * sigma[j]) << what;
+    }
+  }
+}
+
+void ExpectNear(const Estimator& found, const Estimator& expected, double sigmas,
+                const std::string& what) {
+  ExpectNear(testing::PositionOf(found), found.state().covariance().Dense().topLeftCorner(3, 3),
+             testing::PositionOf(expected),
+             expected.state().covariance().Dense().topLeftCorner(3, 3), sigmas, what);
+  const std::vector<LandmarkEstimate> map = found.landmarks(), expected_map = expected.landmarks();
+  ASSERT_EQ(map.size(), expected_map.size()) << what;
+  for (const LandmarkEstimate& landmark : expected_map) {
+    const LandmarkEstimate* const other = testing::Find(map, landmark.id);
+    ASSERT_NE(other, nullptr) << what << ' ' << landmark.id;
+    EXPECT_EQ(other->generation, landmark.generation);
+    ExpectNear(other->position, other->covariance, landmark.position, landmark.covariance, sigmas,
+               what + " landmark " + std::to_string(landmark.id));
+  }
+}
+
+TEST(FixedLagLandmarks, OverAllFramesIsTheBatchOfTheDataSoFar) {
+  const Problem problem(20, 12);
+  const auto lag = MakeFixedLag(problem.Filter(), "lag_s: 1e12\n");
+  const auto batch = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
+  for (const Frame& frame : problem.frames) {
+    lag->Process(frame);
+    batch->Process(frame);
+    ExpectNear(*lag, *batch, 1e-8, std::to_string(frame.timestamp));
+  }
+  EXPECT_FALSE(lag->failed());
+}
+
+/// Offsets to points that come and go, two of them known to 0.2 m and one exactly.
+struct LinearMap {
+  System system;
+  std::vector<Frame> frames;
+
+  explicit LinearMap(int steps) {
+    constexpr double kNoise = 0.05, kStart = 0.3, kKnown = 0.2;
+    constexpr int kPoints = 14;
+    Random random(7);
+    const auto vector = [&](double sigma) {
+      return Vector3d(sigma * random.Normal(), sigma * random.Normal(), sigma * random.Normal());
+    };
+    LandmarkOptions options;
+    options.max_missed_frames = 3;
+    std::vector<Vector3d> points;
+    for (int i = 0; i < kPoints; ++i) points.push_back(vector(1.0));
+    for (int i = 0; i < 3; ++i) {
+      const double sigma = i < 2 ? kKnown : 0.0;
+      const Vector3d told = points[static_cast<std::size_t>(i)] + vector(sigma);
+      options.known.push_back({i, {told[0], told[1], told[2]}, sigma});
+    }
+    Vector3d r = vector(kStart);
+    for (int k = 0; k < steps; ++k, r += vector(0.1 * std::sqrt(0.1))) {
+      std::vector<Observation> observations;
+      for (int i = 0; i < kPoints; ++i) {
+        const int phase = (k + 5 * i) % 17;  // away for 10 frames: the filter drops it meanwhile
+        if (phase >= 7 || (phase == 2 && i % 3 == 0) || k % 9 == 4) continue;
+        const Vector3d z = points[static_cast<std::size_t>(i)] - r + vector(kNoise);
+        observations.push_back({i, {z[0], z[1], z[2]}});
+      }
+      frames.push_back(FrameOf(0.1 * k, observations));
+    }
+    system = MapSystem(testing::Offset(kNoise), options, kStart);
+  }
+};
+
+TEST(FixedLagLandmarks, OfALinearMapIsTheKalmanFilterWhateverTheWindow) {
+  const LinearMap map(60);
+  for (const char* const options : {"lag_s: 0.25\n", "lag_s: 0.04\n", "lag_s: 1.3\n"}) {
+    const auto lag = MakeFixedLag(map.system, options);
+    Ekf ekf = testing::EkfOf(map.system);
+    int generations = 0;
+    for (const Frame& frame : map.frames) {
+      lag->Process(frame);
+      ekf.Process(frame);
+      ExpectNear(*lag, ekf, 1e-9, options + std::to_string(frame.timestamp));
+      for (const LandmarkEstimate& landmark : ekf.landmarks()) {
+        generations = std::max(generations, landmark.generation);
+      }
+    }
+    EXPECT_FALSE(lag->failed());
+    EXPECT_GE(generations, 2);
+  }
+}
+
+/// Frames, and a last one without measurements, before which all others leave the window.
+std::vector<Frame> WithLateFrame(std::vector<Frame> frames) {
+  frames.push_back(FrameOf(100.0, {}));
+  return frames;
+}
+
+/// What leaves is linearised at the solution of all data: it loses nothing.
+void ExpectNothingIsLost(const System& system, const std::vector<Frame>& frames) {
+  const std::vector<Frame> all = WithLateFrame(frames);
+  const auto batch = MakeBatch(system, "solver: sparse\n");
+  const Found smoothed = Solve(*batch, all);
+  ASSERT_FALSE(smoothed.failed);
+  const auto lag = MakeFixedLag(system, "lag_s: 50\n");
+  for (const Frame& frame : all) lag->Process(frame);
+  ASSERT_FALSE(lag->failed());
+  ExpectNear(*lag, *batch, 1e-7, "current");
+
+  const auto lagged = MakeFixedLag(system, "lag_s: 50\noutput: lagged\n");
+  const Found later = Solve(*lagged, all);
+  ASSERT_FALSE(later.failed);
+  ASSERT_EQ(later.states.size(), all.size());
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    ExpectNear(later.Camera(k), later.states[k].covariance().Dense(), smoothed.Camera(k),
+               smoothed.states[k].covariance().Dense(), 1e-7, "lagged " + std::to_string(k));
+  }
+  ExpectNear(*lagged, *batch, 1e-7, "lagged");
+}
+
+TEST(FixedLagLandmarks, WhatLeavesAtTheSolutionOfAllDataLosesNothing) {
+  const Problem problem(25, 12);
+  ExpectNothingIsLost(problem.Filter(), problem.frames);
+  LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
+  ExpectNothingIsLost(MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(kPixel), options, 0.1),
+                      problem.frames);
+  ExpectNothingIsLost(MapSystem(testing::AnchoredPixels<0>(kPixel), options), problem.frames);
+  for (int i = 0; i < 4; ++i) {
+    const Vector3d p = problem.Point(problem.truth, i);
+    options.known.push_back({i, {p[0], p[1], p[2]}, i < 2 ? 0.0 : 0.05});
+  }
+  ExpectNothingIsLost(MapSystem(testing::InverseDepthPixels(kPixel), options), problem.frames);
+}
+
+TEST(FixedLagLandmarks, WhatLeavesHasTheWeightOfTheSolution) {
+  Problem problem(25, 12, 23);
+  problem.loss = {LossKind::kHuber, 1.5};
+  ExpectNothingIsLost(problem.Filter(), problem.frames);
+}
+
+/// How far the estimates of the newest frames are from those of the batch of the data so far, in
+/// the mean, in its sigmas.
+double MeanDistance(Estimator& filter, const Problem& problem, const std::vector<State>& batch) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < problem.frames.size(); ++k) {
+    filter.Process(problem.frames[k]);
+    if (k == 0) continue;  // known exactly
+    const Eigen::Map<const Vector3d> expected(batch[k].values().data());
+    const Vector3d apart = testing::PositionOf(filter) - expected;
+    sum += std::sqrt(apart.dot(batch[k].covariance().Dense().ldlt().solve(apart)));
+  }
+  EXPECT_FALSE(filter.failed());
+  return sum / static_cast<double>(problem.frames.size() - 1);
+}
+
+// What has left is linearised where it was known less well: the later it leaves, the better.
+TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
+  const Problem problem(40, 20);
+  std::vector<State> states;
+  const auto batch = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
+  for (const Frame& frame : problem.frames) {
+    batch->Process(frame);
+    states.push_back(batch->state());
+  }
+  Ekf ekf = testing::EkfOf(problem.Filter());
+  const auto of_window = [&](const std::string& lag_s) {
+    return MeanDistance(*MakeFixedLag(problem.Filter(), "lag_s: " + lag_s + "\n"), problem, states);
+  };
+  const double filter = MeanDistance(ekf, problem, states);
+  const double brief = of_window("0.25"), middle = of_window("0.75"), longest = of_window("2.05");
+  EXPECT_LT(brief, filter);
+  EXPECT_LT(middle, 0.2 * filter);
+  EXPECT_LT(longest, 0.05 * filter);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -17,6 +17,7 @@
 #include "alidade/filter/timeline.h"
 #include "alidade/host/source.h"
 #include "alidade/state/state.h"
+#include "alidade/system/landmark_representation.h"
 
 namespace alidade::ceres_batch {
 
@@ -81,8 +82,8 @@ using TakePoint = std::function<void(std::size_t frame, const Point&)>;
 /// So it has the information of the filter's initialisation: the observation k is consumed by it,
 /// an anchor is the camera itself, and the prior of the inverse distance counts once.
 ///
-/// Once the frame of that observation has left the window, y is one more block of the state, and
-/// has no inputs of its own: see CondensedRun::MarginaliseFirst.
+/// Once the frame of that observation has left the window, y is in the state, and has no inputs of
+/// its own: see CondensedRun::MarginaliseFirst.
 struct MapLandmark {
   /// A factor of a frame.
   struct Observation {
@@ -292,6 +293,8 @@ class CondensedRun {
                                 const std::vector<LandmarkEstimate>& map) const;
   Eigen::MatrixXd PutInState(const Point& point, std::vector<Leaving>& leaving,
                              const std::vector<bool>& goes_on, Eigen::Index columns);
+  Eigen::MatrixXd AboutItsPoint(const MapLandmark& landmark, const std::vector<double>& y,
+                                const Eigen::MatrixXd& rows) const;
   void AddBlocks(MapLandmark& landmark, State& state) const;
   void LetGo(const std::vector<bool>& goes_on);
   void DropFirst(Trajectory& about);
@@ -353,6 +356,8 @@ class CondensedRun {
   Eigen::MatrixXd Assemble(const Eigen::VectorXd& e, const std::vector<Point>& points,
                            const Information& information, Eigen::VectorXd& g) const;
   Eigen::MatrixXd Packed(const Eigen::MatrixXd& rows) const;
+  std::optional<internal::LandmarkPoint> PointOf(const MapLandmark& landmark,
+                                                 const std::vector<double>& y) const;
   void Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
                 LandmarkEstimate& estimate) const;
   void PutAbout(const std::vector<double>& about, Point& point) const;

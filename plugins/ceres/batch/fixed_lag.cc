@@ -131,7 +131,7 @@ class FixedLag : public Estimator {
     if (!run_.shape().has_landmarks) return solve_.SolveAnew(run_, about_, e_);
     map_ = initialiser_.filter().landmarks();
     sparse_.emplace(run_, options_);
-    if (!sparse_->SolveAll(about_)) return false;
+    if (!sparse_->SolveAnew(about_, e_)) return false;
     e_ = sparse_->inputs();
     return true;
   }

@@ -145,9 +145,19 @@ Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
 Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
   const MapLandmark& landmark = run_.landmarks_[i];
   if (landmark.in_state()) {
-    std::vector<int> variables = ConstantsOf(landmark);
-    for (int& v : variables) v = constants_[static_cast<std::size_t>(v)].value;
-    return Clipped(JointOf(variables));
+    const StateLayout& layout = run_.initial_.layout();
+    const int first = layout[landmark.blocks.front()].tangent_offset;
+    const Block& last = layout[landmark.blocks.back()];
+    const int size = last.tangent_offset + last.geometry().tangent - first;
+    std::vector<int> variables, rows;  // the others stay
+    for (const int own : ConstantsOf(landmark)) {
+      const Constant& constant = constants_[static_cast<std::size_t>(own)];
+      variables.push_back(constant.value);
+      for (const int row : constant.rows) rows.push_back(row - first);
+    }
+    Eigen::MatrixXd p = Eigen::MatrixXd::Zero(size, size);
+    p(rows, rows) = Clipped(JointOf(variables));
+    return p;
   }
   const Point3& point = points_[i];
   const Eigen::MatrixXd own = Found(point.variable, point.variable);

@@ -40,9 +40,13 @@ void KktSystem::FindConstants() {
       std::vector<int>& into = read[first] ? read_rows_ : rest_rows_;
       into.insert(into.end(), rows.begin(), rows.end());
     } else {
+      const bool of_landmark = id >= system;
+      const auto stays = [&](int row) { return !run_.l0_.row(row).any() && run_.d0_[row] == 0.0; };
+      if (of_landmark) std::erase_if(rows, stays);
+      if (rows.empty()) continue;
       Constant& constant = constants_.emplace_back();
       constant.rows = std::move(rows);
-      constant.of_landmark = id >= system;
+      constant.of_landmark = of_landmark;
     }
   }
   rows_ = read_rows_;
@@ -54,7 +58,9 @@ void KktSystem::FindNodes() {
   const auto bear = [&](BlockId id, std::size_t node) {
     const int offset = layout[id].tangent_offset;
     for (std::size_t i = 0; i < constants_.size(); ++i) {
-      if (offset < 0 || constants_[i].born || constants_[i].rows.front() != offset) continue;
+      const int row = constants_[i].rows.front();
+      const bool own = offset <= row && row < offset + layout[id].geometry().tangent;
+      if (offset < 0 || constants_[i].born || !own) continue;
       constants_[i].born = true;
       constants_[i].node = node;
       nodes_[node].born.push_back(i);
@@ -112,7 +118,8 @@ std::vector<int> KktSystem::ConstantsOf(const std::vector<JacobianPart>& parts) 
   for (const JacobianPart& part : parts) {
     for (std::size_t i = 0; i < constants_.size(); ++i) {
       const int at = static_cast<int>(i);
-      if (constants_[i].born && constants_[i].rows.front() == part.offset &&
+      const int row = constants_[i].rows.front();
+      if (constants_[i].born && part.offset <= row && row < part.offset + part.size &&
           std::ranges::find(found, at) == found.end()) {
         found.push_back(at);
       }
@@ -125,7 +132,8 @@ std::vector<int> KktSystem::ConstantsOf(const std::vector<JacobianPart>& parts) 
 std::vector<int> KktSystem::ConstantsOf(const MapLandmark& landmark) const {
   std::vector<JacobianPart> parts;
   for (const BlockId id : landmark.blocks) {
-    parts.push_back({run_.initial_.layout()[id].tangent_offset, 0, 0});
+    const Block& block = run_.initial_.layout()[id];
+    parts.push_back({block.tangent_offset, block.geometry().tangent, 0});
   }
   return ConstantsOf(parts);
 }

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "alidade/system/landmark_representation.h"
-
 namespace alidade::ceres_batch {
 namespace {
 
@@ -18,23 +16,6 @@ double MedianOfPositive(std::vector<double>& values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::ranges::nth_element(values, middle);
   return *middle;
-}
-
-/// dp/dy of the point that a landmark is; none where it has no place.
-std::optional<Eigen::MatrixXd> PointJacobian(const std::vector<Space>& roles,
-                                             const std::vector<double>& y) {
-  const auto representation = RepresentationOf(roles);
-  if (!representation) return {};
-  std::vector<const double*> blocks;
-  const double* next = y.data();
-  for (const Space& role : roles) {
-    if (!role.landmark()) continue;
-    blocks.push_back(next);
-    next += role.geometry.ambient;
-  }
-  const auto point = internal::PointOf(*representation, blocks.data());
-  if (!point) return {};
-  return Eigen::MatrixXd(point->jacobian);
 }
 
 }  // namespace
@@ -356,11 +337,10 @@ Eigen::MatrixXd KktSystem::FollowOf(const MapLandmark& landmark, const Inverse& 
   if (!landmark.first) return none;
   Eigen::MatrixXd m = place.by_d, n = place.by_x;
   if (m.rows() > inputs) {
-    const Factor& factor = run_.epochs_[landmark.first->epoch].factors[landmark.first->factor];
-    const auto jacobian = PointJacobian(run_.ModelOf(factor).roles(), place.y);
-    if (!jacobian || inputs < 3) return none;
-    m = *jacobian * m;
-    n = *jacobian * n;
+    const auto point = run_.PointOf(landmark, place.y);
+    if (!point || inputs < 3) return none;
+    m = point->jacobian * m;
+    n = point->jacobian * n;
   }
   Eigen::MatrixXd c = m.rows() == inputs ? Eigen::MatrixXd(m.partialPivLu().solve(n))
                                          : m.completeOrthogonalDecomposition().solve(n);

@@ -174,27 +174,35 @@ bool CondensedRun::PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
   return true;
 }
 
-/// Place and covariance of a landmark whose blocks have the covariance p.
-void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
-                            LandmarkEstimate& estimate) const {
-  if (landmark.sensor < 0) return;
+/// The point that a landmark is, where it has one.
+std::optional<internal::LandmarkPoint> CondensedRun::PointOf(const MapLandmark& landmark,
+                                                             const std::vector<double>& y) const {
   const std::vector<Space>& roles = ModelOf(landmark.sensor, landmark.xyz).roles();
-  estimate.representation = RepresentationOf(roles);
-  estimate.tried = estimate.accepted = landmark.observed;
-  if (!estimate.representation) return;
-  const auto last = p.rows() - 1;
-  estimate.inverse_distance = IsXyz(*estimate.representation) ? std::nan("") : landmark.y.back();
-  estimate.sigma = IsXyz(*estimate.representation) ? std::nan("") : std::sqrt(p(last, last));
+  const auto representation = RepresentationOf(roles);
+  if (!representation) return {};
   std::vector<const double*> blocks;
-  const double* next = landmark.y.data();
+  const double* next = y.data();
   for (const Space& role : roles) {
     if (!role.landmark()) continue;
     blocks.push_back(next);
     next += role.geometry.ambient;
   }
+  return internal::PointOf(*representation, blocks.data());
+}
+
+/// Place and covariance of a landmark whose blocks have the covariance p.
+void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
+                            LandmarkEstimate& estimate) const {
+  if (landmark.sensor < 0) return;
+  estimate.representation = RepresentationOf(ModelOf(landmark.sensor, landmark.xyz).roles());
+  estimate.tried = estimate.accepted = landmark.observed;
+  if (!estimate.representation) return;
+  const auto last = p.rows() - 1;
+  estimate.inverse_distance = IsXyz(*estimate.representation) ? std::nan("") : landmark.y.back();
+  estimate.sigma = IsXyz(*estimate.representation) ? std::nan("") : std::sqrt(p(last, last));
   estimate.position.setConstant(std::nan(""));
   estimate.covariance.setConstant(std::nan(""));
-  const auto point = internal::PointOf(*estimate.representation, blocks.data());
+  const auto point = PointOf(landmark, landmark.y);
   if (!point) return;
   estimate.position = point->position;
   estimate.covariance = point->jacobian * p * point->jacobian.transpose();

@@ -30,12 +30,26 @@ bool SparseSolve::TooLarge() {
 }
 
 bool SparseSolve::SolveAll(const Trajectory& about) {
+  return Solve([&] { return Start(about); });
+}
+
+bool SparseSolve::SolveAnew(const Trajectory& about, Eigen::VectorXd e) {
+  const RunShape shape = run_.shape();
+  e.conservativeResizeLike(Eigen::VectorXd::Zero(shape.inputs));
+  return Solve([&] {
+    z_ = kkt_.Join(e);
+    return (!shape.has_unit_vector && kkt_.Freeze(z_) && kkt_.Cost(z_)) || Start(about);
+  });
+}
+
+/// From where `start` leaves z_, which says whether the models are defined there.
+bool SparseSolve::Solve(const std::function<bool()>& start) {
   note_.clear();
   if (TooLarge()) {
     failed_ = true;
     return false;
   }
-  if (!Start(about)) {
+  if (!start()) {
     failed_ = true;
     summary_ = "nowhere to start: " + run_.problem();
     return false;

@@ -26,6 +26,8 @@ class SparseSolve {
   /// As MapSolve::SolveAll. False, and summary(), where there are no estimates, or where it would
   /// take too long or too much memory, which is found before anything is solved.
   bool SolveAll(const Trajectory& about);
+  /// As MapSolve::SolveAnew.
+  bool SolveAnew(const Trajectory& about, Eigen::VectorXd e);
   /// Flops of an iteration, known beforehand.
   double flops() const { return kkt_.elimination().flops; }
 
@@ -45,6 +47,7 @@ class SparseSolve {
  private:
   bool TooLarge();
   bool Start(const Trajectory& about);
+  bool Solve(const std::function<bool()>& start);
   bool Minimise();
   bool Descend();
   struct Trial {

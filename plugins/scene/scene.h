@@ -10,6 +10,7 @@
 #include "alidade/base/random.h"
 #include "alidade/host/source.h"
 #include "alidade/model/camera.h"
+#include "keyframes.h"
 #include "points.h"
 #include "surfaces.h"
 #include "trajectory.h"
@@ -45,6 +46,8 @@ inline constexpr const char* kSceneKeys =
 ///                                         known_points.count points to be seen; with its
 ///                                         covariance, unless sigma_px is 0
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
+///   relative_  7        as Keyframes has  keyframes, where there are any
+///   poses               them
 ///
 /// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both
 /// its exact pixel and the noisy one lie on the image; nothing hides it, not the surfaces either,
@@ -53,8 +56,8 @@ inline constexpr const char* kSceneKeys =
 /// `cam.orientation` (world_from_cam), `cam.velocity` (world) and `cam.angular_velocity` (cam), the
 /// velocities as in quaternion_pose; and the place of each point.
 ///
-/// Points, path, pixels, odometry and the noise of images are drawn from streams 0 to 4 of the
-/// seed; of the pixels four numbers for each point and frame, seen or not.
+/// Points, path, pixels, odometry, the noise of images and relative poses are drawn from streams 0
+/// to 5 of the seed; of the pixels four numbers for each point and frame, seen or not.
 ///
 /// Keys         kSceneKeys; the camera by the keys of alidade/model/camera.h.
 /// Errors       kBadConfig.
@@ -64,7 +67,11 @@ class Scene : public Source {
   explicit Scene(const SourceArguments& arguments)
       : Scene(arguments.entry, arguments.params, arguments.seed) {}
   Scene(const Node& entry, Params& p, std::uint64_t seed)
-      : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3), image_noise_(seed, 4) {
+      : camera_(p),
+        pixel_noise_(seed, 2),
+        odometry_noise_(seed, 3),
+        image_noise_(seed, 4),
+        keyframes_(p, seed) {
     ReadNumbers(p);
     for (const char* key : {"points", "trajectory", "surfaces", "state_entry"}) entry.Declare(key);
     Random of_points(seed, 0), of_trajectory(seed, 1);
@@ -83,8 +90,10 @@ class Scene : public Source {
   std::int64_t size() const override { return static_cast<std::int64_t>(count_); }
 
   std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
-    if (id < 0 || id >= static_cast<std::int64_t>(points_.size())) return std::nullopt;
-    return scene::ToArray(points_[static_cast<std::size_t>(id)]);
+    const auto at = static_cast<std::size_t>(id);
+    if (id < 0 || at >= points_.size() + keyframes_.size()) return std::nullopt;
+    if (at >= points_.size()) return keyframes_.position(at - points_.size());
+    return scene::ToArray(points_[at]);
   }
 
   int views() const override { return surfaces_.empty() ? 0 : measures_ == kStereo ? 2 : 1; }
@@ -110,6 +119,7 @@ class Scene : public Source {
                    list(state.angular_velocity)};
     for (const Observation& observation : Look(state)) EmitObservation(observation, frame);
     if (odometry_stream_ >= 0 && index_ + 1 < count_) EmitOdometry(frame);
+    if (keyframes_.any()) keyframes_.Emit(index_, state, keyframe_stream_, points_.size(), frame);
     ++index_;
     return true;
   }
@@ -165,6 +175,10 @@ class Scene : public Source {
     if (odometry_stream_ >= 0) {
       odometry_stream_ = static_cast<int>(streams_.size());
       streams_.push_back({"odometry", 6});
+    }
+    if (keyframes_.any()) {
+      keyframe_stream_ = static_cast<int>(streams_.size());
+      streams_.push_back({"relative_poses", 7});
     }
     truths_ = {{state + ".position", 3},
                {state + ".orientation", 4},
@@ -260,9 +274,10 @@ class Scene : public Source {
   double dt_s_ = 0.0, sigma_px_ = 0.0, baseline_m_ = 0.0, sigma_depth_m_ = 0.0;
   double image_noise_grey_ = 0.0;
   Measures measures_ = kPixel;
-  int known_left_ = 0, odometry_stream_ = -1;
+  int known_left_ = 0, odometry_stream_ = -1, keyframe_stream_ = -1;
   double known_sigma_ = 0.0, linear_sigma_ = 0.0, angular_sigma_ = 0.0;
   Random pixel_noise_, odometry_noise_, image_noise_;
+  scene::Keyframes keyframes_;
 };
 
 inline std::unique_ptr<Source> CreateScene(const SourceArguments& arguments) {

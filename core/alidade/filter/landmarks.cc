@@ -93,7 +93,18 @@ LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkR
     one.inverse_distance = InverseDistance(state, landmark);
     one.sigma = InverseDistanceSigma(state, landmark);
   }
-  if (!landmark.representation) return one;
+  if (!landmark.representation) {
+    for (const BlockId of : landmark.blocks) {
+      const Block& block = state.layout()[of];
+      if (block.space.name != "landmark_position" || block.geometry().tangent != 3) continue;
+      one.position = Eigen::Map<const Eigen::Vector3d>(state.value(of));
+      const JacobianPart part{block.tangent_offset, 3, 0};
+      const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> j = Eigen::Matrix3d::Identity();
+      one.covariance.setZero();
+      state.covariance().Project({j.data(), 3, 3, {&part, 1}}, pjt, one.covariance.data());
+    }
+    return one;
+  }
   const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
   if (!point) return one;
   one.position = point->position;

@@ -5,6 +5,7 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/square_root.h"
 #include "alidade/model/geometry.h"
 #include "condensed_run.h"
 #include "plugins/ceres/difference.h"
@@ -211,12 +212,19 @@ bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
   const std::string noise = "the noise of " + TextOf(SensorOf(factor), factor.measurement);
   if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, model));
   const int m = model.measurement().geometry.tangent;
-  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const RowMajor>(r.data(), m, m));
+  const Eigen::Map<const RowMajor> covariance(r.data(), m, m);
   if (!internal::AllFinite(r)) return Fail(noise + " is not finite");
-  if (llt.info() != Eigen::Success) {
-    return Fail(noise + " is not positive definite: a batch needs sigma > 0, and its square");
+  Eigen::MatrixXd l;
+  if (factor.outcome == Outcome::kInitialised) {  // L is not inverted
+    Eigen::LDLT<Eigen::MatrixXd> ldlt;
+    internal::SquareRootOf(covariance, ldlt, l);
+  } else {
+    const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+    if (llt.info() != Eigen::Success) {
+      return Fail(noise + " is not positive definite: a batch needs sigma > 0, and its square");
+    }
+    l = llt.matrixL();
   }
-  const Eigen::MatrixXd l = llt.matrixL();
   NoteChange(factor.l, l);
   factor.l = l;
   return true;

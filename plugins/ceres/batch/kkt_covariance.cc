@@ -156,7 +156,7 @@ Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
       for (const int row : constant.rows) rows.push_back(row - first);
     }
     Eigen::MatrixXd p = Eigen::MatrixXd::Zero(size, size);
-    p(rows, rows) = Clipped(JointOf(variables));
+    if (!rows.empty()) p(rows, rows) = Clipped(JointOf(variables));
     return p;
   }
   const Point3& point = points_[i];

@@ -196,12 +196,24 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
   if (landmark.sensor < 0) return;
   estimate.representation = RepresentationOf(ModelOf(landmark.sensor, landmark.xyz).roles());
   estimate.tried = estimate.accepted = landmark.observed;
-  if (!estimate.representation) return;
+  estimate.position.setConstant(std::nan(""));
+  estimate.covariance.setConstant(std::nan(""));
+  if (!estimate.representation) {
+    Eigen::Index value = 0, row = 0;
+    for (const Space& role : ModelOf(landmark.sensor, landmark.xyz).roles()) {
+      if (!role.landmark()) continue;
+      if (role.name == "landmark_position" && role.geometry.tangent == 3) {
+        estimate.position = Eigen::Map<const Eigen::Vector3d>(landmark.y.data() + value);
+        estimate.covariance = p.block<3, 3>(row, row);
+      }
+      value += role.geometry.ambient;
+      row += role.geometry.tangent;
+    }
+    return;
+  }
   const auto last = p.rows() - 1;
   estimate.inverse_distance = IsXyz(*estimate.representation) ? std::nan("") : landmark.y.back();
   estimate.sigma = IsXyz(*estimate.representation) ? std::nan("") : std::sqrt(p(last, last));
-  estimate.position.setConstant(std::nan(""));
-  estimate.covariance.setConstant(std::nan(""));
   const auto point = PointOf(landmark, landmark.y);
   if (!point) return;
   estimate.position = point->position;

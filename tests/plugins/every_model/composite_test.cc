@@ -3,6 +3,7 @@
 #include "sensors/pose.h"
 #include "sensors/pseudorange.h"
 #include "sensors/range_bearing.h"
+#include "sensors/relative_pose.h"
 
 namespace alidade::testing {
 namespace {
@@ -15,6 +16,10 @@ INSTANTIATE_TEST_SUITE_P(
         SensorRow("range_bearing",
                   "{sigma_range_m: 0.1, sigma_bearing_rad: 0.05, landmarks: {representation: xyz}}",
                   RangeBearing<Xyz>(0.1, 0.05), {kPosition, kOrientation, {0.2, 0.4, 2.0}}),
+        SensorRow("relative_pose",
+                  "{sigma_position_m: [0.1, 0.2, 0.3], sigma_orientation_rad: 0.01}",
+                  RelativePose({0.1, 0.2, 0.3}, {0.01, 0.01, 0.01}),
+                  {kPosition, kOrientation, {0.2, 0.4, 2.0}, {0.6, 0.0, 0.8, 0.0}}),
         SensorRow("pseudorange", "{sigma_m: 0.5}", Pseudorange(0.5), {{1.0, 2.0, 3.0}, {0.2}})),
     RowName);
 

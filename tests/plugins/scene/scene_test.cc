@@ -137,6 +137,49 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
   for (const std::int64_t id : known) EXPECT_TRUE(Ids(frames[1]).contains(id));
 }
 
+// There and back along x in 9 frames, turned by 90 degrees about y on the way.
+TEST(Scene, KeyframesTellTheWayToOneAnother) {
+  const std::string keys =
+      "max_frames: 9, rate_hz: 1, points: {list: [[0, 0, 5], [0, 0, 6]]}, trajectory: {keyframes: "
+      "[{t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}, {t_s: 4, position: [4, 0, 0], "
+      "euler_deg: [0, 90, 0]}, {t_s: 8, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}, keyframes: "
+      "{every_frames: 2, closure_radius_m: 0.5, closure_after: 2, sigma_position_m: 0, "
+      "sigma_orientation_rad: 0}";
+  const MadeScene made = MakeScene(keys);
+  ASSERT_EQ(made.scene->streams().size(), 2u);
+  EXPECT_EQ(made.scene->streams()[1].name, "relative_poses");
+  const auto frames = SceneFrames(keys);
+  const auto of_keyframes = [&](std::size_t k) {
+    std::vector<Measurement> found;
+    for (const Measurement& m : frames[k].measurements) {
+      if (m.stream == 1) found.push_back(m);
+    }
+    return found;
+  };
+  // The frame itself is the landmark behind the two points: without noise, and so said.
+  const std::vector<Measurement> first = of_keyframes(0);
+  ASSERT_EQ(first.size(), 1u);
+  EXPECT_EQ(first[0].landmark, 2);
+  EXPECT_EQ(first[0].values, (std::vector<double>{0, 0, 0, 1, 0, 0, 0}));
+  EXPECT_EQ(first[0].covariance, std::vector<double>(36, 0.0));
+  EXPECT_TRUE(of_keyframes(1).empty());
+  // At the far end: to the one before, as seen from a camera that looks along the world's x.
+  const std::vector<Measurement> far = of_keyframes(4);
+  ASSERT_EQ(far.size(), 2u);
+  EXPECT_EQ(far[0].landmark, 3);
+  const double back = frames[2].truth[0][0] - 4.0;
+  EXPECT_NEAR(far[0].values[0], 0.0, 1e-12);
+  EXPECT_NEAR(far[0].values[2], back, 1e-12);
+  EXPECT_TRUE(far[0].covariance.empty());
+  // Back at the start: the one before, the first one, and itself.
+  const std::vector<Measurement> closed = of_keyframes(8);
+  ASSERT_EQ(closed.size(), 3u);
+  EXPECT_EQ(closed[1].landmark, 2);
+  const double here[7] = {0, 0, 0, 1, 0, 0, 0};
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(closed[1].values[i], here[i], 1e-12);
+  EXPECT_EQ(closed[2].landmark, 6);
+}
+
 TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
   // Point 0 comes into view from the right when two others are being seen already.
   const auto frames = SceneFrames(

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "alidade/base/random.h"
+#include "alidade/host/source.h"
+#include "alidade/model/geometry.h"
+#include "alidade/model/params.h"
+#include "trajectory.h"
+
+namespace alidade::scene {
+
+/// Relative poses between frames of a trajectory. Every so many frames one is a keyframe k:
+///
+///   z = (R_k' (r_j - r_k) + n_r, (q_k^-1 q_j) (+) n_q)   of the keyframe before, j = k - 1, unless
+///                                                        to_previous is false; and of the nearest
+///                                                        one of those that are old enough and near
+///                                                        enough: a loop is closed
+///   z = (0, 1), without noise                            of k itself: that is where it is
+///
+/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is j, or k, plus
+/// `first`.
+class Keyframes {
+ public:
+  Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {
+    every_ = static_cast<std::size_t>(
+        p.Integer("keyframes.every_frames",
+                  "frames from one keyframe to the next, for stream relative_poses; 0: none", 0,
+                  1'000'000, 0));
+    if (every_ == 0) return;
+    sigma_r_ =
+        p.NonNegative("keyframes.sigma_position_m", "m", "noise of a relative pose, 1 sigma");
+    sigma_q_ = p.NonNegative("keyframes.sigma_orientation_rad", "rad", "likewise");
+    to_previous_ =
+        p.Flag("keyframes.to_previous", "whether the way to the keyframe before is measured", true);
+    radius_ = p.NonNegative("keyframes.closure_radius_m", "m",
+                            "how near a keyframe has to be for a loop to be closed; 0: never", 0.0);
+    apart_ = static_cast<std::size_t>(p.Integer(
+        "keyframes.closure_after", "keyframes that lie between, at least", 1, 1'000'000, 50));
+  }
+
+  bool any() const { return every_ > 0; }
+  /// How many there are so far, and where they are.
+  std::size_t size() const { return keyframes_.size(); }
+  const std::array<double, 3>& position(std::size_t k) const { return keyframes_[k].position; }
+
+  /// The measurements of frame `index`, of that stream; the frames come in turn. The landmarks are
+  /// numbered from `first` on.
+  void Emit(std::size_t index, const CameraState& now, int stream, std::size_t first,
+            Frame& frame) {
+    if (index % every_ != 0) return;
+    first_ = first;
+    if (to_previous_ && !keyframes_.empty())
+      EmitRelative(now, keyframes_.size() - 1, stream, frame);
+    if (const std::size_t near = Nearest(now); near < keyframes_.size()) {
+      EmitRelative(now, near, stream, frame);
+    }
+    Measurement self{frame.timestamp,
+                     stream,
+                     static_cast<std::int64_t>(first_ + keyframes_.size()),
+                     {0, 0, 0, 1, 0, 0, 0},
+                     std::vector<double>(36, 0.0)};
+    frame.measurements.push_back(std::move(self));
+    keyframes_.push_back(now);
+  }
+
+ private:
+  /// Of the old ones within the radius; how many there are where there is none.
+  std::size_t Nearest(const CameraState& now) const {
+    std::size_t nearest = keyframes_.size();
+    double least = radius_ * radius_;
+    for (std::size_t j = 0; radius_ > 0.0 && j + apart_ < keyframes_.size(); ++j) {
+      double way[3];
+      Vec<3>::Minus(keyframes_[j].position.data(), now.position.data(), way);
+      const double squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+      if (squared > least) continue;
+      least = squared;
+      nearest = j;
+    }
+    return nearest;
+  }
+
+  void EmitRelative(const CameraState& now, std::size_t j, int stream, Frame& frame) {
+    const CameraState& then = keyframes_[j];
+    double way[3], turn[4], n[3];
+    Measurement measurement{
+        frame.timestamp, stream, static_cast<std::int64_t>(first_ + j), std::vector<double>(7), {}};
+    double* const z = measurement.values.data();
+    Vec<3>::Minus(then.position.data(), now.position.data(), way);
+    UnitQuaternion::RotateBack(now.orientation.data(), way, z);
+    for (int i = 0; i < 3; ++i) z[i] += sigma_r_ * noise_.Normal();
+    const double back[4] = {now.orientation[0], -now.orientation[1], -now.orientation[2],
+                            -now.orientation[3]};
+    UnitQuaternion::Multiply(back, then.orientation.data(), turn);
+    for (double& one : n) one = sigma_q_ * noise_.Normal();
+    UnitQuaternion::Plus(turn, n, z + 3);
+    frame.measurements.push_back(std::move(measurement));
+  }
+
+  std::size_t every_ = 0, apart_ = 0, first_ = 0;
+  bool to_previous_ = true;
+  double sigma_r_ = 0.0, sigma_q_ = 0.0, radius_ = 0.0;
+  Random noise_;
+  std::vector<CameraState> keyframes_;
+};
+
+}  // namespace alidade::scene

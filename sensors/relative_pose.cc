@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "relative_pose.h"
+
+#include "alidade/model/plugin.h"
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::RelativePose, "relative_pose",
+                              "the pose of a landmark that has one: a tag, or a keyframe",
+                              "[Roumeliotis2002]"))

@@ -115,7 +115,7 @@ double FlopsOf(const Found& found) {
   return std::stod(text.substr(begin, end - begin));
 }
 
-// One loop over 2000 frames ties the last one to the first: the fronts between them carry three rows
+// One loop over 2000 frames ties the last one to the first: the fronts between carry three rows
 // more, and no more.
 TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   constexpr int kFrames = 2000;

@@ -5,10 +5,10 @@
 
 namespace alidade {
 
-/// The pose of a landmark that has one, as seen from the body: a fiducial tag, an object, a station;
-/// or the body itself at an earlier time, a keyframe, to which odometry and loop closures tell the
-/// way. A landmark that is seen first at the neutral pose, without noise, is such a keyframe: its
-/// pose becomes that of the body, a clone with all of its correlations.
+/// The pose of a landmark that has one, as seen from the body: a fiducial tag, an object, a
+/// station; or the body itself at an earlier time, a keyframe, to which odometry and loop closures
+/// tell the way. A landmark that is seen first at the neutral pose, without noise, is such a
+/// keyframe: its pose becomes that of the body, a clone with all of its correlations.
 ///
 ///   model      z = (R_BW (p - r) + n_r, (q^-1 s) (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   automatic differentiation               6 x 12

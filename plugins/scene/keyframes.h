@@ -22,8 +22,8 @@ namespace alidade::scene {
 ///                                                        enough: a loop is closed
 ///   z = (0, 1), without noise                            of k itself: that is where it is
 ///
-/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is j, or k, plus
-/// `first`.
+/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is j, or k,
+/// plus `first`.
 class Keyframes {
  public:
   Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {

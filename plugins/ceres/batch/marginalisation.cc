@@ -192,9 +192,9 @@ Eigen::MatrixXd CondensedRun::PutInState(const Point& point, std::vector<Leaving
   return s;
 }
 
-/// What is known of a landmark from now on is where its point is, of which an anchor is a part: with
-/// p(y) of J = [J_a R] by the anchor and the three last numbers, these alone move, by R^-1 J dy. To
-/// first order nothing that a sensor sees is lost, and three rows are left of six.
+/// What is known of a landmark from now on is where its point is, of which an anchor is a part:
+/// with p(y) of J = [J_a R] by the anchor and the three last numbers, these alone move, by
+/// R^-1 J dy. To first order nothing that a sensor sees is lost, and three rows are left of six.
 Eigen::MatrixXd CondensedRun::AboutItsPoint(const MapLandmark& landmark,
                                             const std::vector<double>& y,
                                             const Eigen::MatrixXd& rows) const {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "alidade/state/tiles.h"
+
 namespace alidade::ceres_batch {
 
 int BlockLdl::AddVariable(int size) {
@@ -91,7 +93,7 @@ void BlockLdl::Extend(const Front& child, const Eigen::MatrixXd& update,
 }
 
 bool BlockLdl::Factorise() {
-  Eigen::MatrixXd f;
+  Eigen::MatrixXd f, transposed;
   for (std::size_t a = 0; a < factors_.size(); ++a) {
     const Front& front = elimination_.fronts[a];
     Factor& factor = factors_[a];
@@ -120,7 +122,8 @@ bool BlockLdl::Factorise() {
     if (m == 0) continue;
     factor.x = factor.d.solve(f.bottomLeftCorner(m, p).transpose());
     factor.update = f.bottomRightCorner(m, m);
-    factor.update.triangularView<Eigen::Lower>() -= f.bottomLeftCorner(m, p) * factor.x;
+    transposed = factor.x.transpose();
+    internal::AddSymmetricProduct(factor.update, f.bottomLeftCorner(m, p), transposed, -1.0);
   }
   return true;
 }

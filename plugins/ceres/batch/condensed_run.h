@@ -316,6 +316,8 @@ class CondensedRun {
   Outcome See(const Factor& factor, const std::vector<double>& x, std::vector<double>& h,
               std::vector<double>* jacobian) const;
   std::vector<const double*> RolesOf(const Factor& factor, const std::vector<double>& x) const;
+  const std::vector<double>& Joined(const std::vector<double>& x,
+                                    const std::vector<double>& y) const;
   void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
   const SensorBinding& SensorOf(const Factor& factor) const {
     return binding_.system.sensors[static_cast<std::size_t>(factor.sensor)];
@@ -389,6 +391,13 @@ class CondensedRun {
   bool has_unit_vector_ = false, robust_ = false;
   double change_ = 0.0;
   mutable std::string problem_;
+  struct Memory {
+    std::vector<double> x, h, jacobian;
+    std::vector<const double*> roles;
+    std::vector<double*> columns;
+    RowMajor j_r_h;
+  };
+  mutable Memory memory_;  ///< of Residual and what it calls
   std::vector<Step> passed_on_;  ///< of frames that were dropped, to the next one
 };
 

@@ -40,6 +40,15 @@ std::string Why(Outcome outcome, const SensorModel& model) {
   return outcome == Outcome::kFailed ? model.error_text() : "out of its domain";
 }
 
+/// B <- L^-1 B, L the lower triangle of `l`. Of few rows.
+template <class B>
+void Whiten(const Eigen::MatrixXd& l, B& b) {
+  for (Eigen::Index i = 0; i < l.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) b.row(i) -= l(i, j) * b.row(j);
+    b.row(i) /= l(i, i);
+  }
+}
+
 /// `sensor 'NAME' at TIME`
 std::string TextOf(const SensorBinding& sensor, const Measurement& measurement) {
   return "sensor '" + sensor.name + "' at " + internal::SecondsText(measurement.timestamp);
@@ -134,6 +143,14 @@ bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, con
   return true;
 }
 
+/// x and, behind, y of a landmark. Until the next call.
+const std::vector<double>& CondensedRun::Joined(const std::vector<double>& x,
+                                                const std::vector<double>& y) const {
+  memory_.x = x;
+  memory_.x.insert(memory_.x.end(), y.begin(), y.end());
+  return memory_.x;
+}
+
 std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
                                                  const std::vector<double>& x) const {
   std::vector<const double*> roles;
@@ -144,9 +161,9 @@ std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
 /// h and, unless null, H in the columns of its place.
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
-  std::vector<double*> memory;
+  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, memory_.roles);
   return internal::EvaluateAt(ModelOf(factor), PlaceOf(factor), factor.measurement,
-                              RolesOf(factor, x).data(), memory, h, jacobian);
+                              memory_.roles.data(), memory_.columns, h, jacobian);
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.
@@ -158,18 +175,18 @@ bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, 
   if (factor.l.size() == 0) {
     return Fail(TextOf(sensor, factor.measurement) + ": not defined at the start");
   }
-  std::vector<double> h, jacobian;
+  std::vector<double>&h = memory_.h, &jacobian = memory_.jacobian;
   const Outcome outcome = See(factor, x, h, a == nullptr ? nullptr : &jacobian);
   if (outcome != Outcome::kAccepted) {
     return Fail(TextOf(sensor, factor.measurement) + ": " + Why(outcome, model));
   }
   const int m = geometry.tangent;
   r.resize(m);
-  RowMajor j_r_h(m, m);
+  RowMajor& j_r_h = memory_.j_r_h;
+  j_r_h.resize(m, m);
   Difference(geometry, factor.measurement.values.data(), h.data(), r.data(),
              a == nullptr ? nullptr : j_r_h.data());
-  const auto whiten = factor.l.triangularView<Eigen::Lower>();
-  whiten.solveInPlace(r);
+  Whiten(factor.l, r);
   bool finite = r.allFinite();
   if (a != nullptr) {
     const internal::SensorPlace& place = PlaceOf(factor);
@@ -178,10 +195,11 @@ bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, 
                           ? place.parts.back().offset + place.parts.back().size
                           : initial_.covariance().size();
     a->setZero(m, width);
+    Whiten(factor.l, j_r_h);
     for (const JacobianPart& part : place.parts) {
-      a->middleCols(part.offset, part.size) += j_r_h * j_h.middleCols(part.column, part.size);
+      a->middleCols(part.offset, part.size) +=
+          j_r_h.lazyProduct(j_h.middleCols(part.column, part.size));
     }
-    if (width > 0) whiten.solveInPlace(*a);  // Eigen solves for one column at least
     finite = finite && a->allFinite();
   }
   return finite || Fail("sensor '" + sensor.name + "' predicts what is not finite");

@@ -105,7 +105,7 @@ std::optional<double> KktSystem::Cost(const Eigen::VectorXd& z) {
     for (const auto& [epoch, index] : landmark.observations) {
       const Factor& factor = run_.epochs_[epoch].factors[index];
       if (factor.left_out) continue;
-      if (!run_.Residual(factor, WithLandmark(points[epoch].x, place.y), r, nullptr)) return {};
+      if (!run_.Residual(factor, run_.Joined(points[epoch].x, place.y), r, nullptr)) return {};
       cost += Rho(run_.SensorOf(factor).loss, r.norm());
     }
   }
@@ -391,7 +391,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
   for (const auto& [epoch, index] : landmark.observations) {
     const Factor& factor = run_.epochs_[epoch].factors[index];
     const bool out = !about && factor.left_out;
-    if (out || !run_.Residual(factor, WithLandmark(at_[epoch].x, place.y), r, &a)) {
+    if (out || !run_.Residual(factor, run_.Joined(at_[epoch].x, place.y), r, &a)) {
       if (!out && !about) return false;
       ++term_;
       continue;

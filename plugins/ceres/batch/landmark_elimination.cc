@@ -182,7 +182,7 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;
   Eigen::MatrixXd a;
-  if (!Residual(factor, WithLandmark(point.x, place.y), r, &a)) return false;
+  if (!Residual(factor, Joined(point.x, place.y), r, &a)) return false;
   const RobustLoss& loss = SensorOf(factor).loss;
   normal.cost += Rho(loss, r.norm());
   const double root = std::sqrt(Weight(loss, r.norm()));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sparse_solve.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -133,6 +134,43 @@ SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
   return settled.cost && !(next.cost && *next.cost < *settled.cost) ? settled : next;
 }
 
+/// Gauss-Newton steps s(z) shrink slowly, or do not shrink at all, where the Hessian is far from
+/// theirs: each error in its direction is left times some factor. From the last few of them, where
+/// a step that is a combination of them is least [Anderson1965]; ds and dz from one to the next:
+///
+///   z + s - (dZ + dS) t,   t = argmin |s - dS t|
+std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
+  constexpr double kEnough = 0.1;  // of what the step promises
+  const auto count = static_cast<Eigen::Index>(last_.size());
+  Eigen::MatrixXd dz(z_.size(), count), ds(z_.size(), count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Stepped& from = last_[static_cast<std::size_t>(i)];
+    const bool newest = i + 1 == count;
+    const Stepped* const to = newest ? nullptr : &last_[static_cast<std::size_t>(i) + 1];
+    dz.col(i) = (newest ? z_ : to->z) - from.z;
+    ds.col(i) = (newest ? kkt_.step() : to->step) - from.step;
+  }
+  const Eigen::VectorXd t = ds.colPivHouseholderQr().solve(kkt_.step());
+  Trial trial;
+  trial.z = z_ + kkt_.step() - (dz + ds) * t;
+  if (!trial.z.allFinite()) return {};
+  trial.cost = kkt_.Cost(trial.z);
+  const double cost = kkt_.cost(), most = cost + kRounding * (1.0 + cost) - kEnough * predicted;
+  return trial.cost && *trial.cost <= most ? std::optional(std::move(trial)) : std::nullopt;
+}
+
+/// Extrapolated where that is as good, or where the step leads.
+SparseSolve::Trial SparseSolve::NextPoint(double mu, double predicted) {
+  constexpr std::size_t kFrom = 5;  // points
+  std::optional<Trial> extrapolated;
+  if (mu == 0.0) {
+    if (!last_.empty()) extrapolated = Extrapolated(predicted);
+    last_.push_back({z_, kkt_.step()});
+    if (last_.size() > kFrom) last_.pop_front();
+  }
+  return extrapolated ? *std::move(extrapolated) : AfterStep(predicted);
+}
+
 /// Levenberg-Marquardt: with the gain ratio g of a step that is taken,
 ///
 ///   mu <- mu max(1/3, 1 - (2 g - 1)^3),   and of one that is not, mu <- mu nu, nu <- 2 nu
@@ -140,6 +178,7 @@ bool SparseSolve::Descend() {
   constexpr double kSettled = 1e-9;              // sigma
   constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
   double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0;
+  last_.clear();
   note_.clear();
   if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
     summary_ = run_.problem();
@@ -155,7 +194,7 @@ bool SparseSolve::Descend() {
     }
     const double predicted = 0.5 * (decrement + mu * squared);
     const bool unseen = predicted <= kRounding * (1.0 + cost);
-    Trial next = AfterStep(predicted);
+    Trial next = NextPoint(mu, predicted);
     ++iterations_;
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
       z_ = std::move(next.z);

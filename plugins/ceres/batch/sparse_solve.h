@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,8 +16,9 @@ namespace alidade::ceres_batch {
 
 /// The maximum a posteriori of a CondensedRun by a KktSystem: Levenberg-Marquardt in all inputs
 /// z = (e, l), whose damping goes up and down as in [Nielsen1999]; Gauss-Newton as long as the cost
-/// falls. Q and R that depend on the state are frozen, the problem is solved, and so on until they
-/// settle. A step is measured by its decrement, sqrt(-dz' grad phi): its length in sigmas.
+/// falls, extrapolated from the last steps [Anderson1965]. Q and R that depend on the state are
+/// frozen, the problem is solved, and so on until they settle. A step is measured by its decrement,
+/// sqrt(-dz' grad phi): its length in sigmas.
 class SparseSolve {
  public:
   SparseSolve(CondensedRun& run, const SolveOptions& options);
@@ -55,6 +57,8 @@ class SparseSolve {
     std::optional<double> cost;  ///< none: a model is not defined there
   };
   Trial AfterStep(double predicted);
+  std::optional<Trial> Extrapolated(double predicted);
+  Trial NextPoint(double mu, double predicted);
   bool EndUnsettled(double left, bool spent);
 
   CondensedRun& run_;
@@ -62,6 +66,10 @@ class SparseSolve {
   KktSystem kkt_;
   std::function<bool()> stop_;
   Eigen::VectorXd z_;
+  struct Stepped {
+    Eigen::VectorXd z, step;
+  };
+  std::deque<Stepped> last_;  ///< steps without damping, and from where
   int iterations_ = 0, solves_ = 0;
   int undefined_ = 0;  ///< of the iterations, whose full step led to where a model is not defined
   std::string summary_, note_;

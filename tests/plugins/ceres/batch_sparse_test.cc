@@ -217,6 +217,26 @@ TEST(SparseBatch, SolvesWithStereoPairs) {
   ExpectSame(both.sparse, both.dense);
 }
 
+// Of four frames the depths are prior and little else: a Gauss-Newton step there goes more than twice
+// as far as it should, and comes back as far. Extrapolated from the last few, steps converge.
+TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
+  Config config = Example("16_slam_room");
+  config.Set("source.seed", "1001", "--set");
+  config.Set("estimators", "{batch: {type: ceres_batch, solver: sparse}}", "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  Estimator& batch = *experiment.estimators[0].estimator;
+  SourceFrame frame;
+  for (int k = 0; k < 5 && experiment.source->Next(frame); ++k) batch.Process(frame);
+  std::string solution;
+  batch.Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+    for (const Event& event : report.events) solution = event.text;
+  });
+  EXPECT_FALSE(batch.failed()) << solution;
+  const std::size_t at = solution.find(", ");
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_LT(std::stoi(solution.substr(at + 2)), 60) << solution;
+}
+
 // An observation is not defined where the dense solver starts, which cannot go on then.
 TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   Config config = Example("15_slam_representations");

@@ -397,7 +397,7 @@ class CondensedRun {
     std::vector<double*> columns;
     RowMajor j_r_h;
   };
-  mutable Memory memory_;  ///< of Residual and what it calls
+  mutable Memory memory_;        ///< of Residual and what it calls
   std::vector<Step> passed_on_;  ///< of frames that were dropped, to the next one
 };
 

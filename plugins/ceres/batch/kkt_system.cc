@@ -77,6 +77,7 @@ bool KktSystem::Settle(Eigen::VectorXd& z, bool all, double left) {
   std::vector<Point> points;
   if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].edge.size() > 0) continue;
     MapLandmark& landmark = run_.landmarks_[i];
     auto l = z.segment(points_[i].column, landmark.from.size());
     landmark.from = l;
@@ -319,8 +320,8 @@ bool KktSystem::LinearisePlain(std::size_t k, bool about) {
 
 bool KktSystem::LineariseLandmarks(const Eigen::VectorXd& z, bool about) {
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const auto size = run_.landmarks_[i].from.size();
-    if (!LineariseLandmark(i, z.segment(points_[i].column, size), about)) return false;
+    const Eigen::VectorXd l = z.segment(points_[i].column, run_.landmarks_[i].from.size());
+    if (!LineariseLandmark(i, l, about)) return false;
   }
   return true;
 }
@@ -361,12 +362,29 @@ void PutFirstCamera(const Eigen::MatrixXd& left, Eigen::Index column, Eigen::Ind
 
 }  // namespace
 
+/// Of l, with so many rows of x_f.
+void KktSystem::AccumulatePrior(const Point3& point, Eigen::Index rows, const Eigen::VectorXd& l) {
+  if (l.size() == 0) {
+    ++term_;
+    return;
+  }
+  const double root_mu = std::sqrt(1.0 + damping_);
+  Eigen::MatrixXd prior(l.size(), l.size() + rows);
+  prior.setIdentity();
+  if (rows > 0) prior.rightCols(rows) = -point.c;
+  const bool held = point.edge.size() > 0;
+  const Eigen::VectorXd free = held ? l - point.edge * point.edge.dot(l) : l;
+  Accumulate(root_mu * prior, free / root_mu);
+}
+
 bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool about) {
   constexpr double kTied = 1e-7;  // of what the camera moves the point by
   const MapLandmark& landmark = run_.landmarks_[i];
   Point3& point = points_[i];
   Inverse& place = point.place;
   if (!run_.Place(landmark, l, at_, place)) return false;
+  const bool held = point.edge.size() > 0;
+  if (held) place.by_d -= place.by_d * point.edge * point.edge.transpose();
   const auto n = Eigen::Index{run_.initial_.covariance().size()};
   std::vector<int> rows = read_rows_;  // of x_f
   for (const int constant : landmark_constants_) {
@@ -375,17 +393,10 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
   }
   const Eigen::Index inputs = l.size(), read = std::ssize(read_rows_), all = std::ssize(rows);
   point.c = FollowOf(landmark, place, static_cast<int>(inputs))(Eigen::all, rows);
+  if (held) point.c.setZero();
   place.by_x = place.by_x(Eigen::all, rows).eval();
   const Eigen::MatrixXd rest = place.by_x - place.by_d * point.c;  // what is left to the camera
-  const double root_mu = std::sqrt(1.0 + damping_);
-  if (inputs == 0) {
-    ++term_;
-  } else {
-    Eigen::MatrixXd prior(inputs, inputs + (landmark.first ? all : 0));
-    prior.setIdentity();
-    if (landmark.first) prior.rightCols(all) = -point.c;
-    Accumulate(root_mu * prior, l / root_mu);
-  }
+  AccumulatePrior(point, landmark.first ? all : 0, l);
   Eigen::VectorXd r;
   Eigen::MatrixXd a, j;
   for (const auto& [epoch, index] : landmark.observations) {

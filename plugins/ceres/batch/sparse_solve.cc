@@ -59,10 +59,26 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
   const std::string cost = "cost " + internal::RoundedText(kkt_.cost(), 9) + ", " +
                            std::to_string(iterations_) + " iterations in " +
                            std::to_string(solves_) + (solves_ == 1 ? " solve: " : " solves: ");
-  summary_ = cost + (failed_ ? summary_ : "converged") + "; sparse, " +
+  summary_ = cost + (failed_ ? summary_ : "converged") + TellEdge() + "; sparse, " +
              (kkt_.in_time_order() ? "in the order of time, " : "in order of minimum degree, ") +
              internal::RoundedText(flops(), 2) + " flops an iteration";
-  return !failed_ || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
+  const bool held = !kkt_.AtEdge().empty();
+  kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
+  return (!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
+}
+
+/// Landmarks at the edge of their domain, by their ids.
+std::string SparseSolve::TellEdge() const {
+  constexpr std::size_t kMost = 10;  // names
+  const std::vector<std::int64_t> ids = kkt_.AtEdge();
+  if (ids.empty()) return "";
+  std::string text = ", " + std::to_string(ids.size()) +
+                     (ids.size() == 1 ? " landmark at the edge of its domain: "
+                                      : " landmarks at the edge of their domain: ");
+  for (std::size_t i = 0; i < std::min(ids.size(), kMost); ++i) {
+    text += (i == 0 ? "" : ", ") + std::to_string(ids[i]);
+  }
+  return text + (ids.size() > kMost ? " and others" : "");
 }
 
 /// From the problem linearised about the filter, the landmarks where they cost least; where that
@@ -122,15 +138,18 @@ SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
   const double cost = kkt_.cost();
   Trial next;
   next.z = z_ + kkt_.step();
-  next.cost = kkt_.Cost(next.z);
-  if (!next.cost) ++undefined_;
+  next.cost = CostAt(next.z);
+  if (!next.cost) {
+    ++undefined_;
+    kkt_.NoteUndefined(next.z);
+  }
   if (!run_.shape().has_landmarks || predicted <= kRounding * (1.0 + cost)) return next;
   if (next.cost && cost - *next.cost > kLinear * predicted) return next;
   Trial settled = next;
   const Eigen::Index map = z_.size() - run_.shape().inputs;
   if (!next.cost) settled.z.tail(map) = z_.tail(map);
   const double left = kLeft * predicted;
-  settled.cost = kkt_.Settle(settled.z, true, left) ? kkt_.Cost(settled.z) : std::nullopt;
+  settled.cost = kkt_.Settle(settled.z, true, left) ? CostAt(settled.z) : std::nullopt;
   return settled.cost && !(next.cost && *next.cost < *settled.cost) ? settled : next;
 }
 
@@ -154,7 +173,7 @@ std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
   Trial trial;
   trial.z = z_ + kkt_.step() - (dz + ds) * t;
   if (!trial.z.allFinite()) return {};
-  trial.cost = kkt_.Cost(trial.z);
+  trial.cost = CostAt(trial.z);
   const double cost = kkt_.cost(), most = cost + kRounding * (1.0 + cost) - kEnough * predicted;
   return trial.cost && *trial.cost <= most ? std::optional(std::move(trial)) : std::nullopt;
 }
@@ -198,7 +217,10 @@ bool SparseSolve::Descend() {
     ++iterations_;
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
       z_ = std::move(next.z);
-      if (mu == 0.0 && (left <= kSettled || (left <= kTells && left > 0.5 * before))) return true;
+      if (mu == 0.0 && (left <= kSettled || (left <= kTells && left > 0.5 * before))) {
+        if (!kkt_.LetGoOfEdge(z_)) return true;
+        last_.clear();
+      }
       const double gain = unseen ? 1.0 : (cost - *next.cost) / predicted;
       mu *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
       if (mu < kLeast) mu = 0.0;
@@ -209,6 +231,11 @@ bool SparseSolve::Descend() {
       mu *= nu;
       nu *= 2.0;
       if (!(mu < kMost)) break;
+    }
+    if (kkt_.HoldAtEdge(z_)) {
+      mu = left = 0.0;
+      nu = 2.0;
+      last_.clear();
     }
     if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
       summary_ = run_.problem();

@@ -56,6 +56,11 @@ class SparseSolve {
     Eigen::VectorXd z;
     std::optional<double> cost;  ///< none: a model is not defined there
   };
+  /// Of z, landmarks that are held at the edge of their domain put back there.
+  std::optional<double> CostAt(Eigen::VectorXd& z) {
+    return kkt_.PutOnEdge(z) ? kkt_.Cost(z) : std::nullopt;
+  }
+  std::string TellEdge() const;
   Trial AfterStep(double predicted);
   std::optional<Trial> Extrapolated(double predicted);
   Trial NextPoint(double mu, double predicted);

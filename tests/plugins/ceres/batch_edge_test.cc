@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "batch_landmarks_fixture.h"
+
+/// Landmarks of a sparse batch whose optimum is at the edge of where their models are defined.
+namespace alidade {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using testing::Found;
+
+constexpr double kOffsetSigma = 0.1, kFirstSigma = 0.3, kPeriod = 0.1, kEdgeSlope = 0.5;
+constexpr int kViews = 4;
+
+/// z = p - r, where a landmark begins only if z_z > z_x / 2.
+struct OffsetBeyond : Sensor<Vec<3>, Vec<3>, Vec<3>> {
+  static constexpr std::array kRoles{testing::kPosition,
+                                     Quantity{"landmark", "m", "", "x,y,z", testing::kOfLandmark}};
+  static constexpr Quantity kMeasurement{"offset", "m", "", "x,y,z"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* r, const T* p, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = p[i] - r[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(kOffsetSigma);
+  }
+  template <class T>
+  bool Initialise(const T* r, const T* z, T* p) const {
+    if (!(z[2] - kEdgeSlope * z[0] > T(0.0))) return false;
+    for (int i = 0; i < 3; ++i) p[i] = r[i] + z[i];
+    return true;
+  }
+};
+
+/// What a camera sees of landmark 7, which seems to come out of its domain, or stays `inside`, and
+/// of landmark 8.
+std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
+  std::vector<std::array<Vector3d, 2>> seen;
+  for (int k = 0; k < kViews; ++k) {
+    const double out = k == 0 || inside ? 0.0 : 0.6;
+    seen.push_back({Vector3d(0.3 - 0.02 * k, 0.1, 0.2 + 0.01 * k - out),
+                    Vector3d(-1.0 + 0.03 * k, 0.2 * k, 2.0 - 0.05 * k)});
+  }
+  return seen;
+}
+
+/// The problem written out in x = (r_0 .. r_3, p_7, p_8): A x = b, linear as it is.
+void WriteOut(const std::vector<std::array<Vector3d, 2>>& seen, MatrixXd& a, VectorXd& b) {
+  constexpr int kSize = 3 * (kViews + 2);
+  a.setZero(kSize, kSize);
+  b.setZero(kSize);
+  const auto add = [&](int plus, int minus, const Vector3d& z, double sigma) {
+    MatrixXd j = MatrixXd::Zero(3, kSize);
+    j.middleCols(3 * plus, 3).setIdentity();
+    if (minus >= 0) j.middleCols(3 * minus, 3) -= MatrixXd::Identity(3, 3);
+    a += j.transpose() * j / (sigma * sigma);
+    b += j.transpose() * z / (sigma * sigma);
+  };
+  add(0, -1, Vector3d::Zero(), kFirstSigma);
+  for (int k = 0; k < kViews; ++k) {
+    if (k > 0) add(k, k - 1, Vector3d::Zero(), testing::kWalk * std::sqrt(kPeriod));
+    for (int i = 0; i < 2; ++i) {
+      add(kViews + i, k, seen[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)],
+          kOffsetSigma);
+    }
+  }
+}
+
+Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
+  const System system = testing::MapSystem(OffsetBeyond(), {}, kFirstSigma);
+  std::vector<Frame> frames;
+  for (int k = 0; k < kViews; ++k) {
+    std::vector<testing::Observation> observations;
+    for (int i = 0; i < 2; ++i) {
+      const Vector3d& z = seen[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)];
+      observations.push_back({7 + i, {z[0], z[1], z[2]}});
+    }
+    frames.push_back(testing::FrameOf(kPeriod * k, observations));
+  }
+  return testing::Solve(system, frames, "solver: sparse\n");
+}
+
+void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
+  ASSERT_FALSE(found.failed);
+  constexpr double kNear = 1e-8;  // of some 0.1 m; it is held at 1e-9 sigma from the edge
+  for (int k = 0; k < kViews; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    EXPECT_LT((found.Camera(at) - x.segment<3>(3 * k)).norm(), kNear) << k;
+    const MatrixXd own = found.states[at].covariance().Dense(),
+                   expected = p.block(3 * k, 3 * k, 3, 3);
+    EXPECT_LT((own - expected).norm(), kNear * expected.norm()) << k;
+  }
+  for (int i = 0; i < 2; ++i) {
+    const int at = 3 * (kViews + i);
+    EXPECT_LT((found.Landmark(7 + i).position - x.segment<3>(at)).norm(), kNear) << i;
+    const MatrixXd expected = p.block(at, at, 3, 3);
+    EXPECT_LT((found.Landmark(7 + i).covariance - expected).norm(), kNear * expected.norm()) << i;
+  }
+}
+
+// The minimum under  p_z - r_0z = (p_x - r_0x) / 2  of landmark 7. It slides along the edge: its x
+// is not what it was where it got there. The covariances are those without the edge.
+TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
+  const auto seen = OffsetsOf(false);
+  MatrixXd a;
+  VectorXd b;
+  WriteOut(seen, a, b);
+  const Eigen::Index n = b.size();
+  MatrixXd bordered = MatrixXd::Zero(n + 1, n + 1);
+  bordered.topLeftCorner(n, n) = a;
+  for (const auto& [at, value] : {std::pair(3 * kViews + 2, 1.0), std::pair(2, -1.0),
+                                  std::pair(3 * kViews, -kEdgeSlope), std::pair(0, kEdgeSlope)}) {
+    bordered(n, at) = bordered(at, n) = value;
+  }
+  VectorXd right = VectorXd::Zero(n + 1);
+  right.head(n) = b;
+  const VectorXd x = bordered.partialPivLu().solve(right).head(n);
+  EXPECT_GT((x - a.llt().solve(b)).norm(), 0.1);
+  const Found found = SolveSparse(seen);
+  ExpectSolution(found, x, a.inverse());
+  const std::string& said = found.events.back().text;
+  EXPECT_NE(said.find(": converged, 1 landmark at the edge of its domain: 7; sparse"),
+            std::string::npos)
+      << said;
+}
+
+TEST(CeresBatchEdge, NoneIsNamedWhereTheOptimumIsInside) {
+  const auto seen = OffsetsOf(true);
+  MatrixXd a;
+  VectorXd b;
+  WriteOut(seen, a, b);
+  const Found found = SolveSparse(seen);
+  ExpectSolution(found, a.llt().solve(b), a.inverse());
+  EXPECT_NE(found.events.back().text.find(": converged; sparse"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -72,7 +72,7 @@ void KktSystem::NoteUndefined(const Eigen::VectorXd& z) {
 }
 
 bool KktSystem::HoldAtEdge(Eigen::VectorXd& z) {
-  constexpr int kPatience = 2;  // steps out of the domain; more of one that was let go
+  constexpr int kPatience = 1;  // steps out of the domain; more of one that was let go
   const auto waits = [](const Point3& point) {
     return point.edge.size() > 0 || point.refused < kPatience << std::min(point.released, 20);
   };

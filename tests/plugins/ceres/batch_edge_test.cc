@@ -128,6 +128,47 @@ TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
       << said;
 }
 
+/// z = exp(-r_z): Gauss-Newton goes much too far at first, then comes back by 1 m a step.
+struct Exponential : Sensor<Vec<1>, Vec<3>> {
+  static constexpr std::array kRoles{testing::kPosition};
+  static constexpr Quantity kMeasurement{"z", "", "", ""};
+  template <class T>
+  bool Predict(const T* r, T* z) const {
+    using std::exp;
+    z[0] = exp(-r[2]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.01);
+  }
+};
+
+// On the way the camera is so far back that the landmark, 4 m before it, wants to be behind where
+// the camera was first. At the optimum it is 1 m before that, and the dense solver finds the same.
+TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
+  System system = testing::MapSystem(OffsetBeyond(), {});
+  testing::AddSensor(system, "e", InProcessSensor(Exponential(), "exponential"), {"cam.position"});
+  std::vector<Frame> frames;
+  for (int k = 0; k < kViews; ++k) {
+    const double z = k == 0 ? 1.0 : 4.0;
+    frames.push_back(testing::FrameOf(kPeriod * k, {{7, {0.0, 0.0, z}}}));
+    if (k == 0) continue;
+    frames.back().measurements.push_back({frames.back().timestamp, 1, -1, {std::exp(3.0)}, {}});
+  }
+  const Found found = testing::Solve(system, frames, "solver: sparse\n"),
+              expected = testing::Solve(system, frames, "solver: dense\n");
+  const std::string& said = found.events.back().text;
+  ASSERT_FALSE(found.failed) << said;
+  ASSERT_FALSE(expected.failed) << expected.events.back().text;
+  EXPECT_NE(said.find(": converged; sparse"), std::string::npos) << said;
+  EXPECT_NEAR(found.Landmark(7).position[2], expected.Landmark(7).position[2], 1e-7);
+  EXPECT_NEAR(found.Landmark(7).position[2], 1.0, 0.2);
+  for (std::size_t k = 0; k < kViews; ++k) {
+    EXPECT_NEAR(found.Camera(k)[2], expected.Camera(k)[2], 1e-7) << k;
+  }
+}
+
 TEST(CeresBatchEdge, NoneIsNamedWhereTheOptimumIsInside) {
   const auto seen = OffsetsOf(true);
   MatrixXd a;

@@ -217,8 +217,8 @@ TEST(SparseBatch, SolvesWithStereoPairs) {
   ExpectSame(both.sparse, both.dense);
 }
 
-// Of four frames the depths are prior and little else: a Gauss-Newton step there goes more than twice
-// as far as it should, and comes back as far. Extrapolated from the last few, steps converge.
+// Of four frames the depths are prior and little else: a Gauss-Newton step there goes more than
+// twice as far as it should, and comes back as far. Extrapolated from the last few, steps converge.
 TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   Config config = Example("16_slam_room");
   config.Set("source.seed", "1001", "--set");

@@ -293,8 +293,6 @@ class CondensedRun {
                                 const std::vector<LandmarkEstimate>& map) const;
   Eigen::MatrixXd PutInState(const Point& point, std::vector<Leaving>& leaving,
                              const std::vector<bool>& goes_on, Eigen::Index columns);
-  Eigen::MatrixXd AboutItsPoint(const MapLandmark& landmark, const std::vector<double>& y,
-                                const Eigen::MatrixXd& rows) const;
   void AddBlocks(MapLandmark& landmark, State& state) const;
   void LetGo(const std::vector<bool>& goes_on);
   void DropFirst(Trajectory& about);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -179,31 +178,15 @@ Eigen::MatrixXd CondensedRun::PutInState(const Point& point, std::vector<Leaving
     MapLandmark& landmark = landmarks_[one.landmark];
     if (landmark.l.size() == 0 || !goes_on[one.landmark]) continue;
     const Eigen::Index at = s.rows(), t = one.place.by_d.rows();
-    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(t, columns);
-    own.leftCols(c) = one.place.by_x * point.s;
-    own.middleCols(one.column, one.place.by_d.cols()) = one.place.by_d;
-    s.conservativeResize(at + t, Eigen::NoChange);
-    s.bottomRows(t) = AboutItsPoint(landmark, one.place.y, own);
+    s.conservativeResizeLike(Eigen::MatrixXd::Zero(at + t, columns));
+    s.block(at, 0, t, c) = one.place.by_x * point.s;
+    s.block(at, one.column, t, one.place.by_d.cols()) = one.place.by_d;
     landmark.mean = std::move(one.place.y);
     AddBlocks(landmark, state);
   }
   initial_ = std::move(state);
   PutPlaces();
   return s;
-}
-
-/// What is known of a landmark from now on is where its point is, of which an anchor is a part:
-/// with p(y) of J = [J_a R] by the anchor and the three last numbers, these alone move, by
-/// R^-1 J dy. To first order nothing that a sensor sees is lost, and three rows are left of six.
-Eigen::MatrixXd CondensedRun::AboutItsPoint(const MapLandmark& landmark,
-                                            const std::vector<double>& y,
-                                            const Eigen::MatrixXd& rows) const {
-  const auto point = PointOf(landmark, y);
-  if (!point || rows.rows() <= 3) return rows;
-  const Eigen::Matrix3d r = point->jacobian.rightCols<3>();
-  Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
-  moved.bottomRows(3) = r.partialPivLu().solve(point->jacobian * rows);
-  return moved.allFinite() ? moved : rows;
 }
 
 /// Its value in x.

@@ -200,5 +200,42 @@ TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
                                std::to_string(longest));
 }
 
+// A camera goes along points that come and go. Where it is in the world it knows less and less: a
+// prior of points that stays where it was linearised, as with anchors that do not move, would tell.
+TEST(FixedLagLandmarks, OnAWayAlongPointsItKnowsNoMoreThanTheFilter) {
+  constexpr int kSteps = 120, kPoints = 240;
+  LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
+  options.max_missed_frames = 1;
+  const System system = MapSystem(testing::InverseDepthPixels(kPixel), options);
+  Random random(3);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < kPoints; ++i) {
+    points.emplace_back(-1.0 + 0.06 * i, 0.5 * random.Normal(), 1.6 + 0.1 * (i % 9));
+  }
+  const auto window = testing::MakeFixedLag(system, "lag_s: 0.45\n");
+  Ekf ekf = testing::EkfOf(system);
+  Vector3d r = Vector3d::Zero();
+  for (int k = 0; k < kSteps; ++k) {
+    std::vector<Observation> observations;
+    for (int i = 0; i < kPoints; ++i) {
+      const Vector3d h = points[static_cast<std::size_t>(i)] - r;
+      if (std::abs(h[0] / h[2]) > 0.4) continue;
+      observations.push_back(
+          {i, {h[0] / h[2] + kPixel * random.Normal(), h[1] / h[2] + kPixel * random.Normal()}});
+    }
+    const Frame frame = FrameOf(0.1 * k, observations);
+    window->Process(frame);
+    ekf.Process(frame);
+    r += Vector3d(0.08, 0.03 * random.Normal(), 0.03 * random.Normal());
+  }
+  ASSERT_FALSE(window->failed());
+  const auto sigma = [](const Estimator& filter, int axis) {
+    return std::sqrt(filter.state().covariance().Variance(axis));
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_GT(sigma(*window, axis), 0.8 * sigma(ekf, axis)) << axis;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -288,11 +288,12 @@ class Models : public Source {
     if (settings) settings->RejectUnread();
   }
 
-  /// The model with landmarks that are points.
+  /// The model with landmarks that are points, or poses.
   static SensorModel ModelOf(const Node& entry, const SensorBinding& binding) {
     if (!binding.model.has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
     if (binding.xyz) return *binding.xyz;
+    if (HasPose(binding.model)) return binding.model;
     const auto representation = RepresentationOf(binding.model.roles());
     if (!representation || !IsXyz(*representation)) {
       entry.Fail("model '" + binding.model.name() + "' of sensor '" + binding.name +
@@ -300,6 +301,15 @@ class Models : public Source {
                  "a source with landmarks of its own");
     }
     return binding.model;
+  }
+
+  /// Whether its landmarks are a position and an orientation.
+  static bool HasPose(const SensorModel& model) {
+    const std::size_t last = model.roles().size() - 1;
+    return model.roles().size() >= 2 && model.roles()[last - 1].landmark() &&
+           model.roles()[last - 1].geometry == Geometry::Vector(3) &&
+           model.roles()[last].landmark() &&
+           model.roles()[last].geometry == Geometry::UnitQuaternion();
   }
 
   void DrawPoints(const Node& entry, std::uint64_t seed) {
@@ -320,6 +330,12 @@ class Models : public Source {
     points_.resize(count);
     for (auto& point : points_) {
       for (std::size_t k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * random.Uniform();
+    }
+    Random of_orientations(seed, 2);
+    orientations_.resize(count);
+    for (auto& orientation : orientations_) {
+      for (double& value : orientation) value = of_orientations.Normal();
+      Geometry::UnitQuaternion().Normalise(orientation.data());
     }
     for (const KnownLandmark& known : system_.landmarks->known) {
       if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) {
@@ -407,8 +423,11 @@ class Models : public Source {
       roles.push_back(role.block < 0 ? nullptr : x_[static_cast<std::size_t>(role.block)].data());
     }
     if (landmark >= 0) {
-      roles.resize(sensor.model.roles().size() - 1);
-      roles.push_back(points_[static_cast<std::size_t>(landmark)].data());
+      const auto id = static_cast<std::size_t>(landmark);
+      const bool has_pose = HasPose(sensor.model);
+      roles.resize(sensor.model.roles().size() - (has_pose ? 2 : 1));
+      roles.push_back(points_[id].data());
+      if (has_pose) roles.push_back(orientations_[id].data());
     }
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
@@ -451,6 +470,7 @@ class Models : public Source {
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
   std::vector<std::array<double, 3>> points_;
+  std::vector<std::array<double, 4>> orientations_;  ///< of landmarks that have a pose
   double dt_s_, start_s_ = 0.0;
   std::int64_t count_, index_ = 0;
 };

@@ -321,6 +321,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, min_range_m: 0.3}"},
       {"pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.03]}"},
+      {"relative_pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.03]}"},
       {"pseudorange", "{sigma_m: 2}"},
       {"range_bearing",
        "{sigma_range_m: 0.1, sigma_bearing_rad: 0.01, landmarks: {representation: inverse_depth}}"},

@@ -53,15 +53,14 @@ class Keyframes {
   void Emit(std::size_t index, const CameraState& now, int stream, std::size_t first,
             Frame& frame) {
     if (index % every_ != 0) return;
-    first_ = first;
     if (to_previous_ && !keyframes_.empty())
-      EmitRelative(now, keyframes_.size() - 1, stream, frame);
+      EmitRelative(now, keyframes_.size() - 1, stream, first, frame);
     if (const std::size_t near = Nearest(now); near < keyframes_.size()) {
-      EmitRelative(now, near, stream, frame);
+      EmitRelative(now, near, stream, first, frame);
     }
     Measurement self{frame.timestamp,
                      stream,
-                     static_cast<std::int64_t>(first_ + keyframes_.size()),
+                     static_cast<std::int64_t>(first + keyframes_.size()),
                      {0, 0, 0, 1, 0, 0, 0},
                      std::vector<double>(36, 0.0)};
     frame.measurements.push_back(std::move(self));
@@ -84,11 +83,12 @@ class Keyframes {
     return nearest;
   }
 
-  void EmitRelative(const CameraState& now, std::size_t j, int stream, Frame& frame) {
+  void EmitRelative(const CameraState& now, std::size_t j, int stream, std::size_t first,
+                    Frame& frame) {
     const CameraState& then = keyframes_[j];
     double way[3], turn[4], n[3];
     Measurement measurement{
-        frame.timestamp, stream, static_cast<std::int64_t>(first_ + j), std::vector<double>(7), {}};
+        frame.timestamp, stream, static_cast<std::int64_t>(first + j), std::vector<double>(7), {}};
     double* const z = measurement.values.data();
     Vec<3>::Minus(then.position.data(), now.position.data(), way);
     UnitQuaternion::RotateBack(now.orientation.data(), way, z);
@@ -101,7 +101,7 @@ class Keyframes {
     frame.measurements.push_back(std::move(measurement));
   }
 
-  std::size_t every_ = 0, apart_ = 0, first_ = 0;
+  std::size_t every_ = 0, apart_ = 0;
   bool to_previous_ = true;
   double sigma_r_ = 0.0, sigma_q_ = 0.0, radius_ = 0.0;
   Random noise_;

@@ -313,7 +313,7 @@ class CondensedRun {
                 Eigen::MatrixXd* a) const;
   Outcome See(const Factor& factor, const std::vector<double>& x, std::vector<double>& h,
               std::vector<double>* jacobian) const;
-  std::vector<const double*> RolesOf(const Factor& factor, const std::vector<double>& x) const;
+  const double* const* RolesOf(const Factor& factor, const std::vector<double>& x) const;
   const std::vector<double>& Joined(const std::vector<double>& x,
                                     const std::vector<double>& y) const;
   void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);

@@ -151,19 +151,18 @@ const std::vector<double>& CondensedRun::Joined(const std::vector<double>& x,
   return memory_.x;
 }
 
-std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
-                                                 const std::vector<double>& x) const {
-  std::vector<const double*> roles;
-  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, roles);
-  return roles;
+/// Until the next call.
+const double* const* CondensedRun::RolesOf(const Factor& factor,
+                                           const std::vector<double>& x) const {
+  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, memory_.roles);
+  return memory_.roles.data();
 }
 
 /// h and, unless null, H in the columns of its place.
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
-  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, memory_.roles);
   return internal::EvaluateAt(ModelOf(factor), PlaceOf(factor), factor.measurement,
-                              memory_.roles.data(), memory_.columns, h, jacobian);
+                              RolesOf(factor, x), memory_.columns, h, jacobian);
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.
@@ -225,8 +224,7 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
 bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
   const SensorModel& model = ModelOf(factor);
   std::vector<double> root, r;
-  const Outcome outcome =
-      internal::NoiseAt(model, factor.measurement, RolesOf(factor, x).data(), root, r);
+  const Outcome outcome = internal::NoiseAt(model, factor.measurement, RolesOf(factor, x), root, r);
   const std::string noise = "the noise of " + TextOf(SensorOf(factor), factor.measurement);
   if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, model));
   const int m = model.measurement().geometry.tangent;

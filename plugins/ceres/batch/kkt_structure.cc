@@ -41,6 +41,7 @@ void KktSystem::FindConstants() {
       into.insert(into.end(), rows.begin(), rows.end());
     } else {
       const bool of_landmark = id >= system;
+      // What the prior knows exactly, as the first keyframe, has no variance.
       const auto stays = [&](int row) { return !run_.l0_.row(row).any() && run_.d0_[row] == 0.0; };
       if (of_landmark) std::erase_if(rows, stays);
       if (rows.empty()) continue;

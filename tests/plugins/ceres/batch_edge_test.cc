@@ -14,20 +14,8 @@ constexpr double kOffsetSigma = 0.1, kFirstSigma = 0.3, kPeriod = 0.1, kEdgeSlop
 constexpr int kViews = 4;
 
 /// z = p - r, where a landmark begins only if z_z > z_x / 2.
-struct OffsetBeyond : Sensor<Vec<3>, Vec<3>, Vec<3>> {
-  static constexpr std::array kRoles{testing::kPosition,
-                                     Quantity{"landmark", "m", "", "x,y,z", testing::kOfLandmark}};
-  static constexpr Quantity kMeasurement{"offset", "m", "", "x,y,z"};
-  static constexpr int kInitialises = 1;
-  template <class T>
-  bool Predict(const T* r, const T* p, T* z) const {
-    for (int i = 0; i < 3; ++i) z[i] = p[i] - r[i];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, const T*, T* l) const {
-    for (int i = 0; i < 3; ++i) l[4 * i] = T(kOffsetSigma);
-  }
+struct OffsetBeyond : testing::Offset {
+  OffsetBeyond() : Offset(kOffsetSigma) {}
   template <class T>
   bool Initialise(const T* r, const T* z, T* p) const {
     if (!(z[2] - kEdgeSlope * z[0] > T(0.0))) return false;

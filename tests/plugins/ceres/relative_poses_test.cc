@@ -30,7 +30,7 @@ struct Walked {
       return Vector3d(sigma * random.Normal(), sigma * random.Normal(), sigma * random.Normal());
     };
     const double step = 0.1 * std::sqrt(0.1);
-    MatrixXd information = MatrixXd::Identity(3 * steps, 3 * steps) * 0.0;
+    MatrixXd information = MatrixXd::Zero(3 * steps, 3 * steps);
     VectorXd right = VectorXd::Zero(3 * steps);
     const auto add = [&](int from, int to, const Vector3d& difference, double sigma) {
       for (int e = 0; e < 3; ++e) {
@@ -144,7 +144,7 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   ASSERT_FALSE(open.failed || closed.failed);
   RecordProperty("flops", std::to_string(FlopsOf(open)) + ' ' + std::to_string(FlopsOf(closed)));
   EXPECT_LT(FlopsOf(closed), 2.0 * FlopsOf(open));
-  EXPECT_LT(FlopsOf(closed), 2e4 * kFrames);
+  EXPECT_LT(FlopsOf(closed), 2e3 * kFrames);
   // It tells of the end: 2000 steps of 0.1 m/sqrt(s) against one offset of 0.05 m.
   const auto sigma = [](const Found& found) {
     return std::sqrt(found.states.back().covariance().Variance(0));

@@ -69,5 +69,63 @@ TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
   EXPECT_NEAR(Seconds(thinned.timestamps.back()), 0.033 * 4996, 1e-6);
 }
 
+/// Takes truth for lambda and the rate of depth too.
+class WithAllTruth : public testing::SwingingTarget {
+ public:
+  using SwingingTarget::SwingingTarget;
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  bool Next(SourceFrame& frame) override {
+    if (!SwingingTarget::Next(frame)) return false;
+    const double t_s = Seconds(frame.timestamp);
+    frame.truth = {
+        {0.3 + 0.1 * std::sin(2.5133 * t_s)}, {0.25133 * std::cos(2.5133 * t_s)}, {1.0 / 0.3}};
+    return true;
+  }
+
+ private:
+  std::vector<StreamInfo> truths_ = {{"depth"}, {"depth_rate"}, {"inverse_distance"}};
+};
+
+ErrorSeries FollowWithAllTruth(int frames, EstimatorKind kind = EstimatorKind::kFilter) {
+  Experiment experiment = testing::MakeExperiment(frames);
+  experiment.source = std::make_unique<WithAllTruth>(frames);
+  experiment.estimators[0].kind = kind;
+  internal::ErrorRecorder recorder(experiment.estimators[0], experiment);
+  ShowsErrors shows(recorder);
+  RunOptions options;
+  options.observers = {&shows};
+  Run(experiment, options);
+  return recorder.Take();
+}
+
+TEST(ErrorRecorder, HasErrorsByTheirCramerRaoBound) {
+  const ErrorSeries series = FollowWithAllTruth(60);
+  ASSERT_EQ(series.blocks.size(), 3u);
+  ASSERT_EQ(series.bounds.size(), series.squares.size());
+  EXPECT_EQ(series.no_bound, "");
+  for (std::size_t i = 0; i < 3; ++i) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 60; ++k) {
+      sum += series.squares[3 * k + i] / series.bounds[3 * k + i];
+    }
+    EXPECT_NEAR(series.by_bound.at(series.blocks[i]), sum / 60.0, 1e-12);
+  }
+  // The first of them has the prior and one measurement of each sensor.
+  const double h = -26.0 / (0.3 * 0.3);
+  EXPECT_LT(series.bounds[0], 1.0 / (h * h));
+}
+
+TEST(ErrorRecorder, ThinsTheBoundWithTheRest) {
+  const ErrorSeries all = FollowWithAllTruth(1000), thinned = FollowWithAllTruth(5000);
+  ASSERT_EQ(thinned.bounds.size(), thinned.squares.size());
+  for (std::size_t k = 1; k < 250; ++k) EXPECT_EQ(thinned.bounds[3 * k], all.bounds[3 * 4 * k]);
+}
+
+TEST(ErrorRecorder, HasNoBoundOfWhatKnowsLaterDataOrWhereTruthLacks) {
+  EXPECT_EQ(Follow(60).series.no_bound, "'target.depth_rate' has no truth");
+  const ErrorSeries window = FollowWithAllTruth(60, EstimatorKind::kSlidingWindow);
+  EXPECT_TRUE(window.bounds.empty() && window.by_bound.empty() && window.no_bound.empty());
+}
+
 }  // namespace
 }  // namespace alidade

@@ -154,6 +154,15 @@ TEST(OverRuns, ErrorsHaveRmsAndQuantiles) {
   EXPECT_NEAR(error.high[0], 0.84, 1e-12);
 }
 
+TEST(OverRuns, BoundsAreRmsAndThereWhereAllRunsHaveThem) {
+  ErrorSeries one = SeriesOf({1.0, 1.0}, {1.0, 1.0}), two = one, three = one;
+  one.bounds = {1.0, 4.0};
+  two.bounds = {3.0, 8.0};
+  const OverTime::Error error = Over({one, two}).errors.at("p.x");
+  EXPECT_EQ(error.bound, (std::vector<double>{std::sqrt(2.0), std::sqrt(6.0)}));
+  EXPECT_TRUE(Over({one, two, three}).errors.at("p.x").bound.empty());
+}
+
 TEST(OverRuns, TimestampsOfOneRunAloneAndWhatIsNoNumberAreLeftOut) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const OverTime over =

@@ -259,6 +259,9 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
   }
   AddCpuTime(one, compared);
   compared.series = one.entry->errors;
+  for (const auto& [block, by_bound] : one.entry->errors.by_bound) {
+    compared.ratios["mse_by_bound:" + block] = {by_bound, 1.0};
+  }
   if (!one.entry->usable()) return compared;
   if (references.along != nullptr && references.along->entry->usable()) {
     const Candidate& along = *references.along;
@@ -322,6 +325,10 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
       notes.insert("'" + along->name +
                    "' knows later data, a filter does not: it lags behind by nature");
     }
+  }
+  for (const Candidate& one : candidates) {
+    const std::string& why = one.entry->errors.no_bound;
+    if (!why.empty()) notes.insert("no Cramer-Rao bound: " + why);
   }
   std::vector<std::string> all(notes.begin(), notes.end());
   const std::vector<std::string> without = WithoutReference(candidates, references);

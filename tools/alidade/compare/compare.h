@@ -50,7 +50,9 @@ struct ComparedEstimator {
   std::string final_reference;  ///< of the last estimate and the map
   std::int64_t reference_runs = 0, final_reference_runs = 0;  ///< of `used`, those with one
   std::map<std::string, Spread> values;
-  std::map<std::string, Ratio> ratios;  ///< by KEY, to the reference: of rmse, final_error, map
+  /// By KEY, to the reference: of rmse, final_error, map; and over seeds `mse_by_bound:BLOCK`, mean
+  /// |e|^2 / tr P, P the Cramer-Rao bound, of those that know the past alone.
+  std::map<std::string, Ratio> ratios;
   std::map<std::string, std::string> units;  ///< of blocks
   std::int64_t used = 0;                     ///< runs that values are taken over
   std::int64_t diverged = 0;                 ///< runs in which it did

@@ -46,19 +46,61 @@ ErrorRecorder::ErrorRecorder(const NamedEstimator& named, const Experiment& expe
     const std::vector<bool> angles = AreAngles(layout[id].geometry());
     series_.angles.push_back(std::ranges::find(angles, false) == angles.end());
   }
+  const bool online = named.kind == EstimatorKind::kFilter ||
+                      (named.kind == EstimatorKind::kBatch && !named.estimator->offline());
+  if (!online || tracked_.empty()) return;
+  series_.no_bound = CramerRaoBound::WhyNone(named.system, truths);
+  if (!series_.no_bound.empty()) return;
+  bound_.emplace(named.system, experiment.source->streams(), truths);
+}
+
+ErrorSeries ErrorRecorder::Take() {
+  for (std::size_t i = 0; bound_ && i < tracked_.size(); ++i) {
+    const Tracked& one = tracked_[i];
+    if (one.with_bound == 0) continue;
+    series_.by_bound[series_.blocks[i]] = one.sum_by_bound / static_cast<double>(one.with_bound);
+  }
+  return std::move(series_);
+}
+
+bool ErrorRecorder::AddBound(const SourceFrame& frame) {
+  if (!bound_->Add(frame)) return false;
+  const State& state = bound_->state();
+  for (Tracked& one : tracked_) {
+    const Block& block = state.layout()[one.id];
+    one.bound = 0.0;
+    for (int i = 0; block.present && i < block.geometry().tangent; ++i) {
+      one.bound += state.sigma(one.id, i) * state.sigma(one.id, i);
+    }
+    if (!one.known || !(one.bound > 0.0)) continue;
+    one.sum_by_bound += one.error.squaredNorm() / one.bound;
+    ++one.with_bound;
+  }
+  return true;
 }
 
 void ErrorRecorder::Add(const SourceFrame& frame, const State& state) {
-  if (tracked_.empty() || count_++ % stride_ != 0) return;
-  series_.timestamps.push_back(frame.timestamp);
+  if (tracked_.empty()) return;
   for (Tracked& one : tracked_) {
     one.known = one.truth < frame.truth.size() && !frame.truth[one.truth].empty() &&
                 state.layout()[one.id].present;
-    if (one.known) {
-      state.layout()[one.id].geometry().Minus(frame.truth[one.truth].data(), state.value(one.id),
-                                              one.error.data());
-    }
+    if (!one.known) continue;
+    state.layout()[one.id].geometry().Minus(frame.truth[one.truth].data(), state.value(one.id),
+                                            one.error.data());
+  }
+  if (bound_ && !AddBound(frame)) {
+    bound_.reset();
+    series_.bounds.clear();
+    series_.no_bound = "truth is not known at all timestamps, or a model is not defined there";
+  }
+  if (count_++ % stride_ == 0) Keep(frame.timestamp, state);
+}
+
+void ErrorRecorder::Keep(Timestamp timestamp, const State& state) {
+  series_.timestamps.push_back(timestamp);
+  for (const Tracked& one : tracked_) {
     series_.squares.push_back(one.known ? one.error.squaredNorm() : kNoError);
+    if (bound_) series_.bounds.push_back(one.bound);
   }
   for (std::size_t owner = 0; owner < series_.owners.size(); ++owner) {
     std::vector<BlockError> errors;
@@ -78,6 +120,7 @@ void ErrorRecorder::Thin() {
   for (std::size_t i = 0; 2 * i < kMost; ++i) series_.timestamps[i] = series_.timestamps[2 * i];
   series_.timestamps.resize(kMost / 2);
   KeepEvenRows(series_.blocks.size(), series_.squares);
+  KeepEvenRows(series_.blocks.size(), series_.bounds);
   KeepEvenRows(series_.owners.size(), series_.nees);
   KeepEvenRows(series_.owners.size(), series_.dofs);
   stride_ *= 2;

@@ -2,15 +2,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade/compare/over_runs.h"
+#include "alidade/run/cramer_rao.h"
 #include "alidade/run/run.h"
 
 namespace alidade::internal {
 
-/// Follows the errors of one estimator of a run. Of a long run every n-th timestamp is kept, n a
+/// Follows the errors of one estimator of a run, and of one that knows the past alone the bound
+/// that no such estimator is below: CramerRaoBound. Of a long run every n-th timestamp is kept, n a
 /// power of two, so that memory does not grow with it.
 class ErrorRecorder {
  public:
@@ -18,7 +21,7 @@ class ErrorRecorder {
 
   ErrorRecorder(const NamedEstimator& named, const Experiment& experiment);
   void Add(const SourceFrame& frame, const State& state);
-  ErrorSeries Take() { return std::move(series_); }
+  ErrorSeries Take();
 
  private:
   /// A block with truth; its error at the timestamp at hand.
@@ -28,13 +31,21 @@ class ErrorRecorder {
     double truth_variance;
     Eigen::VectorXd error = {};
     bool known = false;
+    double bound = 0.0;           ///< tr P of it
+    double sum_by_bound = 0.0;    ///< of |e|^2 / tr P over the timestamps that have both
+    std::int64_t with_bound = 0;  ///< these
   };
 
+  /// False: there is no bound, and will be none.
+  bool AddBound(const SourceFrame& frame);
+  /// Appends the timestamp at hand to the series.
+  void Keep(Timestamp timestamp, const State& state);
   /// Leaves out every other row.
   void Thin();
 
   ErrorSeries series_;
   std::vector<Tracked> tracked_;
+  std::optional<CramerRaoBound> bound_;
   std::size_t count_ = 0, stride_ = 1;
 };
 

@@ -36,9 +36,10 @@ Interval Bootstrap(const std::vector<double>& a, const std::vector<double>& b) {
 /// What the runs have at one timestamp.
 struct AtTimestamp {
   std::vector<std::vector<double>> errors;  ///< |e|, by block
+  std::vector<double> bounds;               ///< sums of tr P, by block
   std::vector<double> nees, dofs;           ///< sums, by owner
   std::vector<std::int64_t> runs;           ///< with a NEES, by owner
-  std::int64_t count = 0;
+  std::int64_t count = 0, bounded = 0;      ///< runs, and those with a bound
 };
 
 void Gather(const ErrorSeries& run, std::map<Timestamp, AtTimestamp>& all) {
@@ -46,6 +47,7 @@ void Gather(const ErrorSeries& run, std::map<Timestamp, AtTimestamp>& all) {
   for (std::size_t k = 0; k < run.timestamps.size(); ++k) {
     AtTimestamp& at = all[run.timestamps[k]];
     at.errors.resize(blocks);
+    at.bounds.resize(blocks);
     at.nees.resize(owners);
     at.dofs.resize(owners);
     at.runs.resize(owners);
@@ -53,6 +55,10 @@ void Gather(const ErrorSeries& run, std::map<Timestamp, AtTimestamp>& all) {
     for (std::size_t i = 0; i < blocks; ++i) {
       const double square = run.squares[k * blocks + i];
       if (std::isfinite(square)) at.errors[i].push_back(std::sqrt(square));
+    }
+    at.bounded += run.bounds.empty() ? 0 : 1;
+    for (std::size_t i = 0; i < blocks && !run.bounds.empty(); ++i) {
+      at.bounds[i] += run.bounds[k * blocks + i];
     }
     for (std::size_t i = 0; i < owners; ++i) {
       if (!std::isfinite(run.nees[k * owners + i])) continue;
@@ -121,10 +127,16 @@ OverTime OverRuns(const std::vector<const ErrorSeries*>& runs) {
       OverTime::Error& error = over_time.errors[first.blocks[i]];
       error.is_angle = first.angles[i];
       AddError(at.errors[i], error);
+      if (at.bounded == at.count) {
+        error.bound.push_back(std::sqrt(at.bounds[i] / static_cast<double>(at.count)));
+      }
     }
     for (std::size_t i = 0; i < first.owners.size(); ++i) {
       AddNees(at.nees[i], at.dofs[i], at.runs[i], over_time.nees[first.owners[i]]);
     }
+  }
+  for (auto& [block, error] : over_time.errors) {
+    if (error.bound.size() != error.rms.size()) error.bound.clear();
   }
   const auto unknown = [](double value) { return std::isnan(value); };
   std::erase_if(over_time.errors,

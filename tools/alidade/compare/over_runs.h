@@ -46,6 +46,11 @@ struct ErrorSeries {
   std::vector<double> squares;  ///< |e|^2, by timestamp and block; NaN where there is none
   std::vector<double> nees;     ///< e' C^-1 e, by timestamp and owner; NaN where there is none
   std::vector<double> dofs;     ///< of that
+  /// tr P of the Cramer-Rao bound, by timestamp and block; empty: there is none.
+  std::vector<double> bounds = {};
+  /// mean |e|^2 / tr P of a run, over all its timestamps, by block.
+  std::map<std::string, double> by_bound = {};
+  std::string no_bound = {};  ///< why there is no bound
 };
 
 /// Errors of one estimator over N runs, timestamp by timestamp. N may differ from one to the other,
@@ -55,6 +60,7 @@ struct OverTime {
   struct Error {
     std::vector<double> rms;        ///< sqrt(mean |e|^2) over the runs
     std::vector<double> low, high;  ///< 16 and 84 % quantiles of |e|
+    std::vector<double> bound;      ///< sqrt(mean tr P) of the Cramer-Rao bound; empty: none
     bool is_angle = false;          ///< in rad
   };
   /// Of an owner: the average NEES [BarShalom2001, sec. 5.4.2]. Of a consistent filter

@@ -159,10 +159,19 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
 std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
                              std::vector<RowKind> kinds) {
   if (rows == ReportRows::kAll) return kinds;
-  static const std::set<std::string> errors = {
-      "rmse",      "ratio.rmse",     "trajectory.sim3.rmse", "ratio.trajectory.sim3.rmse",
-      "nees.mean", "cpu_us",         "cpu_us.start",         "time_us",
-      "map.rmse",  "ratio.map.rmse", "map.sim3.rmse",        "ratio.map.sim3.rmse"};
+  static const std::set<std::string> errors = {"rmse",
+                                               "ratio.rmse",
+                                               "trajectory.sim3.rmse",
+                                               "ratio.trajectory.sim3.rmse",
+                                               "nees.mean",
+                                               "cpu_us",
+                                               "cpu_us.start",
+                                               "time_us",
+                                               "map.rmse",
+                                               "ratio.map.rmse",
+                                               "map.sim3.rmse",
+                                               "ratio.map.sim3.rmse",
+                                               "ratio.mse_by_bound"};
   static const std::set<std::string> differences = {
       "rmsd",     "trajectory.sim3.rmsd", "rmsd.sigmas", "cpu_us", "cpu_us.start", "time_us",
       "map.rmsd", "map.sim3.rmsd"};
@@ -214,6 +223,7 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
   if (of.empty()) return {};
   std::vector<RowKind> kinds = {{"rmse", "rmse"},
                                 {"ratio.rmse", "  ratio"},
+                                {"ratio.mse_by_bound", "MSE / Cramer-Rao bound,"},
                                 {"implied.rmse", "rmse of single measurements,"},
                                 {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
                                 {"trajectory.sim3.scale", "trajectory, scale"},
@@ -371,20 +381,35 @@ std::string ReferencesText(const Comparison& comparison) {
   return names.empty() ? comparison.reference : internal::Join(names);
 }
 
-/// What a ratio is, and its interval; "" where there is none.
-std::string RatioLine(const Comparison& comparison) {
-  const bool any = std::ranges::any_of(comparison.estimators, [](const ComparedEstimator& one) {
-    return std::ranges::any_of(one.ratios, [](const auto& ratio) {
-      return ratio.second.error != ratio.second.reference_error;
-    });
-  });
-  if (!any) return "";
-  if (comparison.runs == 1) return "ratios are of one run and have no interval: --runs N gives one";
-  return "ratio: mean error over the runs by that of the reference [95 % interval, paired "
-         "bootstrap over the runs]; undecided: the interval includes 1" +
-         (comparison.runs < kFewRuns ? "; too few runs: of fewer than " + std::to_string(kFewRuns) +
-                                           " it is too narrow, and decides nothing"
-                                     : std::string());
+constexpr const char* kByBound = "mse_by_bound";
+
+/// What ratios are, and their intervals, a line each.
+std::vector<std::string> RatioLines(const Comparison& comparison) {
+  bool to_reference = false, by_bound = false;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    for (const auto& [key, ratio] : one.ratios) {
+      const bool is_by_bound = key.starts_with(kByBound);
+      by_bound = by_bound || is_by_bound;
+      to_reference = to_reference || (!is_by_bound && ratio.error != ratio.reference_error);
+    }
+  }
+  std::vector<std::string> lines;
+  if (to_reference && comparison.runs == 1) {
+    lines.emplace_back("ratios are of one run and have no interval: --runs N gives one");
+  } else if (to_reference) {
+    lines.push_back(
+        "ratio: mean error over the runs by that of the reference [95 % interval, paired "
+        "bootstrap over the runs]; undecided: the interval includes 1" +
+        (comparison.runs < kFewRuns ? "; too few runs: of fewer than " + std::to_string(kFewRuns) +
+                                          " it is too narrow, and decides nothing"
+                                    : std::string()));
+  }
+  if (by_bound) {
+    lines.emplace_back(
+        "MSE / Cramer-Rao bound: mean square error by the least that an unbiased filter can have "
+        "[95 % interval], mean over the run and the runs");
+  }
+  return lines;
 }
 
 std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
@@ -396,7 +421,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
                 : comparison.reference == "truth"
                     ? ", errors against truth"
                     : ", differences from " + ReferencesText(comparison);
-  if (const std::string line = RatioLine(comparison); !line.empty()) head.lines.push_back(line);
+  head.lines = RatioLines(comparison);
   if (!comparison.measurements_sha256.empty()) {
     head.lines.push_back("data sha256 " + comparison.measurements_sha256);
   }

@@ -55,6 +55,7 @@ void WriteOverTime(const OutputFolder& folder, const Estimators& estimators,
       add("rms:" + block, error.rms);
       add("p16:" + block, error.low);
       add("p84:" + block, error.high);
+      if (!error.bound.empty()) add("bound:" + block, error.bound);
     }
     for (const auto& [owner, nees] : one.over_time.nees) {
       add("anees:" + owner, nees.mean);
@@ -149,6 +150,10 @@ std::vector<FigureScript> ErrorFigure(const Estimators& estimators, const std::s
                      " with filledcurves" + StyleOf(e),
                  "16 % to 84 %");
     line(script, e, "rms", "");
+    if (estimators[e].over_time.errors.at(block).bound.empty()) return;
+    script.Curve(file,
+                 FigureScript::kTime + column(e, "bound:") + " with lines ls 12 dt (6,4) lw 2",
+                 "Cramer-Rao bound");
   };
   return FigurePages(
       {"rms." + block, block + ": error over the runs", timestamps.front(), timestamps.back()},

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/run/cramer_rao.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "alidade/filter/ekf.h"
+#include "support/systems.h"
+
+namespace alidade::internal {
+namespace {
+
+using testing::FrameAt;
+
+/// Depth 0.3 + 0.1 sin(t), measured with errors of a pixel and more; each third frame is blind.
+SourceFrame SwingingFrame(int k) {
+  const double t_s = 0.1 * k, depth = 0.3 + 0.1 * std::sin(t_s), wobble = std::sin(37.0 * k);
+  SourceFrame frame{FrameAt(t_s, {{1, depth / 0.3 + 0.01 * wobble}}),
+                    {{depth}, {0.1 * std::cos(t_s)}, {1.0 / 0.3}}};
+  if (k % 3 != 0)
+    frame.measurements.push_back({frame.timestamp, 0, -1, {26.0 / depth + wobble}, {}});
+  return frame;
+}
+
+const std::vector<StreamInfo> kTruths = {{"depth"}, {"depth_rate"}, {"inverse_distance"}};
+
+// The same by the information form, with the derivatives written out at truth.
+TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
+  const System system = testing::DepthFilter();
+  CramerRaoBound bound(system, testing::StreamsOf(system), kTruths);
+  Eigen::Matrix3d p = Eigen::Vector3d(0.1 * 0.1, 0.5 * 0.5, 0.5 * 0.5).asDiagonal();
+  Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
+  f(0, 1) = 0.1;
+  const Eigen::Vector3d g(0.5 * 0.1 * 0.1, 0.1, 0.0);
+  for (int k = 0; k < 30; ++k) {
+    const SourceFrame frame = SwingingFrame(k);
+    ASSERT_TRUE(bound.Add(frame));
+    if (k > 0) p = f * p * f.transpose() + g * g.transpose();
+    const double z = frame.truth[0][0], lambda = frame.truth[2][0];
+    Eigen::Matrix3d information = p.inverse();
+    if (k % 3 != 0) {
+      const Eigen::Vector3d h(-26.0 / (z * z), 0.0, 0.0);
+      information += h * h.transpose();
+    }
+    const Eigen::Vector3d h(lambda, 0.0, z);
+    const double sigma = 2.0 / 300.0 * std::pow(lambda * z, 3);
+    information += h * h.transpose() / (sigma * sigma);
+    p = information.inverse();
+    const Eigen::Matrix3d difference = bound.state().covariance().Dense() - p;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        EXPECT_LT(std::abs(difference(i, j)), 1e-9 * std::sqrt(p(i, i) * p(j, j))) << k;
+      }
+    }
+  }
+}
+
+TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
+  System system = testing::MovingPoint();
+  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.5), {"p.x"});
+  const std::vector<StreamInfo> streams = testing::StreamsOf(system);
+  Ekf ekf(system, {}, streams);
+  CramerRaoBound bound(system, streams, {{"x"}, {"v"}});
+  for (int k = 0; k < 20; ++k) {
+    const Frame frame = FrameAt(0.1 * k, {{0, std::sin(9.0 * k)}});
+    ekf.Process(frame);
+    ASSERT_TRUE(bound.Add({frame, {{std::sin(0.1 * k)}, {std::cos(0.1 * k)}}}));
+    EXPECT_LT((bound.state().covariance().Dense() - ekf.state().covariance().Dense()).norm(),
+              1e-12);
+  }
+}
+
+// A loss, a Schmidt gain and a Jacobian at what the measurement implies all make a filter worse.
+TEST(CramerRaoBound, IsThatOfTheBestFilter) {
+  System worse = testing::DepthFilter();
+  worse.sensors[0].loss = {LossKind::kCauchy, 0.1};
+  worse.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  worse.sensors[1].roles[1].mode = RoleMode::kConsider;
+  const System system = testing::DepthFilter();
+  const std::vector<StreamInfo> streams = testing::StreamsOf(system);
+  CramerRaoBound bound(system, streams, kTruths), same(worse, streams, kTruths);
+  for (int k = 0; k < 10; ++k) {
+    ASSERT_TRUE(bound.Add(SwingingFrame(k)) && same.Add(SwingingFrame(k)));
+  }
+  EXPECT_EQ(bound.state().covariance().Dense(), same.state().covariance().Dense());
+}
+
+TEST(CramerRaoBound, EndsWhereTruthIsNotKnown) {
+  const System system = testing::DepthFilter();
+  CramerRaoBound bound(system, testing::StreamsOf(system), kTruths);
+  EXPECT_TRUE(bound.Add(SwingingFrame(0)));
+  SourceFrame without = SwingingFrame(1);
+  without.truth[1].clear();
+  EXPECT_FALSE(bound.Add(without));
+  EXPECT_FALSE(bound.Add(SwingingFrame(2))) << "for good";
+}
+
+TEST(CramerRaoBound, TellsWhyThereIsNone) {
+  const System system = testing::DepthFilter();
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, kTruths), "");
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, {{"depth"}, {"depth_rate"}}),
+            "'template.inverse_distance' has no truth");
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, {{"depth", 1, 0.1}, {"depth_rate"}}),
+            "the truth of 'target.depth' is not exact");
+  EXPECT_EQ(CramerRaoBound::WhyNone(
+                testing::WithStatus(system, "target.depth_rate", BlockStatus::kConsider), kTruths),
+            "'target.depth_rate' is a consider state");
+  const System constant =
+      testing::WithStatus(system, "template.inverse_distance", BlockStatus::kConstant);
+  EXPECT_EQ(CramerRaoBound::WhyNone(constant, {{"depth"}, {"depth_rate"}}), "");
+  System slam = system;
+  slam.landmarks.emplace();
+  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths), "the system has landmarks");
+}
+
+}  // namespace
+}  // namespace alidade::internal

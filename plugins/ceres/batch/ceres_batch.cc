@@ -109,7 +109,9 @@ class CeresBatch : public Estimator {
     sparse_.emplace(run_, options_);
     sparse_->StopWhen(stop_);
     map_ = initialiser_.filter().landmarks();
-    return sparse_->SolveAll(filtered_) && sparse_->PutAll(put, map_);
+    const bool first = offline() || e_.size() == 0;
+    return (first ? sparse_->SolveAll(filtered_) : sparse_->SolveAnew(filtered_, e_)) &&
+           sparse_->PutAll(put, map_);
   }
 
   void Note(std::vector<Event>& events) const {
@@ -126,6 +128,7 @@ class CeresBatch : public Estimator {
       SmoothSparse([&](std::size_t k, const auto& x, const auto& covariance) {
         if (k == last) run_.Put(k, x, covariance(), state_, report_);
       });
+      e_ = sparse_->inputs();
     } else if (solve_.SolveAnew(run_, filtered_, e_)) {
       PutAll([&](std::size_t k, const Point& point) {
         if (k != last) return;

@@ -62,7 +62,8 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = binding_.system.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
-  const Eigen::VectorXd w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(n_w);  // the mean, until L is taken
+  if (step.l.size() > 0) w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
   const bool sensitivity = point.s.rows() > 0;
   RowMajor f(n, n), g(n, n_w);
   std::vector<double> next(point.x.size());

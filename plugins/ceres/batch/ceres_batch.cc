@@ -135,7 +135,12 @@ class CeresBatch : public Estimator {
         run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
       });
     }
-    if (!failed()) Note(report_.events);
+    if (failed()) return;
+    if (sparse_) {
+      sparse_->NoteNew(run_.timestamp(), at_edge_, report_.events);
+    } else {
+      solve_.Note(run_.timestamp(), report_.events);
+    }
   }
 
   /// Gives `put` the points of the solution, and makes its map.
@@ -151,6 +156,7 @@ class CeresBatch : public Estimator {
   CondensedRun run_;
   MapSolve solve_;
   std::optional<SparseSolve> sparse_;  ///< once it is solved so
+  std::string at_edge_;                ///< what it said last of landmarks at the edge
   std::function<bool()> stop_;
   State state_;
   InitialisingFilter initialiser_;  ///< gives the trajectory to start from

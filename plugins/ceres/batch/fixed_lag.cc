@@ -146,7 +146,7 @@ class FixedLag : public Estimator {
       if (!offline() && k + 1 == frames) run_.Put(k, x, covariance(), state_, report_);
     });
     if (sparse_) {
-      sparse_->Note(timestamp, report_.events);
+      sparse_->NoteNew(timestamp, at_edge_, report_.events);
     } else {
       solve_.FailUnless(all, run_);
       solve_.Note(timestamp, report_.events);
@@ -159,6 +159,7 @@ class FixedLag : public Estimator {
   CondensedRun run_;  ///< that of the window
   MapSolve solve_;
   std::optional<SparseSolve> sparse_;  ///< with landmarks: of the last window
+  std::string at_edge_;                ///< what it said of landmarks at the edge of their domain
   State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter
       initialiser_;  ///< gives the newest frame a start, and blocks their first values

@@ -21,6 +21,15 @@ void SparseSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
   if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
 }
 
+void SparseSolve::NoteNew(Timestamp timestamp, std::string& told,
+                          std::vector<Event>& events) const {
+  Note(timestamp, events);
+  if (at_edge_ != told && !at_edge_.empty()) {
+    events.push_back({timestamp, "edge_of_domain", at_edge_});
+  }
+  told = at_edge_;
+}
+
 bool SparseSolve::TooLarge() {
   constexpr double kMostBytes = 16e9, kMostFlops = 1e13;
   if (kkt_.bytes() <= kMostBytes && flops() <= kMostFlops) return false;
@@ -59,22 +68,24 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
   const std::string cost = "cost " + internal::RoundedText(kkt_.cost(), 9) + ", " +
                            std::to_string(iterations_) + " iterations in " +
                            std::to_string(solves_) + (solves_ == 1 ? " solve: " : " solves: ");
-  summary_ = cost + (failed_ ? summary_ : "converged") + TellEdge() + "; sparse, " +
+  at_edge_ = TextOfEdge();
+  const bool held = !at_edge_.empty();
+  summary_ = cost + (failed_ ? summary_ : "converged") + (held ? ", " : "") + at_edge_ +
+             "; sparse, " +
              (kkt_.in_time_order() ? "in the order of time, " : "in order of minimum degree, ") +
              internal::RoundedText(flops(), 2) + " flops an iteration";
-  const bool held = !kkt_.AtEdge().empty();
   kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
   return (!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
 }
 
 /// Landmarks at the edge of their domain, by their ids.
-std::string SparseSolve::TellEdge() const {
+std::string SparseSolve::TextOfEdge() const {
   constexpr std::size_t kMost = 10;  // names
   const std::vector<std::int64_t> ids = kkt_.AtEdge();
   if (ids.empty()) return "";
-  std::string text = ", " + std::to_string(ids.size()) +
-                     (ids.size() == 1 ? " landmark at the edge of its domain: "
-                                      : " landmarks at the edge of their domain: ");
+  std::string text =
+      std::to_string(ids.size()) + (ids.size() == 1 ? " landmark at the edge of its domain: "
+                                                    : " landmarks at the edge of their domain: ");
   for (std::size_t i = 0; i < std::min(ids.size(), kMost); ++i) {
     text += (i == 0 ? "" : ", ") + std::to_string(ids[i]);
   }

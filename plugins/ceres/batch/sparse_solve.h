@@ -45,6 +45,9 @@ class SparseSolve {
   const std::string& summary() const { return summary_; }
   /// As MapSolve::Note.
   void Note(Timestamp timestamp, std::vector<Event>& events) const;
+  /// As Note, of one solve after another: and the event `edge_of_domain` where other landmarks are
+  /// held there than in `told`, which becomes those.
+  void NoteNew(Timestamp timestamp, std::string& told, std::vector<Event>& events) const;
 
  private:
   bool TooLarge();
@@ -60,7 +63,7 @@ class SparseSolve {
   std::optional<double> CostAt(Eigen::VectorXd& z) {
     return kkt_.PutOnEdge(z) ? kkt_.Cost(z) : std::nullopt;
   }
-  std::string TellEdge() const;
+  std::string TextOfEdge() const;
   Trial AfterStep(double predicted);
   std::optional<Trial> Extrapolated(double predicted);
   Trial NextPoint(double mu, double predicted);
@@ -78,6 +81,7 @@ class SparseSolve {
   int iterations_ = 0, solves_ = 0;
   int undefined_ = 0;  ///< of the iterations, whose full step led to where a model is not defined
   std::string summary_, note_;
+  std::string at_edge_;  ///< landmarks that the last solve holds at the edge of their domain; or ""
   bool failed_ = false;
 };
 

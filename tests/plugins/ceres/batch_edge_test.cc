@@ -58,8 +58,9 @@ void WriteOut(const std::vector<std::array<Vector3d, 2>>& seen, MatrixXd& a, Vec
   }
 }
 
-Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
-  const System system = testing::MapSystem(OffsetBeyond(), {}, kFirstSigma);
+System EdgeSystem() { return testing::MapSystem(OffsetBeyond(), {}, kFirstSigma); }
+
+std::vector<Frame> FramesOf(const std::vector<std::array<Vector3d, 2>>& seen) {
   std::vector<Frame> frames;
   for (int k = 0; k < kViews; ++k) {
     std::vector<testing::Observation> observations;
@@ -69,7 +70,11 @@ Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
     }
     frames.push_back(testing::FrameOf(kPeriod * k, observations));
   }
-  return testing::Solve(system, frames, "solver: sparse\n");
+  return frames;
+}
+
+Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
+  return testing::Solve(EdgeSystem(), FramesOf(seen), "solver: sparse\n");
 }
 
 void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
@@ -114,6 +119,29 @@ TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
   EXPECT_NE(said.find(": converged, 1 landmark at the edge of its domain: 7; sparse"),
             std::string::npos)
       << said;
+}
+
+// Landmark 7 comes to the edge by the second frame, and stays there.
+TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
+  const auto seen = OffsetsOf(false);
+  const Found batch = SolveSparse(seen);
+  const System system = EdgeSystem();
+  const auto window = testing::MakeFixedLag(system, "lag_s: 10\n");
+  const auto filter = testing::MakeBatch(system, "solver: sparse\nmode: filtering\n");
+  for (Estimator* const estimator : {window.get(), filter.get()}) {
+    std::vector<std::string> said;
+    for (const Frame& frame : FramesOf(seen)) {
+      for (const Event& event : estimator->Process(frame).events) {
+        if (event.kind != "edge_of_domain") continue;
+        said.push_back(std::to_string(event.timestamp / 100'000'000) + ": " + event.text);
+      }
+    }
+    ASSERT_FALSE(estimator->failed());
+    EXPECT_EQ(said, (std::vector<std::string>{"1: 1 landmark at the edge of its domain: 7"}));
+    for (const LandmarkEstimate& one : estimator->landmarks()) {
+      EXPECT_LT((one.position - batch.Landmark(one.id).position).norm(), 1e-8) << one.id;
+    }
+  }
 }
 
 /// z = exp(-r_z): Gauss-Newton goes much too far at first, then comes back by 1 m a step.

@@ -197,9 +197,10 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
     }
     const bool may_be_long = !options.budget_s || options.over_seeds;
     if (variant.full_information && of.system.landmarks && may_be_long) {
-      left_out["with landmarks a solve at every frame takes long; of one run --budget SECONDS adds "
-               "it where it can be done in time, and the config may have it"]
-          .emplace_back(variant.what);
+      left_out
+          ["with landmarks a solve at every frame takes long; of one run --budget SECONDS adds "
+           "it where it can be done in time, and the config may have it"]
+              .emplace_back(variant.what);
       continue;
     }
     AddVariant(variant, host, compared, left_out);

@@ -284,21 +284,22 @@ void KktSystem::AddTerms() {
   }
 }
 
-/// Time order, a landmark before the last node that sees it, or minimum degree: the one with fewer
-/// flops.
+/// From the last node back, a landmark before the first node that sees it, or minimum degree: the
+/// one with fewer flops. Back in time a covariance is a sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G';
+/// forward that of a vague first state would be the difference of its prior's and one as large.
 void KktSystem::ChooseOrder() {
-  std::vector<std::vector<int>> ending(nodes_.size());
+  std::vector<std::vector<int>> beginning(nodes_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const MapLandmark& landmark = run_.landmarks_[i];
-    std::size_t last = landmark.first ? node_of_[landmark.first->epoch] : 0;
+    std::size_t first = landmark.first ? node_of_[landmark.first->epoch] : nodes_.size() - 1;
     if (!landmark.observations.empty()) {
-      last = std::max(last, node_of_[landmark.observations.back().epoch]);
+      first = std::min(first, node_of_[landmark.observations.front().epoch]);
     }
-    if (points_[i].variable >= 0) ending[last].push_back(points_[i].variable);
+    if (points_[i].variable >= 0) beginning[first].push_back(points_[i].variable);
   }
   Groups groups;
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    for (const int landmark : ending[k]) groups.push_back({landmark});
+  for (std::size_t k = nodes_.size(); k-- > 0;) {
+    for (const int landmark : beginning[k]) groups.push_back({landmark});
     std::vector<int>& pair = groups.emplace_back();
     for (const int v : {nodes_[k].read, nodes_[k].rest, nodes_[k].multiplier}) {
       if (v >= 0) pair.push_back(v);
@@ -309,6 +310,7 @@ void KktSystem::ChooseOrder() {
     if (constant.born) groups.push_back({constant.value, constant.multiplier});
   }
   Elimination time(ldl_.graph(), groups);
+  std::ranges::reverse(groups);  // of ties minimum degree takes the first
   Elimination least(ldl_.graph(), MinimumDegree(ldl_.graph(), groups));
   in_time_order_ = time.flops <= least.flops;
   ldl_.Use(std::move(in_time_order_ ? time : least));

@@ -72,7 +72,7 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
   const bool held = !at_edge_.empty();
   summary_ = cost + (failed_ ? summary_ : "converged") + (held ? ", " : "") + at_edge_ +
              "; sparse, " +
-             (kkt_.in_time_order() ? "in the order of time, " : "in order of minimum degree, ") +
+             (kkt_.in_time_order() ? "from the last frame back, " : "in order of minimum degree, ") +
              internal::RoundedText(flops(), 2) + " flops an iteration";
   kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
   return (!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());

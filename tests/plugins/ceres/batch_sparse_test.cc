@@ -150,6 +150,14 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   }
 }
 
+// The covariance of the first rate is 1e10 times smaller than its prior's, which is not to be taken
+// as the difference of two such.
+TEST(SparseBatch, AVagueStartCostsNoDigits) {
+  System system = testing::LinearSystem();
+  for (std::size_t i = 0; i < system.priors.size(); ++i) SetPrior(system, i, 1e4);
+  ExpectBothSolve(system, Wobble(60));
+}
+
 // The noise is held over frames without a measurement: they lie inside a node.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
   System system = testing::HeldPoint(0.7);

@@ -284,9 +284,10 @@ void KktSystem::AddTerms() {
   }
 }
 
-/// From the last node back, a landmark before the first node that sees it, or minimum degree: the
-/// one with fewer flops. Back in time a covariance is a sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G';
-/// forward that of a vague first state would be the difference of its prior's and one as large.
+/// From the last node back, a landmark before the first node that sees it, or minimum degree, but
+/// for the first node: the one with fewer flops. Where the first node comes last a covariance is a
+/// sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G'; else that of a vague first state is the difference of
+/// its prior's and one as large.
 void KktSystem::ChooseOrder() {
   std::vector<std::vector<int>> beginning(nodes_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -311,7 +312,12 @@ void KktSystem::ChooseOrder() {
   }
   Elimination time(ldl_.graph(), groups);
   std::ranges::reverse(groups);  // of ties minimum degree takes the first
-  Elimination least(ldl_.graph(), MinimumDegree(ldl_.graph(), groups));
+  Groups order = MinimumDegree(ldl_.graph(), groups);
+  const auto first = std::ranges::find_if(order, [&](const std::vector<int>& group) {
+    return std::ranges::count(group, nodes_.front().multiplier) > 0;
+  });
+  if (first != order.end()) std::rotate(first, first + 1, order.end());
+  Elimination least(ldl_.graph(), order);
   in_time_order_ = time.flops <= least.flops;
   ldl_.Use(std::move(in_time_order_ ? time : least));
 }

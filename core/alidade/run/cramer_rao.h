@@ -10,7 +10,7 @@
 namespace alidade::internal {
 
 /// The Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller
-/// covariance, for the true path that the run has (the parametric bound [Bergman1999, ch. 4]).
+/// covariance, for the true path that the run has (the parametric bound of [Bergman1999], ch. 4).
 /// With F, G, Q, H, R at the true state x_k of each timestamp, and P_0 that of the prior,
 ///
 ///   P- = F P F' + G Q G',   P = (P-^-1 + H' R^-1 H)^-1

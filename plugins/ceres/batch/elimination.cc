@@ -133,7 +133,8 @@ Groups MinimumDegree(const BlockGraph& graph, const Groups& groups) {
   for (std::size_t g = 0; g < groups.size(); ++g) ties.emplace_back(g, g);
   for (const auto& [i, j] : graph.edges) {
     const int a = group[static_cast<std::size_t>(i)], b = group[static_cast<std::size_t>(j)];
-    if (a != b) ties.emplace_back(std::min(a, b), std::max(a, b));
+    const int last = static_cast<int>(groups.size()) - 1;
+    if (a != b && a != last && b != last) ties.emplace_back(std::min(a, b), std::max(a, b));
   }
   std::ranges::sort(ties);
   ties.erase(std::unique(ties.begin(), ties.end()), ties.end());
@@ -154,6 +155,7 @@ Groups MinimumDegree(const BlockGraph& graph, const Groups& groups) {
   Eigen::AMDOrdering<int>()(pattern, permutation);
   Groups ordered;
   std::vector<bool> taken(groups.size(), false);
+  taken.back() = true;
   for (int i = 0; i < size; ++i) {
     const auto g =
         static_cast<std::size_t>(owner[static_cast<std::size_t>(permutation.indices()[i])]);
@@ -161,6 +163,7 @@ Groups MinimumDegree(const BlockGraph& graph, const Groups& groups) {
     taken[g] = true;
     ordered.push_back(groups[g]);
   }
+  ordered.push_back(groups.back());
   return ordered;
 }
 

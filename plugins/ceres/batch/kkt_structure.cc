@@ -311,13 +311,12 @@ void KktSystem::ChooseOrder() {
     if (constant.born) groups.push_back({constant.value, constant.multiplier});
   }
   Elimination time(ldl_.graph(), groups);
-  std::ranges::reverse(groups);  // of ties minimum degree takes the first
-  Groups order = MinimumDegree(ldl_.graph(), groups);
-  const auto first = std::ranges::find_if(order, [&](const std::vector<int>& group) {
+  const auto first_node = std::ranges::find_if(groups, [&](const std::vector<int>& group) {
     return std::ranges::count(group, nodes_.front().multiplier) > 0;
   });
-  if (first != order.end()) std::rotate(first, first + 1, order.end());
-  Elimination least(ldl_.graph(), order);
+  if (first_node != groups.end()) std::rotate(first_node, first_node + 1, groups.end());
+  std::reverse(groups.begin(), groups.end() - 1);  // of ties minimum degree takes the first
+  Elimination least(ldl_.graph(), MinimumDegree(ldl_.graph(), groups));
   in_time_order_ = time.flops <= least.flops;
   ldl_.Use(std::move(in_time_order_ ? time : least));
 }

@@ -70,10 +70,10 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
                            std::to_string(solves_) + (solves_ == 1 ? " solve: " : " solves: ");
   at_edge_ = TextOfEdge();
   const bool held = !at_edge_.empty();
-  summary_ = cost + (failed_ ? summary_ : "converged") + (held ? ", " : "") + at_edge_ +
-             "; sparse, " +
-             (kkt_.in_time_order() ? "from the last frame back, " : "in order of minimum degree, ") +
-             internal::RoundedText(flops(), 2) + " flops an iteration";
+  summary_ =
+      cost + (failed_ ? summary_ : "converged") + (held ? ", " : "") + at_edge_ + "; sparse, " +
+      (kkt_.in_time_order() ? "from the last frame back, " : "in order of minimum degree, ") +
+      internal::RoundedText(flops(), 2) + " flops an iteration";
   kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
   return (!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
 }

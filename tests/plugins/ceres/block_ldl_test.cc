@@ -159,5 +159,14 @@ TEST(MinimumDegree, PutsAHubLast) {
             Elimination(graph, hub_first).flops);
 }
 
+TEST(MinimumDegree, LeavesTheLastWhereItIs) {
+  Chain chain(50, 1, 50);
+  Groups groups = chain.time();
+  std::ranges::reverse(groups);  // the end of a chain, which has one neighbour, comes last
+  const Groups ordered = MinimumDegree(chain.ldl().graph(), groups);
+  EXPECT_EQ(ordered.back(), groups.back());
+  EXPECT_EQ(ordered.size(), groups.size());
+}
+
 }  // namespace
 }  // namespace alidade::ceres_batch

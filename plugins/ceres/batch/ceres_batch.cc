@@ -109,8 +109,8 @@ class CeresBatch : public Estimator {
     sparse_.emplace(run_, options_);
     sparse_->StopWhen(stop_);
     map_ = initialiser_.filter().landmarks();
-    const bool first = offline() || e_.size() == 0;
-    return (first ? sparse_->SolveAll(filtered_) : sparse_->SolveAnew(filtered_, e_)) &&
+    const bool again = !offline() && e_.size() > 0;
+    return ((again && sparse_->SolveAnew(filtered_, e_)) || sparse_->SolveAll(filtered_)) &&
            sparse_->PutAll(put, map_);
   }
 

@@ -38,7 +38,7 @@ struct Elimination {
 };
 
 /// The groups in an order of approximate minimum degree [Amestoy1996], but for the last, which stays
-/// there; a group weighs as much as it has rows.
+/// there; a group weighs as much as it has rows. There is one at least.
 Groups MinimumDegree(const BlockGraph& graph, const Groups& groups);
 
 }  // namespace alidade::ceres_batch

@@ -11,6 +11,7 @@ namespace {
 
 /// Symmetric, and without what rounding left below zero.
 Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
+  if (p.size() == 0) return p;
   Eigen::MatrixXd symmetric = 0.5 * (p + p.transpose());
   if (symmetric.ldlt().vectorD().minCoeff() >= 0.0) return symmetric;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(symmetric);

@@ -311,6 +311,7 @@ void KktSystem::ChooseOrder() {
     if (constant.born) groups.push_back({constant.value, constant.multiplier});
   }
   Elimination time(ldl_.graph(), groups);
+  if (groups.empty()) return ldl_.Use(std::move(time));
   const auto first_node = std::ranges::find_if(groups, [&](const std::vector<int>& group) {
     return std::ranges::count(group, nodes_.front().multiplier) > 0;
   });

@@ -158,6 +158,16 @@ TEST(SparseBatch, AVagueStartCostsNoDigits) {
   ExpectBothSolve(system, Wobble(60));
 }
 
+TEST(SparseBatch, WhereAllIsKnownNothingIsSolved) {
+  System system;
+  testing::AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.0, 0.0}});
+  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  system = testing::WithStatus(system, "p.x", BlockStatus::kConstant);
+  const Found found = testing::Solve(system, Wobble(5), "solver: sparse\n");
+  ASSERT_FALSE(found.failed);
+  EXPECT_EQ(testing::ValueOf(found.states.back(), "p.x"), 2.0);
+}
+
 // The noise is held over frames without a measurement: they lie inside a node.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
   System system = testing::HeldPoint(0.7);

@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 
 #include "alidade/filter/ekf.h"
+#include "alidade/host/in_process.h"
+#include "alidade/model/model.h"
 #include "support/systems.h"
 
 namespace alidade::internal {
@@ -53,6 +55,33 @@ TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
         EXPECT_LT(std::abs(difference(i, j)), 1e-9 * std::sqrt(p(i, i) * p(j, j))) << k;
       }
     }
+  }
+}
+
+/// x' = x + (x - x^3 + w) dt, w ~ N(0, 1).
+struct DoubleWell : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double dt_s, T* next) const {
+    next[0] = x[0] + (x[0] - x[0] * x[0] * x[0] + w[0]) * dt_s;
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+TEST(CramerRaoBound, TakesTheMotionAtTruth) {
+  System system;
+  testing::AddMotion(system, "p", InProcessMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
+  testing::AddSensor(system, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
+  CramerRaoBound bound(system, testing::StreamsOf(system), {{"x"}});
+  const double dt_s = 0.1, q = dt_s * dt_s;
+  double p = 0.25, before = 0.0;
+  for (int k = 0; k < 30; ++k) {
+    const double x = std::sin(0.5 * k);
+    ASSERT_TRUE(bound.Add({FrameAt(dt_s * k, {{0, x + std::sin(37.0 * k)}}), {{x}}}));
+    if (k > 0) p = std::pow(1.0 + dt_s * (1.0 - 3.0 * before * before), 2) * p + q;
+    p = 1.0 / (1.0 / p + 1.0 / (0.4 * 0.4));
+    EXPECT_NEAR(bound.state().covariance().Dense()(0, 0), p, 1e-12) << k;
+    before = x;
   }
 }
 

@@ -37,8 +37,8 @@ struct Elimination {
   Elimination(const BlockGraph& graph, const Groups& order);
 };
 
-/// The groups in an order of approximate minimum degree [Amestoy1996], but for the last, which stays
-/// there; a group weighs as much as it has rows. There is one at least.
+/// The groups, one at least, in an order of approximate minimum degree [Amestoy1996], but for the
+/// last, which stays there; a group weighs as much as it has rows.
 Groups MinimumDegree(const BlockGraph& graph, const Groups& groups);
 
 }  // namespace alidade::ceres_batch

@@ -114,11 +114,13 @@ class CeresBatch : public Estimator {
            sparse_->PutAll(put, map_);
   }
 
-  void Note(std::vector<Event>& events) const {
-    if (sparse_) {
+  void Note(std::vector<Event>& events) {
+    if (!sparse_) {
+      solve_.Note(run_.timestamp(), events);
+    } else if (offline()) {
       sparse_->Note(run_.timestamp(), events);
     } else {
-      solve_.Note(run_.timestamp(), events);
+      sparse_->NoteNew(run_.timestamp(), at_edge_, events);
     }
   }
 
@@ -135,12 +137,7 @@ class CeresBatch : public Estimator {
         run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
       });
     }
-    if (failed()) return;
-    if (sparse_) {
-      sparse_->NoteNew(run_.timestamp(), at_edge_, report_.events);
-    } else {
-      solve_.Note(run_.timestamp(), report_.events);
-    }
+    if (!failed()) Note(report_.events);
   }
 
   /// Gives `put` the points of the solution, and makes its map.

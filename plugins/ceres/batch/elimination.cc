@@ -129,11 +129,11 @@ Groups MinimumDegree(const BlockGraph& graph, const Groups& groups) {
                  static_cast<int>(g));
     first.push_back(static_cast<int>(owner.size()));
   }
+  const int last = static_cast<int>(groups.size()) - 1;
   std::vector<std::pair<int, int>> ties;
   for (std::size_t g = 0; g < groups.size(); ++g) ties.emplace_back(g, g);
   for (const auto& [i, j] : graph.edges) {
     const int a = group[static_cast<std::size_t>(i)], b = group[static_cast<std::size_t>(j)];
-    const int last = static_cast<int>(groups.size()) - 1;
     if (a != b && a != last && b != last) ties.emplace_back(std::min(a, b), std::max(a, b));
   }
   std::ranges::sort(ties);

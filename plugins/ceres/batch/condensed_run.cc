@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/decompositions.h"
@@ -63,6 +64,41 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   held_l_.resize(binding_.motion_places.size());
   PutPlaces();
   if (has_landmarks()) AddKnown();
+}
+
+VariableRows CondensedRun::FindVariables() const {
+  const auto n = static_cast<std::size_t>(initial_.covariance().size());
+  std::vector<bool> moves(n, false), read(n, false);
+  for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
+    if (binding_.system.motions[i].model.stationary()) continue;
+    for (const int row : binding_.motion_places[i].at) {
+      if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
+    }
+  }
+  for (const internal::SensorPlace& place : binding_.sensor_places) {
+    for (const JacobianPart& part : place.parts) {
+      std::fill_n(read.begin() + part.offset, part.size, true);
+    }
+  }
+  VariableRows found;
+  const std::vector<Block>& blocks = initial_.layout().blocks();
+  for (std::size_t id = 0; id < blocks.size(); ++id) {
+    if (!blocks[id].has_covariance()) continue;
+    std::vector<int> rows(static_cast<std::size_t>(blocks[id].geometry().tangent));
+    std::iota(rows.begin(), rows.end(), blocks[id].tangent_offset);
+    const auto first = static_cast<std::size_t>(blocks[id].tangent_offset);
+    if (moves[first]) {
+      std::vector<int>& into = read[first] ? found.read : found.rest;
+      into.insert(into.end(), rows.begin(), rows.end());
+      continue;
+    }
+    const bool of_landmark = id >= prior_.size();
+    // What the prior knows exactly, as the first keyframe, has no variance.
+    const auto stays = [&](int row) { return !l0_.row(row).any() && d0_[row] == 0.0; };
+    if (of_landmark) std::erase_if(rows, stays);
+    if (!rows.empty()) found.constants.push_back({std::move(rows), of_landmark});
+  }
+  return found;
 }
 
 void CondensedRun::PutPlaces() {

@@ -150,6 +150,22 @@ struct Reduced {
   Eigen::LLT<Eigen::MatrixXd> llt;  ///< of its Gauss-Newton matrix, N x N: a Schur complement
 };
 
+/// The rows of the tangent of a state, as a system of its frames has them as variables.
+struct VariableRows {
+  struct Constant {
+    std::vector<int> rows;
+    bool of_landmark = false;  ///< a block of one that is in the state
+  };
+  std::vector<int> read, rest;      ///< those that move: that sensors read, and others
+  std::vector<Constant> constants;  ///< blocks that do not move, what is known exactly apart
+
+  std::vector<int> moving() const {
+    std::vector<int> rows = read;
+    rows.insert(rows.end(), rest.begin(), rest.end());
+    return rows;
+  }
+};
+
 /// A whole run as a function of its random inputs e, all of them N(0, 1):
 ///
 ///   prior         x_0     = m (+) L_0 e_0,             P_0 = L_0 L_0'
@@ -236,6 +252,7 @@ class CondensedRun {
 
  private:
   friend class KktSystem;  // the same run, linearised by frames instead of condensed
+  friend class IncrementalSolve;
 
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {
@@ -259,6 +276,7 @@ class CondensedRun {
   /// An observation that is not defined makes the problem so, or is skipped.
   enum class Undefined { kFails, kSkipped };
 
+  VariableRows FindVariables() const;
   /// x_0 and S_0, of so many columns; -1: without.
   bool Begin(const double* e, int columns, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
@@ -339,6 +357,7 @@ class CondensedRun {
   bool PointsOf(const Eigen::VectorXd& e, bool sensitivity, std::vector<Point>& points) const;
   bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
              const std::vector<Point>& points, Inverse& place) const;
+  Eigen::MatrixXd FollowOf(const MapLandmark& landmark, const Inverse& place, int inputs) const;
   bool FreezeLandmarks(const std::vector<Point>& points);
   static constexpr double kSettledLandmark = 1e-10;  ///< sigma
   bool NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,

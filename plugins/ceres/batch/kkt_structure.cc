@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "kkt_system.h"
@@ -14,44 +13,16 @@ KktSystem::KktSystem(CondensedRun& run) : run_(run), points_(run.landmarks_.size
   Build();
 }
 
-/// Which rows move, and which of them sensors read; the blocks that do not move.
 void KktSystem::FindConstants() {
-  const auto n = static_cast<std::size_t>(run_.initial_.covariance().size());
-  std::vector<bool> moves(n, false), read(n, false);
-  for (std::size_t i = 0; i < run_.binding_.motion_places.size(); ++i) {
-    if (run_.binding_.system.motions[i].model.stationary()) continue;
-    for (const int row : run_.binding_.motion_places[i].at) {
-      if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
-    }
+  const VariableRows variables = run_.FindVariables();
+  read_rows_ = variables.read;
+  rest_rows_ = variables.rest;
+  rows_ = variables.moving();
+  for (const VariableRows::Constant& constant : variables.constants) {
+    Constant& own = constants_.emplace_back();
+    own.rows = constant.rows;
+    own.of_landmark = constant.of_landmark;
   }
-  for (const internal::SensorPlace& place : run_.binding_.sensor_places) {
-    for (const JacobianPart& part : place.parts) {
-      std::fill_n(read.begin() + part.offset, part.size, true);
-    }
-  }
-  const std::size_t system = run_.prior_.size();
-  for (std::size_t id = 0; id < run_.initial_.layout().blocks().size(); ++id) {
-    const Block& block = run_.initial_.layout().blocks()[id];
-    if (!block.has_covariance()) continue;
-    std::vector<int> rows(static_cast<std::size_t>(block.geometry().tangent));
-    std::iota(rows.begin(), rows.end(), block.tangent_offset);
-    const auto first = static_cast<std::size_t>(block.tangent_offset);
-    if (moves[first]) {
-      std::vector<int>& into = read[first] ? read_rows_ : rest_rows_;
-      into.insert(into.end(), rows.begin(), rows.end());
-    } else {
-      const bool of_landmark = id >= system;
-      // What the prior knows exactly, as the first keyframe, has no variance.
-      const auto stays = [&](int row) { return !run_.l0_.row(row).any() && run_.d0_[row] == 0.0; };
-      if (of_landmark) std::erase_if(rows, stays);
-      if (rows.empty()) continue;
-      Constant& constant = constants_.emplace_back();
-      constant.rows = std::move(rows);
-      constant.of_landmark = of_landmark;
-    }
-  }
-  rows_ = read_rows_;
-  rows_.insert(rows_.end(), rest_rows_.begin(), rest_rows_.end());
 }
 
 void KktSystem::FindNodes() {

@@ -326,28 +326,6 @@ bool KktSystem::LineariseLandmarks(const Eigen::VectorXd& z, bool about) {
   return true;
 }
 
-/// C with which q = dl + C dx_f moves the point as l does, and the camera alone does not: the least
-/// one with  M C = N,
-///
-///   M = J_l, N = J_x           where y = g(x_f, l) has no more numbers than l
-///   M = J_p J_l, N = J_p J_x   where it is a point p(y)
-///   C = 0                      else
-Eigen::MatrixXd KktSystem::FollowOf(const MapLandmark& landmark, const Inverse& place,
-                                    int inputs) const {
-  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(inputs, place.by_x.cols());
-  if (!landmark.first) return none;
-  Eigen::MatrixXd m = place.by_d, n = place.by_x;
-  if (m.rows() > inputs) {
-    const auto point = run_.PointOf(landmark, place.y);
-    if (!point || inputs < 3) return none;
-    m = point->jacobian * m;
-    n = point->jacobian * n;
-  }
-  Eigen::MatrixXd c = m.rows() == inputs ? Eigen::MatrixXd(m.partialPivLu().solve(n))
-                                         : m.completeOrthogonalDecomposition().solve(n);
-  return c.allFinite() ? c : none;
-}
-
 namespace {
 
 /// `left` = (of the first camera, of the constants) to columns of j that are, from `column` on, the
@@ -392,7 +370,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
     rows.insert(rows.end(), more.begin(), more.end());
   }
   const Eigen::Index inputs = l.size(), read = std::ssize(read_rows_), all = std::ssize(rows);
-  point.c = FollowOf(landmark, place, static_cast<int>(inputs))(Eigen::all, rows);
+  point.c = run_.FollowOf(landmark, place, static_cast<int>(inputs))(Eigen::all, rows);
   if (held) point.c.setZero();
   place.by_x = place.by_x(Eigen::all, rows).eval();
   const Eigen::MatrixXd rest = place.by_x - place.by_d * point.c;  // what is left to the camera

@@ -164,7 +164,6 @@ class KktSystem {
   std::optional<Eigen::VectorXd> NormalOfEdge(const MapLandmark& landmark, const Eigen::VectorXd& l,
                                               const Eigen::VectorXd& s, double t,
                                               const std::vector<Point>& points) const;
-  Eigen::MatrixXd FollowOf(const MapLandmark& landmark, const Inverse& place, int inputs) const;
   void PutConstraint(std::size_t k, const Point& point, const Eigen::VectorXd& z);
   Eigen::VectorXd Multipliers(const Node& node) const;
   void ChooseScale();

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -140,6 +142,28 @@ bool CondensedRun::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
   by_l.rightCols(l.size() - m) = landmark.sigma * place.by_prior;
   place.by_d = std::move(by_l);
   return true;
+}
+
+/// C with which q = dl + C dx_f moves the point as l does, and the camera alone does not: the least
+/// one with  M C = N,
+///
+///   M = J_l, N = J_x           where y = g(x_f, l) has no more numbers than l
+///   M = J_p J_l, N = J_p J_x   where it is a point p(y)
+///   C = 0                      else
+Eigen::MatrixXd CondensedRun::FollowOf(const MapLandmark& landmark, const Inverse& place,
+                                       int inputs) const {
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(inputs, place.by_x.cols());
+  if (!landmark.first) return none;
+  Eigen::MatrixXd m = place.by_d, n = place.by_x;
+  if (m.rows() > inputs) {
+    const auto point = PointOf(landmark, place.y);
+    if (!point || inputs < 3) return none;
+    m = point->jacobian * m;
+    n = point->jacobian * n;
+  }
+  Eigen::MatrixXd c = m.rows() == inputs ? Eigen::MatrixXd(m.partialPivLu().solve(n))
+                                         : m.completeOrthogonalDecomposition().solve(n);
+  return c.allFinite() ? c : none;
 }
 
 /// R of all observations of landmarks, these where they were found last. One that is not defined

@@ -8,6 +8,7 @@
 #include "alidade/filter/ekf.h"
 #include "alidade/host/in_process.h"
 #include "alidade/model/model.h"
+#include "support/landmark_models.h"
 #include "support/systems.h"
 
 namespace alidade::internal {
@@ -140,7 +141,133 @@ TEST(CramerRaoBound, TellsWhyThereIsNone) {
   EXPECT_EQ(CramerRaoBound::WhyNone(constant, {{"depth"}, {"depth_rate"}}), "");
   System slam = system;
   slam.landmarks.emplace();
-  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths), "the system has landmarks");
+  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths), "");
+  slam.sensors[1].stream = slam.sensors[0].stream;
+  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths),
+            "'disparity' and 'inverse_scale' share a stream");
+}
+
+using Point = std::array<double, 3>;
+
+std::optional<Point> PlaceOf(std::int64_t id) {
+  if (id > 4) return {};
+  const double k = static_cast<double>(id);
+  return Point{0.4 * k - 0.8, 0.3 * std::sin(2.0 * k), 1.6 + 0.3 * k};
+}
+
+Eigen::Vector3d CameraAt(int k) { return {0.1 * k, 0.03 * std::sin(k), 0.02 * k}; }
+
+Eigen::Vector2d Pixel(const Eigen::Vector3d& r, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d h = p - r;
+  return {h.x() / h.z(), h.y() / h.z()};
+}
+
+/// Landmark id is first seen in frame id, and then in all but each fourth.
+bool Sees(int k, int id) { return k >= id && (k == id || (k + id) % 4 != 0); }
+
+SourceFrame MappingFrame(int k, double noise) {
+  const Eigen::Vector3d r = CameraAt(k);
+  SourceFrame frame{{TimestampFromSeconds(0.1 * k), {}}, {{r.x(), r.y(), r.z()}}};
+  for (int id = 0; id < 5; ++id) {
+    if (!Sees(k, id)) continue;
+    const Eigen::Vector2d z = Pixel(r, Eigen::Vector3d(PlaceOf(id)->data()));
+    frame.measurements.push_back({frame.timestamp,
+                                  0,
+                                  id,
+                                  {z.x() + noise * std::sin(37.0 * k + id), z.y() - noise * 0.5},
+                                  {}});
+  }
+  return frame;
+}
+
+/// The information of a camera's path, frames 0 to `last`, and five points, by central differences.
+class JointInformation {
+ public:
+  explicit JointInformation(int last) : x_(3 * (last + 6)) {
+    for (int k = 0; k <= last; ++k) x_.segment<3>(3 * k) = CameraAt(k);
+    for (int id = 0; id < 5; ++id) {
+      x_.segment<3>(3 * (last + 1 + id)) = Eigen::Vector3d(PlaceOf(id)->data());
+    }
+    information_ = Eigen::MatrixXd::Zero(x_.size(), x_.size());
+  }
+  template <class F>
+  void Add(const F& residual) {
+    Eigen::MatrixXd j(residual(x_).size(), x_.size());
+    constexpr double kStep = 1e-5;
+    for (Eigen::Index i = 0; i < x_.size(); ++i) {
+      Eigen::VectorXd up = x_, down = x_;
+      up[i] += kStep;
+      down[i] -= kStep;
+      j.col(i) = (residual(up) - residual(down)) / (2.0 * kStep);
+    }
+    information_ += j.transpose() * j;
+  }
+  /// Of those seen by then, the last position.
+  Eigen::Matrix3d Covariance(int last) const {
+    const Eigen::Index n = 3 * (last + 1 + std::min(last + 1, 5));
+    return information_.topLeftCorner(n, n).inverse().block<3, 3>(3 * last, 3 * last);
+  }
+
+ private:
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd information_;
+};
+
+Eigen::Matrix3d CovarianceByInformation(int last) {
+  JointInformation joint(last);
+  using Vector = Eigen::VectorXd;
+  const auto at = [](const Vector& x, int i) { return Eigen::Vector3d(x.segment<3>(3 * i)); };
+  joint.Add([&](const Vector& x) { return Vector(at(x, 0) / 0.05); });
+  for (int k = 0; k < last; ++k) {
+    joint.Add([&](const Vector& x) {
+      return Vector((at(x, k + 1) - at(x, k)) / (0.1 * std::sqrt(0.1)));
+    });
+  }
+  for (int id = 0; id < 5 && id <= last; ++id) {
+    const int p = last + 1 + id;
+    joint.Add([&](const Vector& x) {  // the prior of the inverse distance
+      return Vector(Vector::Constant(1, 1.0 / (at(x, p) - at(x, id)).norm() / 0.25));
+    });
+    for (int k = id; k <= last; ++k) {
+      if (!Sees(k, id)) continue;
+      joint.Add([&](const Vector& x) { return Vector(Pixel(at(x, k), at(x, p)) / 0.01); });
+    }
+  }
+  return joint.Covariance(last);
+}
+
+// Of a path and a map: the prior's mean and the noise of the data count for nothing.
+template <class Model>
+void ExpectJointBound(const Model& model, double max_linearity_index) {
+  LandmarkOptions options = testing::WithPrior(0.8, 0.25);
+  options.max_linearity_index = max_linearity_index;
+  const System system = testing::MapSystem(model, options, 0.05);
+  CramerRaoBound bound(system, testing::StreamsOf(system), {{"position", 3}}, PlaceOf);
+  for (int k = 0; k < 12; ++k) {
+    ASSERT_TRUE(bound.Add(MappingFrame(k, 0.02)));
+    const Eigen::Matrix3d expected = CovarianceByInformation(k);
+    const Eigen::MatrixXd p = bound.state().covariance().Dense().topLeftCorner(3, 3);
+    EXPECT_LT((p - expected).norm(), 1e-7 * expected.norm()) << k;
+  }
+}
+
+TEST(CramerRaoBound, OfAMapIsThatOfPathAndPointsTogether) {
+  for (const double max_linearity_index : {0.0, 0.3}) {
+    ExpectJointBound(testing::InverseDepthPixels(0.01), max_linearity_index);
+    ExpectJointBound(testing::AnchoredPixels<0>(0.01), max_linearity_index);
+    ExpectJointBound(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), max_linearity_index);
+  }
+}
+
+TEST(CramerRaoBound, EndsAtALandmarkWithoutTruth) {
+  const System system =
+      testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.05);
+  CramerRaoBound bound(system, testing::StreamsOf(system), {{"position", 3}}, PlaceOf);
+  SourceFrame frame = MappingFrame(0, 0.0);
+  EXPECT_TRUE(bound.Add(frame));
+  frame = MappingFrame(1, 0.0);
+  frame.measurements[0].landmark = 5;
+  EXPECT_FALSE(bound.Add(frame));
 }
 
 }  // namespace

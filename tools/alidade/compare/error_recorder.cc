@@ -51,7 +51,9 @@ ErrorRecorder::ErrorRecorder(const NamedEstimator& named, const Experiment& expe
   if (!online || tracked_.empty()) return;
   series_.no_bound = CramerRaoBound::WhyNone(named.system, truths);
   if (!series_.no_bound.empty()) return;
-  bound_.emplace(named.system, experiment.source->streams(), truths);
+  const Source* source = experiment.source.get();
+  bound_.emplace(named.system, experiment.source->streams(), truths,
+                 [source](std::int64_t id) { return source->TrueLandmark(id); });
 }
 
 ErrorSeries ErrorRecorder::Take() {
@@ -91,7 +93,9 @@ void ErrorRecorder::Add(const SourceFrame& frame, const State& state) {
   if (bound_ && !AddBound(frame)) {
     bound_.reset();
     series_.bounds.clear();
-    series_.no_bound = "truth is not known at all timestamps, or a model is not defined there";
+    series_.no_bound =
+        "truth is not known of all blocks and landmarks at all timestamps, or a model is not "
+        "defined there";
   }
   if (count_++ % stride_ == 0) Keep(frame.timestamp, state);
 }

@@ -26,9 +26,9 @@ namespace alidade::internal {
 /// from one.
 ///
 /// Landmarks are set to truth as well, in the representation that they have, from where the camera
-/// truly was. So that they start there, too, a system with landmarks is given h at truth in place of
-/// each valid measurement: no update moves the state, and a landmark is initialised with the
-/// Jacobians at truth. A prior of the inverse distance gives its sigma; its mean counts for nothing.
+/// truly was. So that they start there, too, a system with landmarks is given h at truth in place
+/// of each valid measurement: no update moves the state, and a landmark is initialised with the
+/// Jacobians at truth. A prior of the inverse distance gives its sigma; its mean does not count.
 class CramerRaoBound {
  public:
   /// Where the landmark of an id truly is, m.

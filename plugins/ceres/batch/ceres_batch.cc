@@ -8,6 +8,7 @@
 #include "alidade/host/cpp_plugin.h"
 #include "condensed_run.h"
 #include "fixed_lag.h"
+#include "incremental_solve.h"
 #include "initialising_filter.h"
 #include "map_solve.h"
 #include "sparse_solve.h"
@@ -19,27 +20,44 @@ constexpr int kManyInputs = 1000;         // of which a dense solve takes second
 constexpr int kFewInputs = 200;           // of which it takes less than 0.1 s
 constexpr int kMostInputs = 100'000'000;  // of a sparse solve, which SparseSolve may refuse before
 
+enum class Mode { kSmoothing, kFiltering, kIncremental };
+
+struct BatchOptions {
+  Mode mode = Mode::kSmoothing;
+  double relinearise_above = 0.0;  ///< sigma, where incremental
+  SolveOptions solve;
+};
+
 /// Maximum a posteriori of all states given all data, or given the data so far (the
-/// full-information filter): see CondensedRun for the problem, MapSolve and SparseSolve for its
-/// solution.
+/// full-information filter): see CondensedRun for the problem; MapSolve, SparseSolve, and
+/// IncrementalSolve for its solution.
 class CeresBatch : public Estimator {
  public:
-  CeresBatch(const System& system, bool smooths, const SolveOptions& options,
+  CeresBatch(const System& system, const BatchOptions& options,
              const std::vector<StreamInfo>& streams)
-      : smooths_(smooths),
-        options_(options),
-        run_(system, streams, options.max_dt_s, MayBeSparse() ? kMostInputs : kMostDenseInputs),
-        solve_(options),
+      : mode_(options.mode),
+        options_(options.solve),
+        run_(system, streams, options_.max_dt_s, MayBeSparse() ? kMostInputs : kMostDenseInputs),
+        solve_(options_),
         state_(system.InitialState(/*reserved=*/true)),
-        initialiser_(system, options.max_dt_s, streams) {}
+        initialiser_(system, options_.max_dt_s, streams) {
+    // The full-information filter of no landmarks too: it takes what it touches to the last digit.
+    const bool as_filtering = mode_ == Mode::kFiltering && MayBeSparse() && !system.landmarks;
+    const double above = as_filtering ? 1e-9 : options.relinearise_above;
+    if (mode_ == Mode::kIncremental || as_filtering) incremental_.emplace(run_, above);
+  }
 
   void Start(Timestamp timestamp) override {
     run_.Start(timestamp);
     initialiser_.filter().Start(timestamp);
   }
-  bool offline() const override { return smooths_; }
+  bool offline() const override { return mode_ == Mode::kSmoothing; }
   const State& state() const override { return state_; }
-  std::vector<LandmarkEstimate> landmarks() const override { return map_; }
+  std::vector<LandmarkEstimate> landmarks() const override {
+    if (!incremental_ || !solved_so_) return map_;
+    std::vector<LandmarkEstimate> map = initialiser_.filter().landmarks();
+    return map.empty() || incremental_->PutMap(map) ? map : map_;
+  }
   Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed(); }
   bool failed() const override {
@@ -95,8 +113,8 @@ class CeresBatch : public Estimator {
   bool MayBeSparse() const { return options_.solver != SolverKind::kDense; }
   /// Few inputs are solved for as fast without.
   bool IsSparse() const {
-    return MayBeSparse() &&
-           (options_.solver == SolverKind::kSparse || run_.shape().inputs > kFewInputs);
+    return MayBeSparse() && (incremental_ || options_.solver == SolverKind::kSparse ||
+                             run_.shape().inputs > kFewInputs);
   }
 
   bool SmoothDense(const SparseSolve::Take& put) {
@@ -124,13 +142,41 @@ class CeresBatch : public Estimator {
     }
   }
 
+  /// By what the frame touches alone, where that can be.
+  bool SolveIncrementally() {
+    solved_so_ = incremental_ && incremental_->Solve();
+    if (!solved_so_) return false;
+    told_why_ = false;
+    run_.Put(run_.shape().frames - 1, incremental_->Values(), incremental_->Covariance(), state_,
+             report_);
+    return true;
+  }
+
+  /// From the solution of all frames. Says why once, until it goes on.
+  void RestartIncremental() {
+    if (!told_why_ && mode_ == Mode::kIncremental) {
+      report_.events.push_back(
+          {run_.timestamp(), "solved_as_a_whole",
+           incremental_->problem() +
+               (incremental_->ties() ? "; so are all frames from here on" : "")});
+    }
+    told_why_ = true;
+    if (incremental_->ties()) {
+      incremental_.reset();
+    } else {
+      incremental_->Restart(e_);  // where it cannot, the next frame says why
+    }
+  }
+
   void SolveSoFar() {
     const std::size_t last = run_.shape().frames - 1;
+    if (SolveIncrementally()) return;
     if (IsSparse()) {
       SmoothSparse([&](std::size_t k, const auto& x, const auto& covariance) {
         if (k == last) run_.Put(k, x, covariance(), state_, report_);
       });
       e_ = sparse_->inputs();
+      if (incremental_ && !failed()) RestartIncremental();
     } else if (solve_.SolveAnew(run_, filtered_, e_)) {
       PutAll([&](std::size_t k, const Point& point) {
         if (k != last) return;
@@ -148,12 +194,15 @@ class CeresBatch : public Estimator {
                              run_);
   }
 
-  bool smooths_;
+  Mode mode_;
   SolveOptions options_;
   CondensedRun run_;
   MapSolve solve_;
   std::optional<SparseSolve> sparse_;  ///< once it is solved so
-  std::string at_edge_;                ///< what it said last of landmarks at the edge
+  std::optional<IncrementalSolve> incremental_;
+  bool solved_so_ = false;  ///< the last frame, incrementally
+  bool told_why_ = false;   ///< why it was not
+  std::string at_edge_;     ///< what it said last of landmarks at the edge
   std::function<bool()> stop_;
   State state_;
   InitialisingFilter initialiser_;  ///< gives the trajectory to start from
@@ -168,15 +217,24 @@ constexpr Support kSupport = {.known = false, .from_measurement = true, .landmar
 
 EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
-  const bool smooths = p.Choice("mode", {"smoothing", "filtering"},
-                                "data of an estimate: all frames, or those up to it", 0) == 0;
-  SolveOptions options = ReadSolveOptions(p);
-  options.solver = static_cast<SolverKind>(
+  BatchOptions options;
+  options.mode = static_cast<Mode>(
+      p.Choice("mode", {"smoothing", "filtering", "incremental"},
+               "data of an estimate: all frames, or those up to it; incremental: as filtering, but "
+               "only what a frame changes is solved for again",
+               0));
+  if (options.mode == Mode::kIncremental) {
+    options.relinearise_above =
+        p.Positive("relinearise_above", "sigma",
+                   "how far what is linearised may move until it is linearised anew", 0.01);
+  }
+  options.solve = ReadSolveOptions(p);
+  options.solve.solver = static_cast<SolverKind>(
       p.Choice("solver", {"auto", "sparse", "dense"},
                "system of an iteration; auto: sparse, but dense where there are few inputs", 0));
-  return [smooths, options](const System& system, const std::vector<StreamInfo>& streams) {
+  return [options](const System& system, const std::vector<StreamInfo>& streams) {
     ALIDADE_EXPECTS(!FindUnsupported(system, kSupport));
-    return std::make_unique<CeresBatch>(system, smooths, options, streams);
+    return std::make_unique<CeresBatch>(system, options, streams);
   };
 }
 

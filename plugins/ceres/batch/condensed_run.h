@@ -130,6 +130,9 @@ inline constexpr int kMostDenseInputs = 4000;
 /// P = y' y of a point, y = U^-T S', for Cov(e) = (U'U)^-1.
 Eigen::MatrixXd CovarianceOf(const Point& point, const Eigen::MatrixXd& u);
 
+/// Symmetric, and without what rounding left below zero.
+Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p);
+
 /// What a CondensedRun consists of so far.
 struct RunShape {
   int inputs, residuals;  ///< N, M

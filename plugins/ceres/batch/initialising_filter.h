@@ -18,6 +18,7 @@ class InitialisingFilter {
                 streams) {}
 
   Ekf& filter() { return filter_; }
+  const Ekf& filter() const { return filter_; }
   /// Its report of a frame.
   const UpdateReport& Process(const Frame& frame) {
     had_failed_ = filter_.failed();

@@ -7,9 +7,7 @@
 
 /// The covariances of states and landmarks, from the inverse of a KktSystem.
 namespace alidade::ceres_batch {
-namespace {
 
-/// Symmetric, and without what rounding left below zero.
 Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
   if (p.size() == 0) return p;
   Eigen::MatrixXd symmetric = 0.5 * (p + p.transpose());
@@ -18,8 +16,6 @@ Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
   const Eigen::VectorXd positive = eigen.eigenvalues().cwiseMax(0.0);
   return eigen.eigenvectors() * positive.asDiagonal() * eigen.eigenvectors().transpose();
 }
-
-}  // namespace
 
 void KktSystem::Invert() {
   std::vector<std::pair<int, int>> wanted;

@@ -1,0 +1,764 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "incremental_solve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "alidade/state/tiles.h"
+#include "kkt_system.h"
+
+namespace alidade::ceres_batch {
+
+IncrementalSolve::IncrementalSolve(CondensedRun& run, double relinearise_above)
+    : run_(run), above_(relinearise_above) {
+  const VariableRows variables = run_.FindVariables();
+  rows_ = variables.moving();
+  read_ = variables.read;
+  for (const VariableRows::Constant& constant : variables.constants) {
+    Constant& own = constants_.emplace_back();
+    own.rows = constant.rows;
+    own.column = constant_rows_;
+    constant_rows_ += static_cast<int>(own.rows.size());
+    own.dx = own.lambda = own.sigma = Eigen::VectorXd::Zero(std::ssize(own.rows));
+  }
+}
+
+bool IncrementalSolve::Fail(const std::string& why) {
+  problem_ = why;
+  return false;
+}
+
+void IncrementalSolve::Touch(std::size_t node) { touched_ = std::min(touched_, node); }
+
+// Frames that come.
+
+bool IncrementalSolve::Extend() {
+  for (std::size_t i = at_.size(); i < run_.epochs_.size(); ++i) {
+    if (!AddNode(i)) return Fail(run_.problem());
+  }
+  return true;
+}
+
+/// The epoch is a node of its own, or, where noise goes on being held, the end of the last one.
+bool IncrementalSolve::AddNode(std::size_t epoch) {
+  const bool open = !nodes_.empty() && !run_.epochs_[nodes_.back().last].ends;
+  if (!open) {
+    Node& node = nodes_.emplace_back();
+    node.first = epoch;
+    node.column = run_.epochs_[epoch].column;
+  }
+  const std::size_t k = nodes_.size() - 1;
+  Node& node = nodes_[k];
+  node.last = epoch;
+  const bool newest = epoch + 1 == run_.epochs_.size();
+  node.columns = (newest ? run_.inputs_ : run_.epochs_[epoch + 1].column) - node.column;
+  node_of_.push_back(k);
+  at_.emplace_back();
+  e_.conservativeResizeLike(Eigen::VectorXd::Zero(run_.inputs_));
+  node.dx = Eigen::VectorXd::Zero(std::ssize(rows_));
+  node.lambda = node.sigma = node.dx;
+  BearConstants(k);
+  Touch(k);
+  back_ = std::min(back_, k);
+  return Predict(k) && LineariseMotion(k) && SeeLandmarks(k) && LineariseTerms(k, nullptr);
+}
+
+void IncrementalSolve::BearConstants(std::size_t k) {
+  const StateLayout& layout = run_.initial_.layout();
+  const auto bear = [&](BlockId id) {
+    const int offset = layout[id].tangent_offset;
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      const int row = constants_[i].rows.front();
+      const bool own = offset <= row && row < offset + layout[id].geometry().tangent;
+      if (offset < 0 || constants_[i].born || !own) continue;
+      constants_[i].born = true;
+      constants_[i].node = k;
+      nodes_[k].born.push_back(i);
+    }
+  };
+  const Node& node = nodes_[k];
+  for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
+    if (id >= run_.prior_.size() || run_.prior_[id]) bear(static_cast<BlockId>(id));
+  }
+  for (std::size_t i = node.first; i <= node.last; ++i) {
+    for (const FirstValue& first : run_.epochs_[i].first_values) bear(first.block);
+  }
+}
+
+/// x of its last epoch, from the estimates before it.
+bool IncrementalSolve::Predict(std::size_t k) {
+  const Node& node = nodes_[k];
+  Point point;
+  if (k > 0) {
+    point.x = ValuesOf(k - 1, true);
+  } else if (!run_.Begin(e_.data(), -1, point)) {
+    return false;
+  }
+  for (std::size_t i = node.first; i <= node.last; ++i) {
+    if (!run_.Advance(i, e_.data(), point)) return false;
+  }
+  if (k > 0) {  // a constant is one variable, about one value
+    for (const Constant& constant : constants_) {
+      if (!constant.born || constant.node == k) continue;
+      for (const Block& block : run_.initial_.layout().blocks()) {
+        if (!block.has_covariance() || block.tangent_offset != constant.rows.front()) continue;
+        std::copy_n(at_[nodes_[k - 1].last].x.data() + block.value_offset, block.geometry().ambient,
+                    point.x.data() + block.value_offset);
+      }
+    }
+  }
+  at_[node.last].x = point.x;
+  return true;
+}
+
+/// Landmarks that the node sees: its terms, and those that come into the system or back to it.
+bool IncrementalSolve::SeeLandmarks(std::size_t k) {
+  constexpr std::size_t kPatience = 10;  // nodes
+  Node& node = nodes_[k];
+  for (std::size_t i = landmarks_.size(); i < run_.landmarks_.size(); ++i) {
+    Landmark& landmark = landmarks_.emplace_back();
+    const MapLandmark& of_run = run_.landmarks_[i];
+    landmark.l = of_run.l.size() > 0 ? of_run.l : of_run.from;
+    landmark.q = Eigen::VectorXd::Zero(landmark.l.size());
+    landmark.patience = kPatience;
+  }
+  const auto enter = [&](std::size_t i) {
+    Landmark& landmark = landmarks_[i];
+    landmark.seen = k;
+    if (landmark.retired) {
+      std::erase(nodes_[*landmark.retired].retired, i);
+      Touch(*landmark.retired);
+      landmark.retired.reset();
+      landmark.patience *= 2;
+    }
+    if (landmark.sigma.size() > 0 || landmark.l.size() == 0) return true;
+    landmark.node = k;
+    landmark.sigma = Eigen::VectorXd::Zero(landmark.l.size());
+    if (!LineariseLandmark(i)) return false;
+    Term& term = node.terms.emplace_back();
+    term.landmark = static_cast<int>(i);
+    return LinearisePrior(term);
+  };
+  const std::vector<Factor>& factors = run_.epochs_[node.last].factors;
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    const Factor& factor = factors[i];
+    const bool of_landmark = factor.row < 0 && factor.landmark >= 0;
+    if (factor.row < 0 && !of_landmark) continue;
+    if (of_landmark) {
+      const auto landmark = static_cast<std::size_t>(factor.landmark);
+      if (landmarks_[landmark].l.size() == 0 && !LineariseLandmark(landmark)) return false;
+      if (!enter(landmark)) return false;
+      if (factor.outcome != Outcome::kAccepted) continue;  // the one that it began with
+    }
+    Term& term = node.terms.emplace_back();
+    term.factor = static_cast<int>(i);
+    term.landmark = of_landmark ? factor.landmark : -1;
+  }
+  for (std::size_t i = 0; k > 0 && i < landmarks_.size(); ++i) {
+    Landmark& landmark = landmarks_[i];
+    const bool in = landmark.sigma.size() > 0 && !landmark.retired;
+    if (!in || k - landmark.seen <= landmark.patience) continue;
+    landmark.retired = k;
+    node.retired.push_back(i);
+  }
+  return true;
+}
+
+// Linearised.
+
+bool IncrementalSolve::LineariseMotion(std::size_t k) {
+  Node& node = nodes_[k];
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  Point point;
+  if (k == 0) {
+    if (!run_.Begin(e_.data(), node.columns, point)) return false;
+  } else {
+    point.x = at_[nodes_[k - 1].last].x;
+    point.s.setZero(n, n + node.columns);
+    point.s.leftCols(n).setIdentity();
+    point.offset.setZero(n);
+    point.before = node.column - static_cast<int>(n);
+  }
+  for (std::size_t i = node.first; i <= node.last; ++i) {
+    if (!run_.FreezeEpoch(run_.epochs_[i], e_.data(), point)) return false;
+    if (i < node.last) at_[i].x = point.x;
+  }
+  run_.PutAbout(at_[node.last].x, point);
+  std::vector<int> own = rows_, before = rows_;
+  for (const std::size_t i : node.born) {
+    own.insert(own.end(), constants_[i].rows.begin(), constants_[i].rows.end());
+  }
+  for (const Constant& constant : constants_) {
+    before.insert(before.end(), constant.rows.begin(), constant.rows.end());
+  }
+  node.b = point.s(own, Eigen::lastN(node.columns));
+  node.c = point.offset(own);
+  node.f.resize(0, 0);
+  if (k > 0) node.f = point.s(own, before);
+  return true;
+}
+
+bool IncrementalSolve::LineariseLandmark(std::size_t i) {
+  const MapLandmark& landmark = run_.landmarks_[i];
+  Landmark& own = landmarks_[i];
+  if (!run_.Place(landmark, own.l, at_, own.place)) return false;
+  if (landmark.first) {
+    const auto [epoch, index] = *landmark.first;
+    Factor& factor = run_.epochs_[epoch].factors[index];
+    if (!run_.FreezeFactor(factor, WithLandmark(at_[epoch].x, own.place.y)) ||
+        !run_.Place(landmark, own.l, at_, own.place)) {
+      return false;
+    }
+  }
+  std::vector<int> columns = read_;
+  for (const Constant& constant : constants_) {
+    columns.insert(columns.end(), constant.rows.begin(), constant.rows.end());
+  }
+  own.c = run_.FollowOf(landmark, own.place, static_cast<int>(own.l.size()))(Eigen::all, columns);
+  own.place.by_x = own.place.by_x(Eigen::all, columns).eval();
+  return true;
+}
+
+/// l + q - C dx_f
+bool IncrementalSolve::LinearisePrior(Term& term) const {
+  const Landmark& landmark = landmarks_[static_cast<std::size_t>(term.landmark)];
+  term.j.resize(landmark.l.size(), landmark.c.cols() + landmark.l.size());
+  term.j << -landmark.c, Eigen::MatrixXd::Identity(landmark.l.size(), landmark.l.size());
+  term.r = landmark.l;
+  return true;
+}
+
+/// r + J dx, times the root of the weight of a loss. One of a landmark that is not defined tells
+/// nothing until it is.
+bool IncrementalSolve::LineariseTerm(std::size_t k, Term& term) {
+  constexpr double kTied = 1e-7;  // of what the camera moves the point by
+  if (term.factor < 0) return LinearisePrior(term);
+  const std::size_t epoch = nodes_[k].last;
+  Factor& factor = run_.epochs_[epoch].factors[static_cast<std::size_t>(term.factor)];
+  const Landmark* const landmark =
+      term.landmark < 0 ? nullptr : &landmarks_[static_cast<std::size_t>(term.landmark)];
+  const std::vector<double> x =
+      landmark == nullptr ? at_[epoch].x : WithLandmark(at_[epoch].x, landmark->place.y);
+  Eigen::VectorXd r;
+  Eigen::MatrixXd a;
+  if (!run_.FreezeFactor(factor, x) || !run_.Residual(factor, x, r, &a)) {
+    if (landmark == nullptr || term.r.size() > 0) return false;
+    factor.left_out = true;
+    return true;
+  }
+  factor.left_out = false;
+  const auto read = std::ssize(read_);
+  const Eigen::Index inputs = landmark == nullptr ? 0 : landmark->l.size();
+  const Eigen::Index states = read + constant_rows_;
+  term.j.resize(r.size(), states + inputs);
+  term.j.leftCols(read) = a(Eigen::all, read_);
+  for (const Constant& constant : constants_) {
+    term.j.middleCols(read + constant.column, std::ssize(constant.rows)) =
+        a(Eigen::all, constant.rows);
+  }
+  if (inputs > 0) {
+    const Inverse& place = landmark->place;
+    const MapLandmark& of_run = run_.landmarks_[static_cast<std::size_t>(term.landmark)];
+    const auto a_y = a.rightCols(place.by_d.rows());
+    term.j.rightCols(inputs).noalias() = a_y * place.by_d;
+    if (of_run.first) {
+      const Eigen::MatrixXd left = a_y * (place.by_x - place.by_d * landmark->c);
+      if (of_run.first->epoch == epoch) {
+        term.j.leftCols(states) += left;
+      } else if (left.norm() > kTied * (a_y * place.by_x).norm()) {
+        ties_ = true;
+        return run_.Fail("landmark " + std::to_string(of_run.id) +
+                         " ties its first camera to those that see it later");
+      }
+    }
+  }
+  const double root = std::sqrt(Weight(run_.SensorOf(factor).loss, r.norm()));
+  term.j *= root;
+  term.r = root * r;
+  return true;
+}
+
+/// Those of the node, or, unless null, only those of these landmarks.
+bool IncrementalSolve::LineariseTerms(std::size_t k, const std::set<std::size_t>* landmarks) {
+  for (Term& term : nodes_[k].terms) {
+    const bool named = term.landmark >= 0 && landmarks != nullptr &&
+                       landmarks->contains(static_cast<std::size_t>(term.landmark));
+    if ((landmarks == nullptr || named) && !LineariseTerm(k, term)) return false;
+  }
+  ChooseScale(nodes_[k]);
+  return true;
+}
+
+/// As that of a KktSystem, by node. Any will do.
+void IncrementalSolve::ChooseScale(Node& node) const {
+  double h = 0.0, q = 0.0;
+  for (const Term& term : node.terms) {
+    if (term.r.size() > 0) h = std::max(h, term.j.leftCols(std::ssize(read_)).squaredNorm());
+  }
+  for (Eigen::Index i = 0; i < node.b.rows(); ++i) q = std::max(q, node.b.row(i).squaredNorm());
+  node.alpha = h > 0.0 && q > 0.0 ? std::sqrt(h / q) : 1.0;
+}
+
+/// About where they are now.
+bool IncrementalSolve::Relinearise(const Moved& moved) {
+  std::set<std::size_t> nodes = moved.nodes, landmarks = moved.landmarks;
+  if (moved.constants) {
+    for (std::size_t k = 0; k < nodes_.size(); ++k) nodes.insert(k);
+  }
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    const bool in = landmarks_[i].sigma.size() > 0;
+    if (in && run_.landmarks_[i].first && nodes.contains(landmarks_[i].node)) landmarks.insert(i);
+  }
+  // l + q; where the camera moves too, less what that moves it by.
+  for (const std::size_t i : landmarks) {
+    const bool follows = run_.landmarks_[i].first && nodes.contains(landmarks_[i].node);
+    landmarks_[i].l =
+        follows ? InputsOfLandmark(i, moved.constants) : (landmarks_[i].l + landmarks_[i].q).eval();
+    landmarks_[i].q.setZero();
+  }
+  std::vector<std::pair<std::size_t, std::vector<double>>> values;
+  for (const std::size_t k : nodes) {
+    values.emplace_back(nodes_[k].last, ValuesOf(k, moved.constants));
+    e_.segment(nodes_[k].column, nodes_[k].columns) = InputsOf(k);
+  }
+  for (auto& [epoch, x] : values) at_[epoch].x = std::move(x);
+  for (const std::size_t k : nodes) nodes_[k].dx.setZero();
+  if (moved.constants) {
+    for (Constant& constant : constants_) constant.dx.setZero();
+  }
+  std::set<std::size_t> motions = nodes, changed = nodes;
+  for (const std::size_t k : nodes) {
+    if (k + 1 < nodes_.size()) motions.insert(k + 1);
+  }
+  for (const std::size_t k : motions) {
+    if (!LineariseMotion(k)) return Fail(run_.problem());
+    Touch(k);
+  }
+  for (const std::size_t i : landmarks) {
+    if (!LineariseLandmark(i)) return Fail(run_.problem());
+    changed.insert(landmarks_[i].node);
+    for (const auto& [epoch, index] : run_.landmarks_[i].observations) {
+      changed.insert(node_of_[epoch]);
+    }
+  }
+  for (const std::size_t k : changed) {
+    if (!LineariseTerms(k, nodes.contains(k) ? nullptr : &landmarks)) return Fail(run_.problem());
+    Touch(k);
+  }
+  return true;
+}
+
+bool IncrementalSolve::Restart(const Eigen::VectorXd& e) {
+  nodes_.clear();
+  node_of_.clear();
+  landmarks_.clear();
+  at_.clear();
+  touched_ = back_ = 0;
+  for (Constant& constant : constants_) {
+    constant.born = false;
+    constant.dx.setZero();
+  }
+  e_ = e;
+  return Extend();
+}
+
+// Solved.
+
+int IncrementalSolve::SizeOf(int variable) const {
+  if (variable < 0) return static_cast<int>(rows_.size());
+  const auto v = static_cast<std::size_t>(variable);
+  if (v < 2 * constants_.size()) return static_cast<int>(constants_[v / 2].rows.size());
+  return static_cast<int>(landmarks_[v - 2 * constants_.size()].l.size());
+}
+
+Eigen::VectorXd& IncrementalSolve::SolutionOf(std::size_t node, int variable) {
+  if (variable == kState) return nodes_[node].dx;
+  if (variable == kMultiplier) return nodes_[node].lambda;
+  const auto v = static_cast<std::size_t>(variable);
+  if (v >= 2 * constants_.size()) return landmarks_[v - 2 * constants_.size()].q;
+  return v % 2 == 0 ? constants_[v / 2].dx : constants_[v / 2].lambda;
+}
+
+/// Takes the steps from the first node that was touched.
+bool IncrementalSolve::Eliminate() {
+  for (std::size_t k = touched_; k < nodes_.size(); ++k, ++eliminated_) {
+    if (!StepTo(k)) return Fail("the batch has a singular pivot");
+  }
+  back_ = std::min(back_, touched_);
+  touched_ = nodes_.size();
+  return true;
+}
+
+/// R_k, from R_{k-1} and E_k.
+bool IncrementalSolve::StepTo(std::size_t k) {
+  Node& node = nodes_[k];
+  const auto n = std::ssize(rows_);
+  // The places of what is eliminated, then of the variables of the node.
+  std::vector<int> pivots, &next = node.variables;
+  next = {kState, kMultiplier};
+  for (std::size_t i = 0; i < constants_.size(); ++i) {
+    if (!constants_[i].born || constants_[i].node > k) continue;
+    next.push_back(ValueOf(i));
+    next.push_back(MultiplierOf(i));
+  }
+  places_.assign(2 * constants_.size() + landmarks_.size(), -1);
+  const auto place = [&](int v) -> Eigen::Index& { return places_[static_cast<std::size_t>(v)]; };
+  Eigen::Index p = k == 0 ? 0 : 2 * n;
+  for (const std::size_t i : node.retired) {
+    place(VariableOf(i)) = p;
+    p += SizeOf(VariableOf(i));
+  }
+  const std::vector<int> none, &before = k == 0 ? none : nodes_[k - 1].variables;
+  for (const int v : before) {
+    const bool landmark = v >= static_cast<int>(2 * constants_.size());
+    if (landmark && place(v) < 0) next.push_back(v);
+  }
+  for (const Term& term : node.terms) {
+    if (term.factor < 0) next.push_back(VariableOf(static_cast<std::size_t>(term.landmark)));
+  }
+  Eigen::Index size = p;
+  for (const int v : next) {
+    if (v >= 0) place(v) = size;
+    size += SizeOf(v);
+  }
+  Eigen::MatrixXd& g = front_;  // the lower triangle counts
+  Eigen::VectorXd& right = right_;
+  g.setZero(size, size);
+  right.setZero(size);
+  if (k > 0) {
+    struct Run {
+      Eigen::Index from, to, size;
+    };
+    std::vector<Run> runs;  // of variables that stay side by side
+    Eigen::Index from = 0;
+    for (const int v : before) {
+      const Eigen::Index to = v == kState ? 0 : v == kMultiplier ? n : place(v);
+      const Eigen::Index rows = SizeOf(v);
+      if (!runs.empty() && runs.back().to + runs.back().size == to) {
+        runs.back().size += rows;
+      } else {
+        runs.push_back({from, to, rows});
+      }
+      from += rows;
+    }
+    const Node& last = nodes_[k - 1];
+    for (std::size_t j = 0; j < runs.size(); ++j) {
+      const Run& b = runs[j];
+      right.segment(b.to, b.size) = last.right.segment(b.from, b.size);
+      g.block(b.to, b.to, b.size, b.size) = last.r.block(b.from, b.from, b.size, b.size);
+      for (std::size_t i = j + 1; i < runs.size(); ++i) {
+        const Run& a = runs[i];
+        const auto part = last.r.block(a.from, b.from, a.size, b.size);
+        if (a.to > b.to) {
+          g.block(a.to, b.to, a.size, b.size) = part;
+        } else {
+          g.block(b.to, a.to, b.size, a.size) = part.transpose();
+        }
+      }
+    }
+  }
+  AddMotion(k, p);
+  for (const Term& term : node.terms) AddTerm(term, p);
+  const Eigen::Index m = size - p;
+  node.r = g.bottomRightCorner(m, m);
+  node.right = right.tail(m);
+  node.x.setZero(p, m);
+  node.y.setZero(p);
+  if (p == 0) return true;
+  const Eigen::MatrixXd d = g.topLeftCorner(p, p).selfadjointView<Eigen::Lower>();
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(d);
+  if (!lu.matrixLU().allFinite() || !(lu.matrixLU().diagonal().cwiseAbs().minCoeff() > 0.0)) {
+    return false;
+  }
+  node.y = lu.solve(right.head(p));
+  if (m == 0) return true;
+  node.x = lu.solve(g.bottomLeftCorner(m, p).transpose());
+  node.right.noalias() -= node.x.transpose() * right.head(p);
+  const Eigen::MatrixXd transposed = node.x.transpose();
+  internal::AddSymmetricProduct(node.r, g.bottomLeftCorner(m, p), transposed, -1.0);
+  return true;
+}
+
+/// Adds the motion to node k, whose variables begin at row p.
+void IncrementalSolve::AddMotion(std::size_t k, Eigen::Index p) {
+  const Node& node = nodes_[k];
+  const auto n = std::ssize(rows_);
+  std::vector<Eigen::Index> values, multipliers;  // places
+  for (Eigen::Index i = 0; i < n; ++i) {
+    values.push_back(p + i);
+    multipliers.push_back(p + n + i);
+  }
+  const auto place = [&](int v) { return places_[static_cast<std::size_t>(v)]; };
+  for (const std::size_t born : node.born) {
+    for (int i = 0; i < SizeOf(ValueOf(born)); ++i) {
+      values.push_back(place(ValueOf(born)) + i);
+      multipliers.push_back(place(MultiplierOf(born)) + i);
+    }
+  }
+  const double alpha = node.alpha;
+  const Eigen::MatrixXd q = alpha * alpha * node.b * node.b.transpose();
+  const Eigen::VectorXd missed = alpha * (node.c - node.b * e_.segment(node.column, node.columns));
+  for (std::size_t i = 0; i < multipliers.size(); ++i) {
+    const Eigen::Index row = multipliers[i], own = static_cast<Eigen::Index>(i);
+    right_[row] += missed[own];
+    front_(std::max(row, values[i]), std::min(row, values[i])) += alpha;
+    for (std::size_t j = 0; j <= i; ++j) {
+      front_(std::max(row, multipliers[j]), std::min(row, multipliers[j])) -=
+          q(own, static_cast<Eigen::Index>(j));
+    }
+    if (k == 0) continue;
+    front_.row(row).head(n) -= alpha * node.f.row(own).head(n);
+    for (std::size_t c = 0; c < constants_.size(); ++c) {
+      const Constant& constant = constants_[c];
+      if (!constant.born || constant.node >= k) continue;
+      for (Eigen::Index j = 0; j < std::ssize(constant.rows); ++j) {
+        const Eigen::Index column = place(ValueOf(c)) + j;
+        front_(std::max(row, column), std::min(row, column)) -=
+            alpha * node.f(own, n + constant.column + j);
+      }
+    }
+  }
+}
+
+/// Adds J'J and -J'r.
+void IncrementalSolve::AddTerm(const Term& term, Eigen::Index p) {
+  if (term.r.size() == 0) return;
+  struct Columns {
+    Eigen::Index place, column, size;
+  };
+  const auto read = std::ssize(read_);
+  std::vector<Columns> parts{{p, 0, read}};
+  for (std::size_t i = 0; i < constants_.size(); ++i) {
+    if (places_[static_cast<std::size_t>(ValueOf(i))] < 0) continue;
+    parts.push_back({places_[static_cast<std::size_t>(ValueOf(i))], read + constants_[i].column,
+                     std::ssize(constants_[i].rows)});
+  }
+  const Eigen::Index states = read + constant_rows_;
+  if (term.landmark >= 0 && term.j.cols() > states) {
+    const int v = VariableOf(static_cast<std::size_t>(term.landmark));
+    parts.push_back({places_[static_cast<std::size_t>(v)], states, term.j.cols() - states});
+  }
+  for (std::size_t a = 0; a < parts.size(); ++a) {
+    const auto j_a = term.j.middleCols(parts[a].column, parts[a].size);
+    right_.segment(parts[a].place, parts[a].size).noalias() -= j_a.transpose() * term.r;
+    for (std::size_t b = 0; b <= a; ++b) {
+      const auto j_b = term.j.middleCols(parts[b].column, parts[b].size);
+      if (parts[a].place >= parts[b].place) {
+        front_.block(parts[a].place, parts[b].place, parts[a].size, parts[b].size) +=
+            j_a.transpose().lazyProduct(j_b);
+      } else {
+        front_.block(parts[b].place, parts[a].place, parts[b].size, parts[a].size) +=
+            j_b.transpose().lazyProduct(j_a);
+      }
+    }
+  }
+}
+
+namespace {
+
+/// The largest of by_i / sigma_i; what is rounding does not count.
+double LargestShare(const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
+  constexpr double kRounding = 1e-12;
+  double share = 0.0;
+  for (Eigen::Index i = 0; i < by.size(); ++i) {
+    if (std::abs(by[i]) > kRounding) share = std::max(share, std::abs(by[i]) / sigma[i]);
+  }
+  return share;
+}
+
+}  // namespace
+
+/// The solution of the last node, and of those before it as long as it changes. The first node that
+/// it was made for.
+std::optional<std::size_t> IncrementalSolve::SolveBack(bool first) {
+  const double kept = 0.01 * above_;  // what changes less is not told to the nodes before
+  const std::size_t last = nodes_.size() - 1;
+  const Node& root = nodes_[last];
+  front_ = root.r.selfadjointView<Eigen::Lower>();
+  Eigen::VectorXd found = root.right;
+  if (found.size() > 0) {
+    root_.compute(front_);
+    found = root_.solve(root.right).eval();
+  }
+  if (!found.allFinite()) return {};
+  if (first && found.size() > 0) sigma_ = root_.inverse().diagonal().cwiseMax(0.0).cwiseSqrt();
+  std::size_t least = std::min(back_, last);
+  Eigen::Index row = 0;
+  for (const int v : root.variables) {
+    const Eigen::Index size = SizeOf(v);
+    Eigen::VectorXd& solution = SolutionOf(last, v);
+    const Eigen::VectorXd own = sigma_.segment(row, size),
+                          change = found.segment(row, size) - solution;
+    solution = found.segment(row, size);
+    row += size;
+    if (v == kState) nodes_[last].sigma = own;
+    if (v < 0) continue;
+    const auto i = static_cast<std::size_t>(v);
+    const bool landmark = i >= 2 * constants_.size();
+    if (!landmark && i % 2 == 1) continue;  // a multiplier
+    (landmark ? landmarks_[i - 2 * constants_.size()].sigma : constants_[i / 2].sigma) = own;
+    if (LargestShare(change, own) <= kept) continue;
+    least = std::min(
+        least, landmark ? landmarks_[i - 2 * constants_.size()].node : constants_[i / 2].node);
+  }
+  back_ = nodes_.size();
+  for (std::size_t k = last; k > 0; --k) {
+    const Node& node = nodes_[k];
+    Node& before = nodes_[k - 1];
+    Eigen::VectorXd border(node.x.cols());
+    row = 0;
+    for (const int v : node.variables) {
+      border.segment(row, SizeOf(v)) = SolutionOf(k, v);
+      row += SizeOf(v);
+    }
+    const Eigen::VectorXd own = node.y - node.x * border;
+    const auto n = std::ssize(rows_);
+    if (k <= least && LargestShare(own.head(n) - before.dx, before.sigma) <= kept) return k;
+    before.dx = own.head(n);
+    before.lambda = own.segment(n, n);
+    row = 2 * n;
+    for (const std::size_t i : node.retired) {
+      landmarks_[i].q = own.segment(row, landmarks_[i].q.size());
+      row += landmarks_[i].q.size();
+    }
+  }
+  return 0;
+}
+
+IncrementalSolve::Moved IncrementalSolve::FindMoved(std::size_t from) const {
+  Moved moved;
+  for (std::size_t k = from; k < nodes_.size(); ++k) {
+    if (LargestShare(nodes_[k].dx, nodes_[k].sigma) > above_) moved.nodes.insert(k);
+  }
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmarks_[i].sigma.size() == 0) continue;
+    if (LargestShare(landmarks_[i].q, landmarks_[i].sigma) > above_) moved.landmarks.insert(i);
+  }
+  for (const Constant& constant : constants_) {
+    const bool far = constant.born && LargestShare(constant.dx, constant.sigma) > above_;
+    moved.constants = moved.constants || far;
+  }
+  return moved;
+}
+
+bool IncrementalSolve::Solve() {
+  constexpr int kMostPasses = 50;
+  eliminated_ = 0;
+  if (!Extend()) return false;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    if (!Eliminate()) return false;
+    const std::optional<std::size_t> from = SolveBack(pass == 0);
+    if (!from) return Fail("the step of the batch is not finite");
+    const Moved moved = FindMoved(*from);
+    if (!moved.any()) return TellRun();
+    if (!Relinearise(moved)) return false;
+  }
+  return Fail("the estimates do not settle in " + std::to_string(kMostPasses) + " passes");
+}
+
+// Estimates.
+
+/// Of the state of node k; constants as they are linearised, or as they are now.
+std::vector<double> IncrementalSolve::ValuesOf(std::size_t k, bool constants) const {
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(run_.initial_.covariance().size());
+  d(rows_) = nodes_[k].dx;
+  for (const Constant& constant : constants_) {
+    if (constants && constant.born && constant.node <= k) d(constant.rows) = constant.dx;
+  }
+  std::vector<double> x = at_[nodes_[k].last].x;
+  for (const Block& block : run_.initial_.layout().blocks()) {
+    if (!block.has_covariance()) continue;
+    double* const value = x.data() + block.value_offset;
+    block.geometry().Plus(value, d.data() + block.tangent_offset, value);
+  }
+  return x;
+}
+
+/// w = B' alpha lambda'
+Eigen::VectorXd IncrementalSolve::InputsOf(std::size_t k) const {
+  const Node& node = nodes_[k];
+  Eigen::VectorXd lambda(node.b.rows());
+  lambda.head(node.lambda.size()) = node.lambda;
+  Eigen::Index row = node.lambda.size();
+  for (const std::size_t i : node.born) {
+    lambda.segment(row, constants_[i].lambda.size()) = constants_[i].lambda;
+    row += constants_[i].lambda.size();
+  }
+  return node.alpha * (node.b.transpose() * lambda);
+}
+
+/// l + q - C dx_f, constants as for ValuesOf
+Eigen::VectorXd IncrementalSolve::InputsOfLandmark(std::size_t i, bool constants) const {
+  const Landmark& landmark = landmarks_[i];
+  if (!run_.landmarks_[i].first) return landmark.l + landmark.q;
+  const auto read = std::ssize(read_);
+  Eigen::VectorXd camera = Eigen::VectorXd::Zero(landmark.c.cols());
+  camera.head(read) = nodes_[landmark.node].dx.head(read);
+  for (const Constant& constant : constants_) {
+    if (constants) camera.segment(read + constant.column, constant.dx.size()) = constant.dx;
+  }
+  return landmark.l + landmark.q - landmark.c * camera;
+}
+
+/// The run knows its landmarks as they are now.
+bool IncrementalSolve::TellRun() {
+  Inverse place;
+  for (const int v : nodes_.back().variables) {
+    const int i = v - static_cast<int>(2 * constants_.size());
+    if (i < 0) continue;
+    const Landmark& own = landmarks_[static_cast<std::size_t>(i)];
+    MapLandmark& landmark = run_.landmarks_[static_cast<std::size_t>(i)];
+    if (!run_.Place(landmark, own.l + own.q, at_, place)) return Fail(run_.problem());
+    landmark.y = place.y;
+    landmark.l = landmark.from = InputsOfLandmark(static_cast<std::size_t>(i), true);
+  }
+  return true;
+}
+
+Eigen::MatrixXd IncrementalSolve::Covariance() const {
+  const Node& node = nodes_.back();
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
+  std::vector<int> rows;
+  std::vector<Eigen::Index> places;
+  Eigen::Index at = 0;
+  for (const int v : node.variables) {
+    const bool constant = v >= 0 && static_cast<std::size_t>(v) < 2 * constants_.size();
+    const std::vector<int>* of = v == kState ? &rows_ : nullptr;
+    if (constant && v % 2 == 0) of = &constants_[static_cast<std::size_t>(v) / 2].rows;
+    for (int i = 0; of != nullptr && i < SizeOf(v); ++i) {
+      // What the prior knows exactly has no variance, not that of rounding.
+      if (nodes_.size() == 1 && v == kState && !node.b.row(i).any()) continue;
+      rows.push_back((*of)[static_cast<std::size_t>(i)]);
+      places.push_back(at + i);
+    }
+    at += SizeOf(v);
+  }
+  Eigen::MatrixXd of_rows = Eigen::MatrixXd::Zero(at, std::ssize(places));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    of_rows(places[i], static_cast<Eigen::Index>(i)) = 1.0;
+  }
+  if (!rows.empty()) p(rows, rows) = Eigen::MatrixXd(root_.solve(of_rows))(places, Eigen::all);
+  const auto system = run_.binding_.initial.covariance().size();
+  return Clipped(p.topLeftCorner(system, system));
+}
+
+bool IncrementalSolve::PutMap(std::vector<LandmarkEstimate>& map) const {
+  KktSystem kkt(run_);
+  Eigen::VectorXd e(run_.inputs_);
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    e.segment(nodes_[k].column, nodes_[k].columns) = InputsOf(k);
+  }
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (landmarks_[i].sigma.size() > 0) run_.landmarks_[i].l = InputsOfLandmark(i, true);
+  }
+  const Eigen::VectorXd z = kkt.Join(e);
+  if (!kkt.TakeLandmarks(z) || !kkt.Linearise(z, 0.0) || !kkt.Solve()) return false;
+  kkt.Invert();
+  kkt.PutMap(map);
+  return true;
+}
+
+}  // namespace alidade::ceres_batch

@@ -226,7 +226,7 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
   if (options.mode == Mode::kIncremental) {
     options.relinearise_above =
         p.Positive("relinearise_above", "sigma",
-                   "how far what is linearised may move until it is linearised anew", 0.01);
+                   "how far what is linearised may move until it is linearised anew", 0.03);
   }
   options.solve = ReadSolveOptions(p);
   options.solve.solver = static_cast<SolverKind>(

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "batch_landmarks_fixture.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using testing::MakeBatch;
+using testing::Problem;
+
+/// How many sigmas two estimates are apart, and by how much of theirs the covariances are.
+struct Apart {
+  double state = 0.0, covariance = 0.0;
+  std::ptrdiff_t whole = 0;  ///< frames that were solved as a whole
+};
+Apart Compare(const Estimator& found, const Estimator& expected) {
+  const MatrixXd p = expected.state().covariance().Dense().topLeftCorner(3, 3);
+  const MatrixXd its = found.state().covariance().Dense().topLeftCorner(3, 3);
+  if (p.trace() == 0.0) return {0.0, its.norm(), 0};
+  const Vector3d d = testing::PositionOf(found) - testing::PositionOf(expected);
+  return {d.norm() / std::sqrt(p.trace()), (its - p).norm() / p.norm(), 0};
+}
+
+/// The largest over the frames of a problem, and of the map at its end.
+Apart LargestOf(const Problem& problem, const std::string& above) {
+  const auto incremental =
+      MakeBatch(problem.Filter(), "mode: incremental\nrelinearise_above: " + above + "\n");
+  const auto whole = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
+  Apart largest;
+  for (const Frame& frame : problem.frames) {
+    const UpdateReport& report = incremental->Process(frame);
+    largest.whole += std::ranges::count(report.events, "solved_as_a_whole", &Event::kind);
+    whole->Process(frame);
+    const Apart apart = Compare(*incremental, *whole);
+    largest.state = std::max(largest.state, apart.state);
+    largest.covariance = std::max(largest.covariance, apart.covariance);
+  }
+  EXPECT_FALSE(incremental->failed());
+  const std::vector<LandmarkEstimate> map = incremental->landmarks();
+  EXPECT_EQ(map.size(), whole->landmarks().size());
+  for (const LandmarkEstimate& expected : whole->landmarks()) {
+    const LandmarkEstimate* const landmark = testing::Find(map, expected.id);
+    if (landmark == nullptr) {
+      ADD_FAILURE() << "no landmark " << expected.id;
+      continue;
+    }
+    const double sigma = std::sqrt(expected.covariance.trace());
+    largest.state =
+        std::max(largest.state, (landmark->position - expected.position).norm() / sigma);
+    largest.covariance =
+        std::max(largest.covariance,
+                 (landmark->covariance - expected.covariance).norm() / expected.covariance.norm());
+  }
+  return largest;
+}
+
+// All is linearised where it is: the whole batch of the data so far.
+TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
+  const Apart apart = LargestOf(Problem(20, 12), "1e-10");
+  EXPECT_LT(apart.state, 1e-7);
+  EXPECT_LT(apart.covariance, 1e-6);
+  EXPECT_EQ(apart.whole, 0);
+}
+
+// Weights settle slowly in the first frames, which are solved as a whole then.
+TEST(IncrementalBatch, OfARobustLossToo) {
+  Problem problem(16, 12, 20);
+  problem.loss = {LossKind::kHuber, 1.345};
+  const Apart apart = LargestOf(problem, "1e-10");
+  EXPECT_LT(apart.state, 1e-7);
+  EXPECT_LT(apart.covariance, 1e-6);
+  EXPECT_LE(apart.whole, 2);
+}
+
+// What has moved by less than a share of its sigma stays: near, and not the same.
+TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
+  const Apart apart = LargestOf(Problem(20, 12), "0.03");
+  EXPECT_LT(apart.state, 0.1);
+  EXPECT_LT(apart.covariance, 0.05);
+  EXPECT_GT(apart.state, 1e-7);
+  EXPECT_EQ(apart.whole, 0);
+}
+
+// Landmarks that nothing has seen for a while leave the last matrix, and come back to it.
+TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
+  Problem problem(45, 9);
+  for (std::size_t k = 12; k < problem.frames.size(); ++k) {
+    const bool gone = k < 32;
+    std::erase_if(problem.frames[k].measurements, [&](const Measurement& m) {
+      return gone == (m.landmark < 5) && (gone || m.landmark > 6);
+    });
+  }
+  const Apart apart = LargestOf(problem, "1e-10");
+  EXPECT_LT(apart.state, 1e-7);
+  EXPECT_LT(apart.covariance, 1e-6);
+  EXPECT_EQ(apart.whole, 0);
+}
+
+// The full-information filter of a linear system is the Kalman filter, at every frame.
+TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
+  const System system = testing::LinearSystem();
+  const auto batch = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
+  Ekf filter(system, {}, testing::StreamsOf(system));
+  for (int k = 0; k < 300; ++k) {
+    const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
+    batch->Process(frame);
+    filter.Process(frame);
+    ASSERT_FALSE(batch->failed());
+    const MatrixXd p = filter.state().covariance().Dense();
+    EXPECT_LT((batch->state().covariance().Dense() - p).norm(), 1e-9 * p.norm()) << k;
+    for (std::size_t i = 0; i < filter.state().values().size(); ++i) {
+      EXPECT_NEAR(batch->state().values()[i], filter.state().values()[i], 1e-9) << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

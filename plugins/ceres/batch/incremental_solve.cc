@@ -391,12 +391,11 @@ bool IncrementalSolve::Eliminate() {
   return true;
 }
 
-/// R_k, from R_{k-1} and E_k.
-bool IncrementalSolve::StepTo(std::size_t k) {
+/// The variables of a node, and the places of all in the step to it: what is eliminated, then
+/// those. How many rows are eliminated.
+Eigen::Index IncrementalSolve::PlaceVariables(std::size_t k) {
   Node& node = nodes_[k];
-  const auto n = std::ssize(rows_);
-  // The places of what is eliminated, then of the variables of the node.
-  std::vector<int> pivots, &next = node.variables;
+  std::vector<int>& next = node.variables;
   next = {kState, kMultiplier};
   for (std::size_t i = 0; i < constants_.size(); ++i) {
     if (!constants_[i].born || constants_[i].node > k) continue;
@@ -405,13 +404,13 @@ bool IncrementalSolve::StepTo(std::size_t k) {
   }
   places_.assign(2 * constants_.size() + landmarks_.size(), -1);
   const auto place = [&](int v) -> Eigen::Index& { return places_[static_cast<std::size_t>(v)]; };
-  Eigen::Index p = k == 0 ? 0 : 2 * n;
+  Eigen::Index p = k == 0 ? 0 : 2 * std::ssize(rows_);
   for (const std::size_t i : node.retired) {
     place(VariableOf(i)) = p;
     p += SizeOf(VariableOf(i));
   }
-  const std::vector<int> none, &before = k == 0 ? none : nodes_[k - 1].variables;
-  for (const int v : before) {
+  for (std::size_t i = 0; k > 0 && i < nodes_[k - 1].variables.size(); ++i) {
+    const int v = nodes_[k - 1].variables[i];
     const bool landmark = v >= static_cast<int>(2 * constants_.size());
     if (landmark && place(v) < 0) next.push_back(v);
   }
@@ -423,61 +422,69 @@ bool IncrementalSolve::StepTo(std::size_t k) {
     if (v >= 0) place(v) = size;
     size += SizeOf(v);
   }
-  Eigen::MatrixXd& g = front_;  // the lower triangle counts
-  Eigen::VectorXd& right = right_;
-  g.setZero(size, size);
-  right.setZero(size);
-  if (k > 0) {
-    struct Run {
-      Eigen::Index from, to, size;
-    };
-    std::vector<Run> runs;  // of variables that stay side by side
-    Eigen::Index from = 0;
-    for (const int v : before) {
-      const Eigen::Index to = v == kState ? 0 : v == kMultiplier ? n : place(v);
-      const Eigen::Index rows = SizeOf(v);
-      if (!runs.empty() && runs.back().to + runs.back().size == to) {
-        runs.back().size += rows;
-      } else {
-        runs.push_back({from, to, rows});
-      }
-      from += rows;
+  front_.setZero(size, size);
+  right_.setZero(size);
+  return p;
+}
+
+/// Puts R_{k-1} in its place.
+void IncrementalSolve::PutBefore(std::size_t k) {
+  struct Run {
+    Eigen::Index from, to, size;
+  };
+  const Node& before = nodes_[k - 1];
+  std::vector<Run> runs;  // of variables that stay side by side
+  Eigen::Index from = 0;
+  for (const int v : before.variables) {
+    Eigen::Index to = v == kState ? 0 : std::ssize(rows_);
+    if (v >= 0) to = places_[static_cast<std::size_t>(v)];
+    const Eigen::Index rows = SizeOf(v);
+    if (!runs.empty() && runs.back().to + runs.back().size == to) {
+      runs.back().size += rows;
+    } else {
+      runs.push_back({from, to, rows});
     }
-    const Node& last = nodes_[k - 1];
-    for (std::size_t j = 0; j < runs.size(); ++j) {
-      const Run& b = runs[j];
-      right.segment(b.to, b.size) = last.right.segment(b.from, b.size);
-      g.block(b.to, b.to, b.size, b.size) = last.r.block(b.from, b.from, b.size, b.size);
-      for (std::size_t i = j + 1; i < runs.size(); ++i) {
-        const Run& a = runs[i];
-        const auto part = last.r.block(a.from, b.from, a.size, b.size);
-        if (a.to > b.to) {
-          g.block(a.to, b.to, a.size, b.size) = part;
-        } else {
-          g.block(b.to, a.to, b.size, a.size) = part.transpose();
-        }
+    from += rows;
+  }
+  for (std::size_t j = 0; j < runs.size(); ++j) {
+    const Run& b = runs[j];
+    right_.segment(b.to, b.size) = before.right.segment(b.from, b.size);
+    front_.block(b.to, b.to, b.size, b.size) = before.r.block(b.from, b.from, b.size, b.size);
+    for (std::size_t i = j + 1; i < runs.size(); ++i) {
+      const Run& a = runs[i];
+      const auto part = before.r.block(a.from, b.from, a.size, b.size);
+      if (a.to > b.to) {
+        front_.block(a.to, b.to, a.size, b.size) = part;
+      } else {
+        front_.block(b.to, a.to, b.size, a.size) = part.transpose();
       }
     }
   }
+}
+
+/// R_k, from R_{k-1} and E_k.
+bool IncrementalSolve::StepTo(std::size_t k) {
+  Node& node = nodes_[k];
+  const Eigen::Index p = PlaceVariables(k), m = front_.rows() - p;
+  if (k > 0) PutBefore(k);
   AddMotion(k, p);
   for (const Term& term : node.terms) AddTerm(term, p);
-  const Eigen::Index m = size - p;
-  node.r = g.bottomRightCorner(m, m);
-  node.right = right.tail(m);
+  node.r = front_.bottomRightCorner(m, m);
+  node.right = right_.tail(m);
   node.x.setZero(p, m);
   node.y.setZero(p);
   if (p == 0) return true;
-  const Eigen::MatrixXd d = g.topLeftCorner(p, p).selfadjointView<Eigen::Lower>();
+  const Eigen::MatrixXd d = front_.topLeftCorner(p, p).selfadjointView<Eigen::Lower>();
   const Eigen::PartialPivLU<Eigen::MatrixXd> lu(d);
   if (!lu.matrixLU().allFinite() || !(lu.matrixLU().diagonal().cwiseAbs().minCoeff() > 0.0)) {
     return false;
   }
-  node.y = lu.solve(right.head(p));
+  node.y = lu.solve(right_.head(p));
   if (m == 0) return true;
-  node.x = lu.solve(g.bottomLeftCorner(m, p).transpose());
-  node.right.noalias() -= node.x.transpose() * right.head(p);
+  node.x = lu.solve(front_.bottomLeftCorner(m, p).transpose());
+  node.right.noalias() -= node.x.transpose() * right_.head(p);
   const Eigen::MatrixXd transposed = node.x.transpose();
-  internal::AddSymmetricProduct(node.r, g.bottomLeftCorner(m, p), transposed, -1.0);
+  internal::AddSymmetricProduct(node.r, front_.bottomLeftCorner(m, p), transposed, -1.0);
   return true;
 }
 
@@ -570,10 +577,9 @@ double LargestShare(const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
 
 }  // namespace
 
-/// The solution of the last node, and of those before it as long as it changes. The first node that
-/// it was made for.
-std::optional<std::size_t> IncrementalSolve::SolveBack(bool first) {
-  const double kept = 0.01 * above_;  // what changes less is not told to the nodes before
+/// The solution of the last node; where it is the first for a frame, its standard deviations too.
+/// The first node that what changes is a part of; nothing where it is not finite.
+std::optional<std::size_t> IncrementalSolve::SolveRoot(bool first) {
   const std::size_t last = nodes_.size() - 1;
   const Node& root = nodes_[last];
   front_ = root.r.selfadjointView<Eigen::Lower>();
@@ -589,8 +595,8 @@ std::optional<std::size_t> IncrementalSolve::SolveBack(bool first) {
   for (const int v : root.variables) {
     const Eigen::Index size = SizeOf(v);
     Eigen::VectorXd& solution = SolutionOf(last, v);
-    const Eigen::VectorXd own = sigma_.segment(row, size),
-                          change = found.segment(row, size) - solution;
+    const Eigen::VectorXd own = sigma_.segment(row, size);
+    const Eigen::VectorXd change = found.segment(row, size) - solution;
     solution = found.segment(row, size);
     row += size;
     if (v == kState) nodes_[last].sigma = own;
@@ -599,23 +605,29 @@ std::optional<std::size_t> IncrementalSolve::SolveBack(bool first) {
     const bool landmark = i >= 2 * constants_.size();
     if (!landmark && i % 2 == 1) continue;  // a multiplier
     (landmark ? landmarks_[i - 2 * constants_.size()].sigma : constants_[i / 2].sigma) = own;
-    if (LargestShare(change, own) <= kept) continue;
+    if (LargestShare(change, own) <= Kept()) continue;
     least = std::min(
         least, landmark ? landmarks_[i - 2 * constants_.size()].node : constants_[i / 2].node);
   }
+  return least;
+}
+
+/// The solutions of the nodes before the last one, at least down to node `least`, and as long as
+/// they change. The first node that it was made for.
+std::size_t IncrementalSolve::SolveBack(std::size_t least) {
   back_ = nodes_.size();
-  for (std::size_t k = last; k > 0; --k) {
+  const auto n = std::ssize(rows_);
+  for (std::size_t k = nodes_.size() - 1; k > 0; --k) {
     const Node& node = nodes_[k];
     Node& before = nodes_[k - 1];
     Eigen::VectorXd border(node.x.cols());
-    row = 0;
+    Eigen::Index row = 0;
     for (const int v : node.variables) {
       border.segment(row, SizeOf(v)) = SolutionOf(k, v);
       row += SizeOf(v);
     }
     const Eigen::VectorXd own = node.y - node.x * border;
-    const auto n = std::ssize(rows_);
-    if (k <= least && LargestShare(own.head(n) - before.dx, before.sigma) <= kept) return k;
+    if (k <= least && LargestShare(own.head(n) - before.dx, before.sigma) <= Kept()) return k;
     before.dx = own.head(n);
     before.lambda = own.segment(n, n);
     row = 2 * n;
@@ -649,9 +661,9 @@ bool IncrementalSolve::Solve() {
   if (!Extend()) return false;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!Eliminate()) return false;
-    const std::optional<std::size_t> from = SolveBack(pass == 0);
-    if (!from) return Fail("the step of the batch is not finite");
-    const Moved moved = FindMoved(*from);
+    const std::optional<std::size_t> least = SolveRoot(pass == 0);
+    if (!least) return Fail("the step of the batch is not finite");
+    const Moved moved = FindMoved(SolveBack(*least));
     if (!moved.any()) return TellRun();
     if (!Relinearise(moved)) return false;
   }

@@ -131,10 +131,15 @@ class IncrementalSolve {
   void ChooseScale(Node& node) const;
   bool Relinearise(const Moved& moved);
   bool Eliminate();
+  Eigen::Index PlaceVariables(std::size_t k);
+  void PutBefore(std::size_t k);
   bool StepTo(std::size_t k);
   void AddMotion(std::size_t k, Eigen::Index p);
   void AddTerm(const Term& term, Eigen::Index p);
-  std::optional<std::size_t> SolveBack(bool first);
+  std::optional<std::size_t> SolveRoot(bool first);
+  std::size_t SolveBack(std::size_t least);
+  /// What changes less, in sigma, is not told to the nodes before.
+  double Kept() const { return 0.01 * above_; }
   Moved FindMoved(std::size_t from) const;
   std::vector<double> ValuesOf(std::size_t k, bool constants) const;
   Eigen::VectorXd InputsOf(std::size_t k) const;

@@ -95,6 +95,7 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
+  EXPECT_LT(LargestOf(problem, "0.3").state, 0.5);  // what they come back to is eliminated again
 }
 
 // The full-information filter of a linear system is the Kalman filter, at every frame.

@@ -215,6 +215,13 @@ class CeresBatch : public Estimator {
 
 constexpr Support kSupport = {.known = false, .from_measurement = true, .landmarks = true};
 
+EstimatorMaker MakerOf(const BatchOptions& options) {
+  return [options](const System& system, const std::vector<StreamInfo>& streams) {
+    ALIDADE_EXPECTS(!FindUnsupported(system, kSupport));
+    return std::make_unique<CeresBatch>(system, options, streams);
+  };
+}
+
 EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
   BatchOptions options;
@@ -229,13 +236,12 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
                    "how far what is linearised may move until it is linearised anew", 0.03);
   }
   options.solve = ReadSolveOptions(p);
+  options.solve.solver = SolverKind::kSparse;
+  if (options.mode == Mode::kIncremental) return MakerOf(options);
   options.solve.solver = static_cast<SolverKind>(
       p.Choice("solver", {"auto", "sparse", "dense"},
                "system of an iteration; auto: sparse, but dense where there are few inputs", 0));
-  return [options](const System& system, const std::vector<StreamInfo>& streams) {
-    ALIDADE_EXPECTS(!FindUnsupported(system, kSupport));
-    return std::make_unique<CeresBatch>(system, options, streams);
-  };
+  return MakerOf(options);
 }
 
 }  // namespace

@@ -101,6 +101,24 @@ VariableRows CondensedRun::FindVariables() const {
   return found;
 }
 
+/// Whether the block that these rows are of begins in the epochs `first` to `last`.
+bool CondensedRun::HasBorn(const std::vector<int>& rows, std::size_t first,
+                           std::size_t last) const {
+  const StateLayout& layout = initial_.layout();
+  const auto own = [&](BlockId id) {
+    const int offset = layout[id].tangent_offset, row = rows.front();
+    return offset >= 0 && offset <= row && row < offset + layout[id].geometry().tangent;
+  };
+  for (std::size_t id = 0; first == 0 && id < layout.blocks().size(); ++id) {
+    if ((id >= prior_.size() || prior_[id]) && own(static_cast<BlockId>(id))) return true;
+  }
+  for (std::size_t i = first; i <= last; ++i) {
+    const auto begins = [&](const FirstValue& value) { return own(value.block); };
+    if (std::ranges::any_of(epochs_[i].first_values, begins)) return true;
+  }
+  return false;
+}
+
 void CondensedRun::PutPlaces() {
   places_.clear();
   xyz_places_.clear();

@@ -280,6 +280,7 @@ class CondensedRun {
   enum class Undefined { kFails, kSkipped };
 
   VariableRows FindVariables() const;
+  bool HasBorn(const std::vector<int>& rows, std::size_t first, std::size_t last) const;
   /// x_0 and S_0, of so many columns; -1: without.
   bool Begin(const double* e, int columns, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "alidade/state/tiles.h"
@@ -66,24 +65,12 @@ bool IncrementalSolve::AddNode(std::size_t epoch) {
 }
 
 void IncrementalSolve::BearConstants(std::size_t k) {
-  const StateLayout& layout = run_.initial_.layout();
-  const auto bear = [&](BlockId id) {
-    const int offset = layout[id].tangent_offset;
-    for (std::size_t i = 0; i < constants_.size(); ++i) {
-      const int row = constants_[i].rows.front();
-      const bool own = offset <= row && row < offset + layout[id].geometry().tangent;
-      if (offset < 0 || constants_[i].born || !own) continue;
-      constants_[i].born = true;
-      constants_[i].node = k;
-      nodes_[k].born.push_back(i);
-    }
-  };
-  const Node& node = nodes_[k];
-  for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
-    if (id >= run_.prior_.size() || run_.prior_[id]) bear(static_cast<BlockId>(id));
-  }
-  for (std::size_t i = node.first; i <= node.last; ++i) {
-    for (const FirstValue& first : run_.epochs_[i].first_values) bear(first.block);
+  Node& node = nodes_[k];
+  for (std::size_t i = 0; i < constants_.size(); ++i) {
+    if (constants_[i].born || !run_.HasBorn(constants_[i].rows, node.first, node.last)) continue;
+    constants_[i].born = true;
+    constants_[i].node = k;
+    node.born.push_back(i);
   }
 }
 
@@ -139,7 +126,8 @@ bool IncrementalSolve::SeeLandmarks(std::size_t k) {
     if (!LineariseLandmark(i)) return false;
     Term& term = node.terms.emplace_back();
     term.landmark = static_cast<int>(i);
-    return LinearisePrior(term);
+    LinearisePrior(term);
+    return true;
   };
   const std::vector<Factor>& factors = run_.epochs_[node.last].factors;
   for (std::size_t i = 0; i < factors.size(); ++i) {
@@ -222,19 +210,21 @@ bool IncrementalSolve::LineariseLandmark(std::size_t i) {
 }
 
 /// l + q - C dx_f
-bool IncrementalSolve::LinearisePrior(Term& term) const {
+void IncrementalSolve::LinearisePrior(Term& term) const {
   const Landmark& landmark = landmarks_[static_cast<std::size_t>(term.landmark)];
   term.j.resize(landmark.l.size(), landmark.c.cols() + landmark.l.size());
   term.j << -landmark.c, Eigen::MatrixXd::Identity(landmark.l.size(), landmark.l.size());
   term.r = landmark.l;
-  return true;
 }
 
 /// r + J dx, times the root of the weight of a loss. One of a landmark that is not defined tells
 /// nothing until it is.
 bool IncrementalSolve::LineariseTerm(std::size_t k, Term& term) {
   constexpr double kTied = 1e-7;  // of what the camera moves the point by
-  if (term.factor < 0) return LinearisePrior(term);
+  if (term.factor < 0) {
+    LinearisePrior(term);
+    return true;
+  }
   const std::size_t epoch = nodes_[k].last;
   Factor& factor = run_.epochs_[epoch].factors[static_cast<std::size_t>(term.factor)];
   const Landmark* const landmark =
@@ -383,7 +373,7 @@ Eigen::VectorXd& IncrementalSolve::SolutionOf(std::size_t node, int variable) {
 
 /// Takes the steps from the first node that was touched.
 bool IncrementalSolve::Eliminate() {
-  for (std::size_t k = touched_; k < nodes_.size(); ++k, ++eliminated_) {
+  for (std::size_t k = touched_; k < nodes_.size(); ++k) {
     if (!StepTo(k)) return Fail("the batch has a singular pivot");
   }
   back_ = std::min(back_, touched_);
@@ -657,7 +647,6 @@ IncrementalSolve::Moved IncrementalSolve::FindMoved(std::size_t from) const {
 
 bool IncrementalSolve::Solve() {
   constexpr int kMostPasses = 50;
-  eliminated_ = 0;
   if (!Extend()) return false;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!Eliminate()) return false;

@@ -47,8 +47,6 @@ class IncrementalSolve {
   Eigen::MatrixXd Covariance() const;
   /// `map`, the landmarks that a filter has: place and covariance. Linear in the frames.
   bool PutMap(std::vector<LandmarkEstimate>& map) const;
-  /// Nodes that were eliminated for the last frame.
-  std::size_t eliminated() const { return eliminated_; }
   const std::string& problem() const { return problem_; }
   /// Whether a landmark ties its first camera to those that see it later: there is no going on.
   bool ties() const { return ties_; }
@@ -127,7 +125,7 @@ class IncrementalSolve {
   bool LineariseLandmark(std::size_t i);
   bool LineariseTerm(std::size_t k, Term& term);
   bool LineariseTerms(std::size_t k, const std::set<std::size_t>* landmarks);
-  bool LinearisePrior(Term& term) const;
+  void LinearisePrior(Term& term) const;
   void ChooseScale(Node& node) const;
   bool Relinearise(const Moved& moved);
   bool Eliminate();
@@ -158,7 +156,6 @@ class IncrementalSolve {
   Eigen::VectorXd e_;                 ///< inputs, linearised at
   std::size_t touched_ = 0;           ///< the first node whose E_k is not in its R_k
   std::size_t back_ = 0;  ///< the first that was eliminated anew since the last solution
-  std::size_t eliminated_ = 0;
   std::vector<Eigen::Index> places_;  ///< in the step taken last, of constants and landmarks
   Eigen::MatrixXd front_;             ///< of that step, the lower triangle; and what follows
   Eigen::VectorXd right_, sigma_;     ///< its right side; of the last node, of all its variables

@@ -26,18 +26,6 @@ void KktSystem::FindConstants() {
 }
 
 void KktSystem::FindNodes() {
-  const StateLayout& layout = run_.initial_.layout();
-  const auto bear = [&](BlockId id, std::size_t node) {
-    const int offset = layout[id].tangent_offset;
-    for (std::size_t i = 0; i < constants_.size(); ++i) {
-      const int row = constants_[i].rows.front();
-      const bool own = offset <= row && row < offset + layout[id].geometry().tangent;
-      if (offset < 0 || constants_[i].born || !own) continue;
-      constants_[i].born = true;
-      constants_[i].node = node;
-      nodes_[node].born.push_back(i);
-    }
-  };
   const std::vector<Epoch>& epochs = run_.epochs_;
   bool open = false;
   for (std::size_t k = 0; k < epochs.size(); ++k) {
@@ -53,11 +41,11 @@ void KktSystem::FindNodes() {
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     Node& node = nodes_[k];
     node.columns = (k + 1 < nodes_.size() ? nodes_[k + 1].column : run_.inputs_) - node.column;
-    for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
-      if (id >= run_.prior_.size() || run_.prior_[id]) bear(static_cast<BlockId>(id), 0);
-    }
-    for (std::size_t i = node.first; i <= node.last; ++i) {
-      for (const FirstValue& first : epochs[i].first_values) bear(first.block, k);
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      if (constants_[i].born || !run_.HasBorn(constants_[i].rows, node.first, node.last)) continue;
+      constants_[i].born = true;
+      constants_[i].node = k;
+      node.born.push_back(i);
     }
   }
 }

@@ -12,6 +12,10 @@ namespace {
 
 constexpr int kMostPivots = 96;      // of a merged front
 constexpr double kMostWider = 1.15;  // border and pivots of the next group over the border
+constexpr double kMostFlops = 1.3;   // of a merged front over those of its two parts
+
+/// Of a front of p pivots and m rows of border, as BlockLdl factorises it: B D^-1 B', D^-1 B', D^-1.
+double FlopsOf(double p, double m) { return p * m * m + 2.0 * p * p * m + 2.0 / 3.0 * p * p * p; }
 
 /// The tree of the groups, one front each.
 struct Tree {
@@ -101,14 +105,15 @@ Elimination::Elimination(const BlockGraph& graph, const Groups& order) {
       front.m = rows(tree.border[g]);
       const std::size_t next = g + 1;
       if (tree.parent[g] != static_cast<int>(next)) break;
-      const int more = rows(groups[next]), wide = more + rows(tree.border[next]);
-      if (front.p + more > kMostPivots || wide > kMostWider * front.m) break;
+      const int more = rows(groups[next]), border = rows(tree.border[next]);
+      if (front.p + more > kMostPivots || more + border > kMostWider * front.m) break;
+      const double apart = FlopsOf(front.p, front.m) + FlopsOf(more, border);
+      if (FlopsOf(front.p + more, border) > kMostFlops * apart) break;
     }
     front.border = std::move(tree.border[g]);
     front.parent = tree.parent[g];  // a group, as yet
-    const double p = front.p, m = front.m;
-    flops += p * m * m + 2.0 * p * p * m + 2.0 / 3.0 * p * p * p;
-    numbers += p * (p + m);
+    flops += FlopsOf(front.p, front.m);
+    numbers += double(front.p) * (front.p + front.m);
     fronts.push_back(std::move(front));
   }
   for (std::size_t a = 0; a < fronts.size(); ++a) {

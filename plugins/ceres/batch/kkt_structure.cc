@@ -243,23 +243,28 @@ void KktSystem::AddTerms() {
   }
 }
 
-/// From the last node back, a landmark before the first node that sees it, or minimum degree, but
-/// for the first node: the one with fewer flops. Where the first node comes last a covariance is a
-/// sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G'; else that of a vague first state is the difference of
-/// its prior's and one as large.
+/// From the last node back, or minimum degree, but for the first node: the one with fewer flops.
+/// From the last node back a landmark comes before the first node that sees it; where two nodes on
+/// end see it alone, which the motion ties in any case, before the second one. Where the first node
+/// comes last a covariance is a sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G'; else that of a vague first
+/// state is the difference of its prior's and one as large.
 void KktSystem::ChooseOrder() {
-  std::vector<std::vector<int>> beginning(nodes_.size());
+  std::vector<std::vector<int>> before(nodes_.size());  // landmarks
   for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].variable < 0) continue;
     const MapLandmark& landmark = run_.landmarks_[i];
-    std::size_t first = landmark.first ? node_of_[landmark.first->epoch] : nodes_.size() - 1;
-    if (!landmark.observations.empty()) {
-      first = std::min(first, node_of_[landmark.observations.front().epoch]);
-    }
-    if (points_[i].variable >= 0) beginning[first].push_back(points_[i].variable);
+    std::size_t first = nodes_.size() - 1, last = 0;
+    const auto see = [&](const MapLandmark::Observation& observation) {
+      first = std::min(first, node_of_[observation.epoch]);
+      last = std::max(last, node_of_[observation.epoch]);
+    };
+    if (landmark.first) see(*landmark.first);
+    std::ranges::for_each(landmark.observations, see);
+    before[last == first + 1 ? last : first].push_back(points_[i].variable);
   }
   Groups groups;
   for (std::size_t k = nodes_.size(); k-- > 0;) {
-    for (const int landmark : beginning[k]) groups.push_back({landmark});
+    for (const int landmark : before[k]) groups.push_back({landmark});
     std::vector<int>& pair = groups.emplace_back();
     for (const int v : {nodes_[k].read, nodes_[k].rest, nodes_[k].multiplier}) {
       if (v >= 0) pair.push_back(v);

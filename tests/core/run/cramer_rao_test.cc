@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <functional>
 
 #include "alidade/filter/ekf.h"
 #include "alidade/host/in_process.h"
@@ -257,6 +259,189 @@ TEST(CramerRaoBound, OfAMapIsThatOfPathAndPointsTogether) {
     ExpectJointBound(testing::AnchoredPixels<0>(0.01), max_linearity_index);
     ExpectJointBound(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), max_linearity_index);
   }
+}
+
+/// A camera that turns at 0.3 rad/s about its y axis while it walks at random.
+struct TurningWalk : Motion<6, Vec<3>, UnitQuaternion> {
+  static constexpr std::array kBlocks{testing::kPosition, Quantity{"orientation"}};
+  template <class T>
+  void Step(const T* r, const T* q, const T* w, double dt_s, T* next_r, T* next_q) const {
+    for (int i = 0; i < 3; ++i) next_r[i] = r[i] + w[i];
+    const T turn[3] = {w[3], w[4] + T(0.3 * dt_s), w[5]};
+    UnitQuaternion::Plus(q, turn, next_q);
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 3; ++i) l(i, i) = 0.1 * std::sqrt(dt_s);
+    for (int i = 3; i < 6; ++i) l(i, i) = 0.02 * std::sqrt(dt_s);
+  }
+};
+
+/// The pixel of a landmark in the axes of such a camera.
+struct TurnedPixels : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitVector, Vec<1>>,
+                      testing::Pinhole {
+  static constexpr std::array kRoles{
+      testing::kPosition, Quantity{"orientation"},
+      Quantity{"anchor", "m", "", "x,y,z", testing::kOfLandmark},
+      Quantity{"direction", "", "", "x,y,z", testing::kOfLandmark},
+      Quantity{"inverse_distance", "1/m", "", "", testing::kOfLandmark}};
+  using Pinhole::kMeasurement;
+  static constexpr int kInitialises = 2, kPrior = 1;
+  template <class T>
+  using Vector = Eigen::Matrix<T, 3, 1>;
+  template <class T>
+  static Eigen::Quaternion<T> Turn(const T* q) {
+    return {q[0], q[1], q[2], q[3]};
+  }
+  template <class T>
+  bool Predict(const T* r, const T* q, const T* a, const T* m, const T* rho, T* z) const {
+    Vector<T> h;
+    for (int i = 0; i < 3; ++i) h[i] = rho[0] * (a[i] - r[i]) + m[i];
+    h = Turn(q).conjugate() * h;
+    return Project(h.data(), z);
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, const T*, const T*, T* l) const {
+    l[0] = l[3] = T(sigma);
+  }
+  template <class T>
+  bool Initialise(const T* r, const T* q, const T* z, const T* rho, T* y) const {
+    const Vector<T> m = Turn(q) * Vector<T>(z[0], z[1], T(1.0)).normalized();
+    for (int i = 0; i < 3; ++i) {
+      y[i] = r[i];
+      y[3 + i] = m[i];
+    }
+    y[6] = rho[0];
+    return true;
+  }
+};
+
+System TurningSystem() {
+  System system;
+  MotionBinding binding{"cam", InProcessMotion(TurningWalk(), "turning_walk"), {}};
+  for (const Space& space : binding.model.blocks()) {
+    const BlockId id = system.layout.Declare("cam." + space.name, "cam", space);
+    binding.blocks.push_back(id);
+    Prior prior;
+    prior.block = id;
+    prior.mean = {0.0, 0.0, 0.0};
+    if (space.geometry.ambient == 4) prior.mean = {1.0, 0.0, 0.0, 0.0};
+    prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
+    system.priors.push_back(prior);
+  }
+  SensorBinding sensor{"tracks", "tracks", InProcessSensor(TurnedPixels(), "tracks"), {}};
+  sensor.roles.resize(sensor.model.roles().size());
+  for (std::size_t i = 0; i < 2; ++i) sensor.roles[i].block = binding.blocks[i];
+  system.motions.push_back(std::move(binding));
+  system.sensors.push_back(std::move(sensor));
+  system.landmarks = testing::WithPrior(0.5, 0.25);
+  return system;
+}
+
+/// Where the filter's data are exact and all begins at truth, it has its Jacobians there. The data
+/// of the bound have noise.
+void ExpectThatOfExactData(const System& system, const std::vector<StreamInfo>& truths,
+                           const CramerRaoBound::TrueLandmark& place,
+                           const std::function<SourceFrame(int k, double noise)>& frame) {
+  Ekf ekf = testing::EkfOf(system);
+  CramerRaoBound bound(system, testing::StreamsOf(system), truths, place);
+  for (int k = 0; k < 10; ++k) {
+    ekf.Process(frame(k, 0.0));
+    ASSERT_TRUE(bound.Add(frame(k, 0.02))) << k;
+    const Eigen::MatrixXd p = bound.state().covariance().Dense();
+    const Eigen::MatrixXd expected = ekf.state().covariance().Dense();
+    ASSERT_EQ(p.rows(), expected.rows());
+    EXPECT_LT((p - expected).norm(), 1e-9 * expected.norm()) << k;
+  }
+}
+
+// Landmarks at 2 m, which the prior says, all seen from the start.
+TEST(CramerRaoBound, OfATurningCamera) {
+  const auto place = [](std::int64_t id) -> std::optional<Point> {
+    const Eigen::Vector3d ray(0.2 * double(id) - 0.3, 0.2 * std::sin(3.0 * double(id)), 1.0);
+    const Eigen::Vector3d p = 2.0 * ray.normalized();
+    return Point{p.x(), p.y(), p.z()};
+  };
+  const auto frame = [&](int k, double noise) {
+    const Eigen::Quaterniond q(Eigen::AngleAxisd(0.03 * k, Eigen::Vector3d::UnitY()));
+    SourceFrame made{{TimestampFromSeconds(0.1 * k), {}},
+                     {{0.0, 0.0, 0.0}, {q.w(), q.x(), q.y(), q.z()}}};
+    for (int id = 0; id < 4; ++id) {
+      const Eigen::Vector3d h = q.conjugate() * Eigen::Vector3d(place(id)->data());
+      made.measurements.push_back(
+          {made.timestamp,
+           0,
+           id,
+           {h.x() / h.z() + noise * std::sin(37.0 * k + id), h.y() / h.z() - noise},
+           {}});
+    }
+    return made;
+  };
+  ExpectThatOfExactData(TurningSystem(), {{"position", 3}, {"orientation", 4}}, place, frame);
+}
+
+// Measured whole, so without a prior; and two that are known beforehand, one of them exactly.
+TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
+  LandmarkOptions options;
+  options.known = {{0, *PlaceOf(0), 0.02}, {1, *PlaceOf(1), 0.0}};
+  const System system = testing::MapSystem(testing::Offset(0.05), options, 0.2);
+  const auto frame = [](int k, double noise) {
+    SourceFrame made{{TimestampFromSeconds(0.1 * k), {}}, {{0.0, 0.0, 0.0}}};
+    for (int id = k < 3 ? 2 : 0; id < 5; ++id) {  // the known ones later
+      const Point p = *PlaceOf(id);
+      made.measurements.push_back({made.timestamp,
+                                   0,
+                                   id,
+                                   {p[0] + noise * std::sin(37.0 * k + id), p[1], p[2] - noise},
+                                   {}});
+    }
+    return made;
+  };
+  ExpectThatOfExactData(system, {{"position", 3}}, PlaceOf, frame);
+}
+
+/// Of a landmark on the ground, which has two coordinates.
+struct OnGround : Sensor<Vec<2>, Vec<3>, Vec<2>> {
+  static constexpr std::array kRoles{testing::kPosition,
+                                     Quantity{"landmark", "m", "", "x,y", testing::kOfLandmark}};
+  static constexpr Quantity kMeasurement{"offset", "m", "", "x,y"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* r, const T* p, T* z) const {
+    for (int i = 0; i < 2; ++i) z[i] = p[i] - r[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(0.1);
+  }
+  template <class T>
+  bool Initialise(const T* r, const T* z, T* p) const {
+    for (int i = 0; i < 2; ++i) p[i] = r[i] + z[i];
+    return true;
+  }
+};
+
+/// The pixel of a point, which starts at the prior's distance along its ray.
+struct XyzByPrior : testing::XyzPixels {
+  static constexpr int kInitialises = 1, kPrior = 1;
+  XyzByPrior() : XyzPixels(0.01) {}
+  template <class T>
+  bool Initialise(const T* r, const T* z, const T* rho, T* p) const {
+    for (int i = 0; i < 3; ++i) p[i] = r[i] + (i < 2 ? z[i] : T(1.0)) / rho[0];
+    return true;
+  }
+};
+
+TEST(CramerRaoBound, TellsWhyLandmarksCannotStartAtTruth) {
+  const std::vector<StreamInfo> truths{{"position", 3}};
+  System system = testing::MapSystem(testing::Offset(0.1), LandmarkOptions());
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths), "");
+  system.sensors[0].model = InProcessSensor(OnGround(), "ground");
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
+            "'tracks' has landmarks of a representation of its own");
+  system.sensors[0].model = InProcessSensor(XyzByPrior(), "xyz");
+  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
+            "'tracks' places landmarks as xyz by a prior, by whose mean the Jacobians are");
 }
 
 TEST(CramerRaoBound, EndsAtALandmarkWithoutTruth) {

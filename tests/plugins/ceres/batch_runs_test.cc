@@ -129,6 +129,15 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
               [&] { run("estimators.batch.max_iterations", "0"); });
   ExpectError(ExitCode::kBadConfig, {"max_iteration", "did you mean 'max_iterations'?"},
               [&] { run("estimators.batch.max_iteration", "3"); });
+  const auto incremental = [](const std::string& key, const std::string& value) {
+    RunDepth(1, {{"estimators.batch.type", "ceres_batch"},
+                 {"estimators.batch.mode", "incremental"},
+                 {"estimators.batch." + key, value}});
+  };
+  ExpectError(ExitCode::kBadConfig, {"estimators.batch.solver", "unknown key"},
+              [&] { incremental("solver", "dense"); });
+  ExpectError(ExitCode::kBadConfig, {"estimators.batch.relinearise_above", "a number > 0"},
+              [&] { incremental("relinearise_above", "0"); });
   ExpectError(
       ExitCode::kPlugin,
       {"estimators.batch.type", "no estimator 'ceres_bach'", "ekf", "ceres_batch", "searched"},

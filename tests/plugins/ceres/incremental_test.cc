@@ -22,13 +22,13 @@ Apart Compare(const Estimator& found, const Estimator& expected) {
   return {d.norm() / std::sqrt(p.trace()), (its - p).norm() / p.norm(), 0};
 }
 
-/// The largest over the frames of a problem, and of the map at its end.
-Apart LargestOf(const Problem& problem, const std::string& above) {
+/// The largest over the frames, and of the map at their end.
+Apart LargestOf(const System& system, const std::vector<Frame>& frames, const std::string& above) {
   const auto incremental =
-      MakeBatch(problem.Filter(), "mode: incremental\nrelinearise_above: " + above + "\n");
-  const auto whole = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
+      MakeBatch(system, "mode: incremental\nrelinearise_above: " + above + "\n");
+  const auto whole = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
   Apart largest;
-  for (const Frame& frame : problem.frames) {
+  for (const Frame& frame : frames) {
     const UpdateReport& report = incremental->Process(frame);
     largest.whole += std::ranges::count(report.events, "solved_as_a_whole", &Event::kind);
     whole->Process(frame);
@@ -55,6 +55,10 @@ Apart LargestOf(const Problem& problem, const std::string& above) {
   return largest;
 }
 
+Apart LargestOf(const Problem& problem, const std::string& above) {
+  return LargestOf(problem.Filter(), problem.frames, above);
+}
+
 // All is linearised where it is: the whole batch of the data so far.
 TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
   const Apart apart = LargestOf(Problem(20, 12), "1e-10");
@@ -79,6 +83,26 @@ TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
   EXPECT_LT(apart.state, 0.1);
   EXPECT_LT(apart.covariance, 0.05);
   EXPECT_GT(apart.state, 1e-7);
+  EXPECT_EQ(apart.whole, 0);
+}
+
+// Landmarks follow their first cameras where nothing is linearised anew. Of a linear map that is
+// exact, but for what is too little to be told to the frames before.
+TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
+  Random random(3);
+  std::vector<Frame> frames;
+  for (int k = 0; k < 12; ++k) {
+    std::vector<testing::Observation> seen;
+    for (int i = k / 3; i < k / 3 + 3; ++i) {
+      const auto n = [&] { return 0.3 * random.Normal(); };
+      seen.push_back({i, {0.4 * i - 0.1 * k + n(), n(), 2.0 + n()}});
+    }
+    frames.push_back(testing::FrameOf(0.1 * k, seen));
+  }
+  const System system = testing::MapSystem(testing::Offset(0.2), LandmarkOptions(), 0.5);
+  const Apart apart = LargestOf(system, frames, "3");
+  EXPECT_LT(apart.state, 0.01);
+  EXPECT_LT(apart.covariance, 1e-8);
   EXPECT_EQ(apart.whole, 0);
 }
 

@@ -143,7 +143,7 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   const Found closed = Solve(system, frames(true), "solver: sparse\n");
   ASSERT_FALSE(open.failed || closed.failed);
   RecordProperty("flops", std::to_string(FlopsOf(open)) + ' ' + std::to_string(FlopsOf(closed)));
-  EXPECT_LT(FlopsOf(closed), 3.0 * FlopsOf(open));
+  EXPECT_LT(FlopsOf(closed), 2.0 * FlopsOf(open));
   EXPECT_LT(FlopsOf(closed), 2e3 * kFrames);
   // It tells of the end: 2000 steps of 0.1 m/sqrt(s) against one offset of 0.05 m.
   const auto sigma = [](const Found& found) {

@@ -75,13 +75,14 @@ TEST(CramerRaoBound, TakesTheMotionAtTruth) {
   System system;
   testing::AddMotion(system, "p", InProcessMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
   testing::AddSensor(system, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
+  system.initial_time_s = -0.1;  // a step before the first frame, from about where that one is
   CramerRaoBound bound(system, testing::StreamsOf(system), {{"x"}});
   const double dt_s = 0.1, q = dt_s * dt_s;
   double p = 0.25, before = 0.0;
   for (int k = 0; k < 30; ++k) {
     const double x = std::sin(0.5 * k);
     ASSERT_TRUE(bound.Add({FrameAt(dt_s * k, {{0, x + std::sin(37.0 * k)}}), {{x}}}));
-    if (k > 0) p = std::pow(1.0 + dt_s * (1.0 - 3.0 * before * before), 2) * p + q;
+    p = std::pow(1.0 + dt_s * (1.0 - 3.0 * before * before), 2) * p + q;
     p = 1.0 / (1.0 / p + 1.0 / (0.4 * 0.4));
     EXPECT_NEAR(bound.state().covariance().Dense()(0, 0), p, 1e-12) << k;
     before = x;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <string>
@@ -56,7 +57,13 @@ class CeresBatch : public Estimator {
   std::vector<LandmarkEstimate> landmarks() const override {
     if (!incremental_ || !solved_so_) return map_;
     std::vector<LandmarkEstimate> map = initialiser_.filter().landmarks();
-    return map.empty() || incremental_->PutMap(map) ? map : map_;
+    if (!map.empty() && !incremental_->PutMap(map)) {
+      for (LandmarkEstimate& one : map) {  // the filter's ids, and no places
+        one.position.setConstant(std::nan(""));
+        one.covariance.setConstant(std::nan(""));
+      }
+    }
+    return map;
   }
   Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed(); }
@@ -128,7 +135,7 @@ class CeresBatch : public Estimator {
     sparse_->StopWhen(stop_);
     map_ = initialiser_.filter().landmarks();
     const bool again = !offline() && e_.size() > 0;
-    return ((again && sparse_->SolveAnew(filtered_, e_)) || sparse_->SolveAll(filtered_)) &&
+    return (again ? sparse_->SolveAnew(filtered_, e_) : sparse_->SolveAll(filtered_)) &&
            sparse_->PutAll(put, map_);
   }
 
@@ -147,25 +154,24 @@ class CeresBatch : public Estimator {
     solved_so_ = incremental_ && incremental_->Solve();
     if (!solved_so_) return false;
     told_why_ = false;
+    e_.resize(0);  // of frames long ago
     run_.Put(run_.shape().frames - 1, incremental_->Values(), incremental_->Covariance(), state_,
              report_);
     return true;
   }
 
-  /// From the solution of all frames. Says why once, until it goes on.
+  /// From the solution of all frames. Says why once, until it goes on. Where it cannot, the next
+  /// frame tries again with all frames.
   void RestartIncremental() {
+    const std::string why = incremental_->problem();
+    if (!incremental_->ties()) incremental_->Restart(e_);
     if (!told_why_ && mode_ == Mode::kIncremental) {
       report_.events.push_back(
           {run_.timestamp(), "solved_as_a_whole",
-           incremental_->problem() +
-               (incremental_->ties() ? "; so are all frames from here on" : "")});
+           why + (incremental_->ties() ? "; so are all frames from here on" : "")});
     }
     told_why_ = true;
-    if (incremental_->ties()) {
-      incremental_.reset();
-    } else {
-      incremental_->Restart(e_);  // where it cannot, the next frame says why
-    }
+    if (incremental_->ties()) incremental_.reset();
   }
 
   void SolveSoFar() {

@@ -384,7 +384,8 @@ std::optional<double> CondensedRun::Freeze(const Eigen::VectorXd& e) {
   for (Epoch& epoch : epochs_) {
     if (!FreezeEpoch(epoch, e.data(), point)) return {};
     for (Factor& factor : epoch.factors) {
-      if (factor.row >= 0 && !FreezeFactor(factor, point.x)) return {};
+      // One of a landmark in the state that is not defined may be left out.
+      if (factor.row >= 0 && !FreezeFactor(factor, point.x) && !IsOfState(factor)) return {};
     }
     if (has_landmarks()) points.push_back(point);
   }

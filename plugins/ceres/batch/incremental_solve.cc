@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "alidade/state/tiles.h"
@@ -15,6 +16,13 @@ IncrementalSolve::IncrementalSolve(CondensedRun& run, double relinearise_above)
   const VariableRows variables = run_.FindVariables();
   rows_ = variables.moving();
   read_ = variables.read;
+  for (const int row : rows_) {
+    for (const Block& block : run_.initial_.layout().blocks()) {
+      const int at = block.tangent_offset;
+      if (!block.has_covariance() || row < at || row >= at + block.geometry().tangent) continue;
+      values_of_.emplace_back(block.value_offset, block.geometry().ambient);
+    }
+  }
   for (const VariableRows::Constant& constant : variables.constants) {
     Constant& own = constants_.emplace_back();
     own.rows = constant.rows;
@@ -57,7 +65,8 @@ bool IncrementalSolve::AddNode(std::size_t epoch) {
   at_.emplace_back();
   e_.conservativeResizeLike(Eigen::VectorXd::Zero(run_.inputs_));
   node.dx = Eigen::VectorXd::Zero(std::ssize(rows_));
-  node.lambda = node.sigma = node.dx;
+  node.lambda = node.dx;
+  node.sigma.resize(0);
   BearConstants(k);
   Touch(k);
   back_ = std::min(back_, k);
@@ -281,7 +290,7 @@ bool IncrementalSolve::LineariseTerms(std::size_t k, const std::set<std::size_t>
   return true;
 }
 
-/// As that of a KktSystem, by node. Any will do.
+/// As large as the terms of the node and its noise say: any will do, and it is for rounding alone.
 void IncrementalSolve::ChooseScale(Node& node) const {
   double h = 0.0, q = 0.0;
   for (const Term& term : node.terms) {
@@ -341,6 +350,15 @@ bool IncrementalSolve::Relinearise(const Moved& moved) {
 }
 
 bool IncrementalSolve::Restart(const Eigen::VectorXd& e) {
+  Clear();
+  e_ = e;
+  if (Extend()) return true;
+  Clear();  // not half of it
+  return false;
+}
+
+/// No frames, which Extend adds again from the inputs that there are.
+void IncrementalSolve::Clear() {
   nodes_.clear();
   node_of_.clear();
   landmarks_.clear();
@@ -350,8 +368,6 @@ bool IncrementalSolve::Restart(const Eigen::VectorXd& e) {
     constant.born = false;
     constant.dx.setZero();
   }
-  e_ = e;
-  return Extend();
 }
 
 // Solved.
@@ -371,14 +387,43 @@ Eigen::VectorXd& IncrementalSolve::SolutionOf(std::size_t node, int variable) {
   return v % 2 == 0 ? constants_[v / 2].dx : constants_[v / 2].lambda;
 }
 
-/// Takes the steps from the first node that was touched.
+/// Takes the steps from the first node that was touched, or from the last matrix that was kept
+/// before it.
 bool IncrementalSolve::Eliminate() {
-  for (std::size_t k = touched_; k < nodes_.size(); ++k) {
+  constexpr std::size_t kEvery = 10;  // nodes; and of the last ones all
+  std::size_t from = std::min(touched_, nodes_.size());
+  while (from > 0 && nodes_[from - 1].r.size() == 0) --from;
+  for (std::size_t k = from; k < nodes_.size(); ++k) {
     if (!StepTo(k)) return Fail("the batch has a singular pivot");
+    if (nodes_[k].sigma.size() == 0) PutSigmas(k);
+    if (k >= kEvery && (k - kEvery) % kEvery != 0) nodes_[k - kEvery].r.resize(0, 0);
   }
-  back_ = std::min(back_, touched_);
+  back_ = std::min(back_, from);
   touched_ = nodes_.size();
   return true;
+}
+
+/// Of the variables of node k, given the data up to it.
+void IncrementalSolve::PutSigmas(std::size_t k) {
+  Node& node = nodes_[k];
+  Eigen::VectorXd sigma;
+  if (node.r.size() > 0) {
+    front_ = node.r.selfadjointView<Eigen::Lower>();
+    sigma = front_.partialPivLu().inverse().diagonal().cwiseMax(0.0).cwiseSqrt();
+  }
+  Eigen::Index row = 0;
+  for (const int v : node.variables) {
+    const auto own = sigma.segment(row, SizeOf(v));
+    row += own.size();
+    if (v == kState) node.sigma = own;
+    if (v < 0) continue;
+    const auto i = static_cast<std::size_t>(v);
+    if (i >= 2 * constants_.size()) {
+      landmarks_[i - 2 * constants_.size()].sigma = own;
+    } else if (i % 2 == 0) {
+      constants_[i / 2].sigma = own;
+    }
+  }
 }
 
 /// The variables of a node, and the places of all in the step to it: what is eliminated, then
@@ -567,37 +612,35 @@ double LargestShare(const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
 
 }  // namespace
 
-/// The solution of the last node; where it is the first for a frame, its standard deviations too.
-/// The first node that what changes is a part of; nothing where it is not finite.
-std::optional<std::size_t> IncrementalSolve::SolveRoot(bool first) {
+/// The solution of the last node. The first node that what changes is a part of; nothing where it is
+/// not finite.
+std::optional<std::size_t> IncrementalSolve::SolveRoot() {
   const std::size_t last = nodes_.size() - 1;
   const Node& root = nodes_[last];
-  front_ = root.r.selfadjointView<Eigen::Lower>();
   Eigen::VectorXd found = root.right;
   if (found.size() > 0) {
+    front_ = root.r.selfadjointView<Eigen::Lower>();
     root_.compute(front_);
     found = root_.solve(root.right).eval();
   }
   if (!found.allFinite()) return {};
-  if (first && found.size() > 0) sigma_ = root_.inverse().diagonal().cwiseMax(0.0).cwiseSqrt();
   std::size_t least = std::min(back_, last);
   Eigen::Index row = 0;
   for (const int v : root.variables) {
     const Eigen::Index size = SizeOf(v);
     Eigen::VectorXd& solution = SolutionOf(last, v);
-    const Eigen::VectorXd own = sigma_.segment(row, size);
     const Eigen::VectorXd change = found.segment(row, size) - solution;
     solution = found.segment(row, size);
     row += size;
-    if (v == kState) nodes_[last].sigma = own;
     if (v < 0) continue;
     const auto i = static_cast<std::size_t>(v);
-    const bool landmark = i >= 2 * constants_.size();
-    if (!landmark && i % 2 == 1) continue;  // a multiplier
-    (landmark ? landmarks_[i - 2 * constants_.size()].sigma : constants_[i / 2].sigma) = own;
-    if (LargestShare(change, own) <= Kept()) continue;
-    least = std::min(
-        least, landmark ? landmarks_[i - 2 * constants_.size()].node : constants_[i / 2].node);
+    if (i >= 2 * constants_.size()) {
+      const Landmark& landmark = landmarks_[i - 2 * constants_.size()];
+      if (LargestShare(change, landmark.sigma) > Kept()) least = std::min(least, landmark.node);
+    } else if (i % 2 == 0) {  // no multiplier
+      const Constant& constant = constants_[i / 2];
+      if (LargestShare(change, constant.sigma) > Kept()) least = std::min(least, constant.node);
+    }
   }
   return least;
 }
@@ -617,7 +660,8 @@ std::size_t IncrementalSolve::SolveBack(std::size_t least) {
       row += SizeOf(v);
     }
     const Eigen::VectorXd own = node.y - node.x * border;
-    if (k <= least && LargestShare(own.head(n) - before.dx, before.sigma) <= Kept()) return k;
+    const bool same = LargestShare(Felt(k - 1, own.head(n) - before.dx), before.sigma) <= Kept();
+    if (k <= least && same) return k;
     before.dx = own.head(n);
     before.lambda = own.segment(n, n);
     row = 2 * n;
@@ -629,31 +673,61 @@ std::size_t IncrementalSolve::SolveBack(std::size_t least) {
   return 0;
 }
 
+/// A change of the state of node k, without what is lost in the digits of its values.
+Eigen::VectorXd IncrementalSolve::Felt(std::size_t k, Eigen::VectorXd by) const {
+  constexpr double kDigits = 4.0 * std::numeric_limits<double>::epsilon();
+  const std::vector<double>& x = at_[nodes_[k].last].x;
+  for (Eigen::Index i = 0; i < by.size(); ++i) {
+    const auto [value, count] = values_of_[static_cast<std::size_t>(i)];
+    double largest = 0.0;
+    for (int j = 0; j < count; ++j) {
+      largest = std::max(largest, std::abs(x[static_cast<std::size_t>(value + j)]));
+    }
+    if (std::abs(by[i]) <= kDigits * largest) by[i] = 0.0;
+  }
+  return by;
+}
+
 IncrementalSolve::Moved IncrementalSolve::FindMoved(std::size_t from) const {
   Moved moved;
+  const auto is_far = [&](const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
+    const double share = LargestShare(by, sigma);
+    moved.largest = std::max(moved.largest, share);
+    return share > above_;
+  };
   for (std::size_t k = from; k < nodes_.size(); ++k) {
-    if (LargestShare(nodes_[k].dx, nodes_[k].sigma) > above_) moved.nodes.insert(k);
+    if (is_far(Felt(k, nodes_[k].dx), nodes_[k].sigma)) moved.nodes.insert(k);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmarks_[i].sigma.size() == 0) continue;
-    if (LargestShare(landmarks_[i].q, landmarks_[i].sigma) > above_) moved.landmarks.insert(i);
+    if (is_far(landmarks_[i].q, landmarks_[i].sigma)) moved.landmarks.insert(i);
   }
   for (const Constant& constant : constants_) {
-    const bool far = constant.born && LargestShare(constant.dx, constant.sigma) > above_;
+    const bool far = constant.born && is_far(constant.dx, constant.sigma);
     moved.constants = moved.constants || far;
   }
   return moved;
 }
 
+/// Where the passes get no further, and what still moves is little, it is rounding that moves it.
 bool IncrementalSolve::Solve() {
-  constexpr int kMostPasses = 50;
+  constexpr int kMostPasses = 50, kRounded = 5;
+  constexpr double kShort = 1e-3;  // sigma
   if (!Extend()) return false;
+  double least_moved = std::numeric_limits<double>::infinity();
+  int since = 0;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!Eliminate()) return false;
-    const std::optional<std::size_t> least = SolveRoot(pass == 0);
+    const std::optional<std::size_t> least = SolveRoot();
     if (!least) return Fail("the step of the batch is not finite");
     const Moved moved = FindMoved(SolveBack(*least));
-    if (!moved.any()) return TellRun();
+    if (!moved.any()) return StoreLandmarks();
+    if (moved.largest < 0.9 * least_moved) {
+      least_moved = moved.largest;
+      since = 0;
+    } else if (++since >= kRounded && moved.largest <= kShort && !run_.robust_) {
+      return StoreLandmarks();
+    }
     if (!Relinearise(moved)) return false;
   }
   return Fail("the estimates do not settle in " + std::to_string(kMostPasses) + " passes");
@@ -703,8 +777,8 @@ Eigen::VectorXd IncrementalSolve::InputsOfLandmark(std::size_t i, bool constants
   return landmark.l + landmark.q - landmark.c * camera;
 }
 
-/// The run knows its landmarks as they are now.
-bool IncrementalSolve::TellRun() {
+/// In the run, as they are now.
+bool IncrementalSolve::StoreLandmarks() {
   Inverse place;
   for (const int v : nodes_.back().variables) {
     const int i = v - static_cast<int>(2 * constants_.size());
@@ -747,6 +821,13 @@ Eigen::MatrixXd IncrementalSolve::Covariance() const {
 }
 
 bool IncrementalSolve::PutMap(std::vector<LandmarkEstimate>& map) const {
+  const std::vector<MapLandmark> before = run_.landmarks_;  // what a solve starts from
+  const bool put = PutMapOfRun(map);
+  run_.landmarks_ = before;
+  return put;
+}
+
+bool IncrementalSolve::PutMapOfRun(std::vector<LandmarkEstimate>& map) const {
   KktSystem kkt(run_);
   Eigen::VectorXd e(run_.inputs_);
   for (std::size_t k = 0; k < nodes_.size(); ++k) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "condensed_run.h"
@@ -72,13 +73,13 @@ class IncrementalSolve {
     std::vector<Term> terms;
     // What the step to it leaves, and what it eliminated.
     std::vector<int> variables;
-    Eigen::MatrixXd r;  ///< R_k, lower triangle
-    Eigen::VectorXd right;
-    Eigen::MatrixXd x;  ///< D^-1 B'
-    Eigen::VectorXd y;  ///< D^-1 of its right side
+    Eigen::MatrixXd r;      ///< R_k, m x m, lower triangle; empty: not kept
+    Eigen::VectorXd right;  ///< m
+    Eigen::MatrixXd x;      ///< D^-1 B', p x m
+    Eigen::VectorXd y;      ///< D^-1 of the p rows of its right side
     // Its solution.
     Eigen::VectorXd dx, lambda;
-    Eigen::VectorXd sigma;  ///< of x_k, given the data up to it
+    Eigen::VectorXd sigma;  ///< of x_k, given the data up to it; empty: not known yet
   };
   struct Constant {
     std::vector<int> rows;
@@ -102,6 +103,7 @@ class IncrementalSolve {
   struct Moved {
     std::set<std::size_t> nodes, landmarks;
     bool constants = false;
+    double largest = 0.0;  ///< share of a standard deviation
     bool any() const { return constants || !nodes.empty() || !landmarks.empty(); }
   };
   /// Variables of a node, which have a place each.
@@ -115,6 +117,7 @@ class IncrementalSolve {
   int SizeOf(int variable) const;
 
   bool Fail(const std::string& why);
+  void Clear();
   bool Extend();
   bool AddNode(std::size_t epoch);
   bool Predict(std::size_t k);
@@ -134,19 +137,24 @@ class IncrementalSolve {
   bool StepTo(std::size_t k);
   void AddMotion(std::size_t k, Eigen::Index p);
   void AddTerm(const Term& term, Eigen::Index p);
-  std::optional<std::size_t> SolveRoot(bool first);
+  void PutSigmas(std::size_t k);
+  std::optional<std::size_t> SolveRoot();
   std::size_t SolveBack(std::size_t least);
   /// What changes less, in sigma, is not told to the nodes before.
   double Kept() const { return 0.01 * above_; }
+  Eigen::VectorXd Felt(std::size_t k, Eigen::VectorXd by) const;
   Moved FindMoved(std::size_t from) const;
   std::vector<double> ValuesOf(std::size_t k, bool constants) const;
   Eigen::VectorXd InputsOf(std::size_t k) const;
   Eigen::VectorXd InputsOfLandmark(std::size_t i, bool constants) const;
-  bool TellRun();
+  bool StoreLandmarks();
+  bool PutMapOfRun(std::vector<LandmarkEstimate>& map) const;
 
   CondensedRun& run_;
   double above_;
   std::vector<int> rows_, read_;  ///< of the tangent: x_k, and those first that sensors read
+  std::vector<std::pair<int, int>>
+      values_of_;  ///< by row of x_k: its block's first value, how many
   std::vector<Constant> constants_;
   int constant_rows_ = 0;
   std::vector<Node> nodes_;
@@ -158,7 +166,7 @@ class IncrementalSolve {
   std::size_t back_ = 0;  ///< the first that was eliminated anew since the last solution
   std::vector<Eigen::Index> places_;  ///< in the step taken last, of constants and landmarks
   Eigen::MatrixXd front_;             ///< of that step, the lower triangle; and what follows
-  Eigen::VectorXd right_, sigma_;     ///< its right side; of the last node, of all its variables
+  Eigen::VectorXd right_;             ///< its right side
   Eigen::PartialPivLU<Eigen::MatrixXd> root_;  ///< of the last R_k
   std::string problem_;
   bool ties_ = false;

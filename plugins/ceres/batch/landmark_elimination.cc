@@ -52,6 +52,7 @@ void CondensedRun::AddKnown() {
     landmark.id = known.id;
     landmark.sigma = known.sigma;
     landmark.mean.assign(known.position.begin(), known.position.end());
+    landmark.y = landmark.mean;
     landmark.from = Eigen::VectorXd::Zero(known.sigma > 0.0 ? 3 : 0);
   }
 }

@@ -55,6 +55,7 @@ bool SparseSolve::SolveAnew(const Trajectory& about, Eigen::VectorXd e) {
 /// From where `start` leaves z_, which says whether the models are defined there.
 bool SparseSolve::Solve(const std::function<bool()>& start) {
   note_.clear();
+  iterations_ = solves_ = undefined_ = 0;
   if (TooLarge()) {
     failed_ = true;
     return false;
@@ -71,11 +72,14 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
   at_edge_ = TextOfEdge();
   const bool held = !at_edge_.empty();
   summary_ =
-      cost + (failed_ ? summary_ : "converged") + (held ? ", " : "") + at_edge_ + "; sparse, " +
+      cost + (failed_ ? summary_ : ended_) + (held ? ", " : "") + at_edge_ + "; sparse, " +
       (kkt_.in_time_order() ? "from the last frame back, " : "in order of minimum degree, ") +
       internal::RoundedText(flops(), 2) + " flops an iteration";
   kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
-  return (!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
+  if ((!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve())) return true;
+  failed_ = true;
+  summary_ += "; then " + run_.problem();
+  return false;
 }
 
 /// Landmarks at the edge of their domain, by their ids.
@@ -207,9 +211,13 @@ SparseSolve::Trial SparseSolve::NextPoint(double mu, double predicted) {
 bool SparseSolve::Descend() {
   constexpr double kSettled = 1e-9;              // sigma
   constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
-  double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0;
+  constexpr double kShort = 1e-3;                // sigma
+  constexpr int kRounded = 20;  // iterations, whose undamped steps are short and get no shorter
+  double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0, shortest = 0.0;
+  int longer = 0;
   last_.clear();
   note_.clear();
+  ended_ = "converged";
   if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
     summary_ = run_.problem();
     return false;
@@ -224,6 +232,11 @@ bool SparseSolve::Descend() {
     }
     const double predicted = 0.5 * (decrement + mu * squared);
     const bool unseen = predicted <= kRounding * (1.0 + cost);
+    if (left > kShort || longer == 0 || left < 0.9 * shortest) {
+      shortest = left;
+      longer = 0;
+    }
+    if (++longer > kRounded) return EndUnsettled(left, End::kRounding);
     Trial next = NextPoint(mu, predicted);
     ++iterations_;
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
@@ -253,17 +266,20 @@ bool SparseSolve::Descend() {
       return false;
     }
   }
-  return EndUnsettled(left, mu < kMost);
+  return EndUnsettled(left, mu < kMost ? End::kSpent : End::kNoneHelps);
 }
 
-/// Of a descent whose next step is `left` sigma long: spent, as iterations are, or no step lowers
-/// the cost. Whether its end will do.
-bool SparseSolve::EndUnsettled(double left, bool spent) {
+/// Of a descent whose next step is `left` sigma long. Whether its end will do.
+bool SparseSolve::EndUnsettled(double left, End end) {
   constexpr double kLong = 1e-3;  // sigma
+  const bool spent = end == End::kSpent;
   const std::string larger =
       "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do";
   if (left <= kLong + 1e-6 * std::sqrt(2.0 * kkt_.cost()) && (!spent || run_.shape().robust)) {
-    if (left > kTells) {
+    if (end == End::kRounding) {
+      ended_ = "converged to rounding, by steps of " + internal::RoundedText(left, 2) + " sigma";
+    }
+    if (left > kTells && (end != End::kRounding || run_.shape().robust)) {
       note_ = "the weights of the losses did not settle in " + std::to_string(iterations_) +
               " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
               (spent ? larger : "it does not lower the cost");

@@ -67,7 +67,10 @@ class SparseSolve {
   Trial AfterStep(double predicted);
   std::optional<Trial> Extrapolated(double predicted);
   Trial NextPoint(double mu, double predicted);
-  bool EndUnsettled(double left, bool spent);
+  /// Why a descent ends whose steps are not short: no iterations are left, no step lowers the cost,
+  /// or it is rounding that makes them.
+  enum class End { kSpent, kNoneHelps, kRounding };
+  bool EndUnsettled(double left, End end);
 
   CondensedRun& run_;
   SolveOptions options_;
@@ -81,6 +84,7 @@ class SparseSolve {
   int iterations_ = 0, solves_ = 0;
   int undefined_ = 0;  ///< of the iterations, whose full step led to where a model is not defined
   std::string summary_, note_;
+  std::string ended_;    ///< how, where it has not failed
   std::string at_edge_;  ///< landmarks that the last solve holds at the edge of their domain; or ""
   bool failed_ = false;
 };

@@ -206,6 +206,32 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   }
 }
 
+// Where a position has seven digits before the point, rounding alone makes steps of 1e-6 sigma.
+TEST(SparseBatch, ConvergesFarFromTheOrigin) {
+  Config config = Example("21_poses");
+  config.Set("state.body.initial.position.mean", "[5e5, 5e6, 0]", "--set");
+  config.Set("sensors.mocap.sigma_position_m", "0.01", "--set");
+  const Both both = SolveBoth(config, 60);
+  ExpectSame(both.sparse, both.dense, 1e-5, 1e-5);
+  config.Set("estimators",
+             "{filtering: {type: ceres_batch, mode: filtering, solver: sparse}, "
+             "incremental: {type: ceres_batch, mode: incremental, relinearise_above: 1e-6}}",
+             "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  SourceFrame frame;
+  for (int k = 0; k < 20 && experiment.source->Next(frame); ++k) {
+    for (const auto& each : experiment.estimators) {
+      const UpdateReport& report = each.estimator->Process(frame);
+      EXPECT_EQ(std::ranges::count(report.events, "solved_as_a_whole", &Event::kind), 0) << k;
+      ASSERT_FALSE(each.estimator->failed()) << k;
+    }
+  }
+  EXPECT_LT(Apart(experiment.estimators[0].estimator->state(),
+                  experiment.estimators[1].estimator->state())
+                .norm(),
+            1e-4);
+}
+
 TEST(SparseBatch, SolvesWithLandmarks) {
   const testing::Problem problem(12, 15);
   ExpectBothSolve(problem.Filter(), problem.frames);

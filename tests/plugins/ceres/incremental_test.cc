@@ -125,17 +125,44 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
 // The full-information filter of a linear system is the Kalman filter, at every frame.
 TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
   const System system = testing::LinearSystem();
-  const auto batch = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
-  Ekf filter(system, {}, testing::StreamsOf(system));
-  for (int k = 0; k < 300; ++k) {
-    const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
-    batch->Process(frame);
-    filter.Process(frame);
-    ASSERT_FALSE(batch->failed());
-    const MatrixXd p = filter.state().covariance().Dense();
-    EXPECT_LT((batch->state().covariance().Dense() - p).norm(), 1e-9 * p.norm()) << k;
-    for (std::size_t i = 0; i < filter.state().values().size(); ++i) {
-      EXPECT_NEAR(batch->state().values()[i], filter.state().values()[i], 1e-9) << k;
+  for (const char* mode : {"filtering", "incremental"}) {
+    SCOPED_TRACE(mode);
+    const auto batch = MakeBatch(system, std::string("mode: ") + mode + '\n');
+    Ekf filter(system, {}, testing::StreamsOf(system));
+    for (int k = 0; k < 300; ++k) {
+      const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
+      const UpdateReport& report = batch->Process(frame);
+      EXPECT_EQ(std::ranges::count(report.events, "solved_as_a_whole", &Event::kind), 0) << k;
+      filter.Process(frame);
+      ASSERT_FALSE(batch->failed());
+      const MatrixXd p = filter.state().covariance().Dense();
+      EXPECT_LT((batch->state().covariance().Dense() - p).norm(), 1e-9 * p.norm()) << k;
+      for (std::size_t i = 0; i < filter.state().values().size(); ++i) {
+        EXPECT_NEAR(batch->state().values()[i], filter.state().values()[i], 1e-9) << k;
+      }
+    }
+  }
+}
+
+// One that is known exactly is no variable, and what is measured of it is told all the same.
+TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
+  LandmarkOptions options;
+  options.known = {{0, {0.5, -0.2, 2.0}, 0.0}, {1, {-0.4, 0.1, 1.5}, 0.1}};
+  const System system = testing::MapSystem(testing::Offset(0.2), options, 0.5);
+  const auto batch = MakeBatch(system, "mode: incremental\n");
+  const auto whole = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
+  for (int k = 0; k < 5; ++k) {
+    const double n = 0.1 * std::sin(37.0 * k);
+    const Frame frame =
+        testing::FrameOf(0.1 * k, {{0, {0.5 + n, -0.2, 2.0 - n}}, {1, {-0.4, 0.1 - n, 1.5}}});
+    const UpdateReport& found = batch->Process(frame);
+    const UpdateReport& expected = whole->Process(frame);
+    EXPECT_LT(Compare(*batch, *whole).state, 1e-3);
+    for (std::size_t i = 0; i < 2; ++i) {
+      ASSERT_EQ(found.measurements()[i].h.size(), 3u);
+      for (std::size_t e = 0; e < 3; ++e) {
+        EXPECT_NEAR(found.measurements()[i].h[e], expected.measurements()[i].h[e], 1e-4) << k;
+      }
     }
   }
 }

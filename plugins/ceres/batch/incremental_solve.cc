@@ -16,13 +16,6 @@ IncrementalSolve::IncrementalSolve(CondensedRun& run, double relinearise_above)
   const VariableRows variables = run_.FindVariables();
   rows_ = variables.moving();
   read_ = variables.read;
-  for (const int row : rows_) {
-    for (const Block& block : run_.initial_.layout().blocks()) {
-      const int at = block.tangent_offset;
-      if (!block.has_covariance() || row < at || row >= at + block.geometry().tangent) continue;
-      values_of_.emplace_back(block.value_offset, block.geometry().ambient);
-    }
-  }
   for (const VariableRows::Constant& constant : variables.constants) {
     Constant& own = constants_.emplace_back();
     own.rows = constant.rows;
@@ -660,7 +653,7 @@ std::size_t IncrementalSolve::SolveBack(std::size_t least) {
       row += SizeOf(v);
     }
     const Eigen::VectorXd own = node.y - node.x * border;
-    const bool same = LargestShare(Felt(k - 1, own.head(n) - before.dx), before.sigma) <= Kept();
+    const bool same = LargestShare(own.head(n) - before.dx, before.sigma) <= Kept();
     if (k <= least && same) return k;
     before.dx = own.head(n);
     before.lambda = own.segment(n, n);
@@ -673,21 +666,6 @@ std::size_t IncrementalSolve::SolveBack(std::size_t least) {
   return 0;
 }
 
-/// A change of the state of node k, without what is lost in the digits of its values.
-Eigen::VectorXd IncrementalSolve::Felt(std::size_t k, Eigen::VectorXd by) const {
-  constexpr double kDigits = 4.0 * std::numeric_limits<double>::epsilon();
-  const std::vector<double>& x = at_[nodes_[k].last].x;
-  for (Eigen::Index i = 0; i < by.size(); ++i) {
-    const auto [value, count] = values_of_[static_cast<std::size_t>(i)];
-    double largest = 0.0;
-    for (int j = 0; j < count; ++j) {
-      largest = std::max(largest, std::abs(x[static_cast<std::size_t>(value + j)]));
-    }
-    if (std::abs(by[i]) <= kDigits * largest) by[i] = 0.0;
-  }
-  return by;
-}
-
 IncrementalSolve::Moved IncrementalSolve::FindMoved(std::size_t from) const {
   Moved moved;
   const auto is_far = [&](const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
@@ -696,7 +674,7 @@ IncrementalSolve::Moved IncrementalSolve::FindMoved(std::size_t from) const {
     return share > above_;
   };
   for (std::size_t k = from; k < nodes_.size(); ++k) {
-    if (is_far(Felt(k, nodes_[k].dx), nodes_[k].sigma)) moved.nodes.insert(k);
+    if (is_far(nodes_[k].dx, nodes_[k].sigma)) moved.nodes.insert(k);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
     if (landmarks_[i].sigma.size() == 0) continue;

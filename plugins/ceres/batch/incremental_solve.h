@@ -7,7 +7,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "condensed_run.h"
@@ -142,7 +141,6 @@ class IncrementalSolve {
   std::size_t SolveBack(std::size_t least);
   /// What changes less, in sigma, is not told to the nodes before.
   double Kept() const { return 0.01 * above_; }
-  Eigen::VectorXd Felt(std::size_t k, Eigen::VectorXd by) const;
   Moved FindMoved(std::size_t from) const;
   std::vector<double> ValuesOf(std::size_t k, bool constants) const;
   Eigen::VectorXd InputsOf(std::size_t k) const;
@@ -153,8 +151,6 @@ class IncrementalSolve {
   CondensedRun& run_;
   double above_;
   std::vector<int> rows_, read_;  ///< of the tangent: x_k, and those first that sensors read
-  std::vector<std::pair<int, int>>
-      values_of_;  ///< by row of x_k: its block's first value, how many
   std::vector<Constant> constants_;
   int constant_rows_ = 0;
   std::vector<Node> nodes_;

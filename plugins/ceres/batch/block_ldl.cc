@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "alidade/state/tiles.h"
+#include "dense_front.h"
 
 namespace alidade::ceres_batch {
 
@@ -23,6 +23,11 @@ std::size_t BlockLdl::AddBlock(int i, int j) {
 }
 
 Eigen::Map<Eigen::MatrixXd> BlockLdl::Block(std::size_t block) {
+  const Place& place = places_[block];
+  return {values_.data() + place.at, SizeOf(place.i), SizeOf(place.j)};
+}
+
+Eigen::Map<const Eigen::MatrixXd> BlockLdl::Block(std::size_t block) const {
   const Place& place = places_[block];
   return {values_.data() + place.at, SizeOf(place.i), SizeOf(place.j)};
 }
@@ -61,39 +66,18 @@ void BlockLdl::Locate(const Front& front) {
   ForEachPart(front.border, place(front.p));
 }
 
-/// Adds the update of a child to the front that was located last, by runs that stay on end.
+/// Adds the update of a child to the front that was located last.
 void BlockLdl::Extend(const Front& child, const Eigen::MatrixXd& update,
                       Eigen::MatrixXd& into) const {
-  struct Run {
-    int from, to, size;
-  };
-  std::vector<Run> runs;
+  std::vector<RowRun> runs;
   ForEachPart(child.border, [&](int v, int at) {
-    const int to = local_[static_cast<std::size_t>(v)], size = SizeOf(v);
-    if (!runs.empty() && runs.back().to + runs.back().size == to) {
-      runs.back().size += size;
-    } else {
-      runs.push_back({at, to, size});
-    }
+    Append({at, local_[static_cast<std::size_t>(v)], SizeOf(v)}, runs);
   });
-  for (std::size_t j = 0; j < runs.size(); ++j) {
-    const Run& b = runs[j];
-    into.block(b.to, b.to, b.size, b.size).triangularView<Eigen::Lower>() +=
-        update.block(b.from, b.from, b.size, b.size);
-    for (std::size_t i = j + 1; i < runs.size(); ++i) {
-      const Run& a = runs[i];
-      const auto part = update.block(a.from, b.from, a.size, b.size);
-      if (a.to > b.to) {
-        into.block(a.to, b.to, a.size, b.size) += part;
-      } else {
-        into.block(b.to, a.to, b.size, a.size) += part.transpose();
-      }
-    }
-  }
+  AddByRuns(runs, update, into);
 }
 
 bool BlockLdl::Factorise() {
-  Eigen::MatrixXd f, transposed;
+  Eigen::MatrixXd f;
   for (std::size_t a = 0; a < factors_.size(); ++a) {
     const Front& front = elimination_.fronts[a];
     Factor& factor = factors_[a];
@@ -115,15 +99,7 @@ bool BlockLdl::Factorise() {
       Extend(elimination_.fronts[static_cast<std::size_t>(c)], child.update, f);
       child.update.resize(0, 0);
     }
-    const Eigen::MatrixXd d = f.topLeftCorner(p, p).selfadjointView<Eigen::Lower>();
-    factor.d.compute(d);
-    const auto pivots = factor.d.matrixLU().diagonal().cwiseAbs();
-    if (!(p == 0 || (factor.d.matrixLU().allFinite() && pivots.minCoeff() > 0.0))) return false;
-    if (m == 0) continue;
-    factor.x = factor.d.solve(f.bottomLeftCorner(m, p).transpose());
-    factor.update = f.bottomRightCorner(m, m);
-    transposed = factor.x.transpose();
-    internal::AddSymmetricProduct(factor.update, f.bottomLeftCorner(m, p), transposed, -1.0);
+    if (!Eliminate(f, p, factor.d, factor.x, factor.update)) return false;
   }
   return true;
 }

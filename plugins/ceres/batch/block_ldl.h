@@ -24,6 +24,7 @@ class BlockLdl {
   std::size_t AddBlock(int i, int j);
   /// The values of a block, size(i) x size(j), zero at first.
   Eigen::Map<Eigen::MatrixXd> Block(std::size_t block);
+  Eigen::Map<const Eigen::MatrixXd> Block(std::size_t block) const;
   void SetZero() { values_.setZero(); }
 
   const BlockGraph& graph() const { return graph_; }

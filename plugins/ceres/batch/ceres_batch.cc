@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "alidade/filter/support.h"
@@ -103,6 +104,7 @@ class CeresBatch : public Estimator {
       if (k + 1 == frames) {
         Note(report_.events);
         report_.events.push_back({run_.timestamp(), "solution", WhyFailed()});
+        if (sparse_) sparse_->NoteInexact(run_.timestamp(), report_.events);
       }
       emit(k, state_, report_);
     };
@@ -133,10 +135,12 @@ class CeresBatch : public Estimator {
   bool SmoothSparse(const SparseSolve::Take& put) {
     sparse_.emplace(run_, options_);
     sparse_->StopWhen(stop_);
-    map_ = initialiser_.filter().landmarks();
     const bool again = !offline() && e_.size() > 0;
-    return (again ? sparse_->SolveAnew(filtered_, e_) : sparse_->SolveAll(filtered_)) &&
-           sparse_->PutAll(put, map_);
+    if (!(again ? sparse_->SolveAnew(filtered_, e_) : sparse_->SolveAll(filtered_))) return false;
+    std::vector<LandmarkEstimate> map = initialiser_.filter().landmarks();
+    if (!sparse_->PutAll(put, map)) return false;
+    map_ = std::move(map);
+    return true;
   }
 
   void Note(std::vector<Event>& events) {
@@ -164,14 +168,14 @@ class CeresBatch : public Estimator {
   /// frame tries again with all frames.
   void RestartIncremental() {
     const std::string why = incremental_->problem();
-    if (!incremental_->ties()) incremental_->Restart(e_);
+    if (!incremental_->ended()) incremental_->Restart(e_);
     if (!told_why_ && mode_ == Mode::kIncremental) {
       report_.events.push_back(
           {run_.timestamp(), "solved_as_a_whole",
-           why + (incremental_->ties() ? "; so are all frames from here on" : "")});
+           why + (incremental_->ended() ? "; so are all frames from here on" : "")});
     }
     told_why_ = true;
-    if (incremental_->ties()) incremental_.reset();
+    if (incremental_->ended()) incremental_.reset();
   }
 
   void SolveSoFar() {
@@ -194,10 +198,12 @@ class CeresBatch : public Estimator {
 
   /// Gives `put` the points of the solution, and makes its map.
   bool PutAll(const TakePoint& put) {
-    map_ = initialiser_.filter().landmarks();
-    return solve_.FailUnless(run_.ForEachFrame(e_, run_.shape().frames, put) &&
-                                 (map_.empty() || run_.PutMap(e_, solve_.u(), map_)),
-                             run_);
+    std::vector<LandmarkEstimate> map = initialiser_.filter().landmarks();
+    const bool all = solve_.FailUnless(run_.ForEachFrame(e_, run_.shape().frames, put) &&
+                                           (map.empty() || run_.PutMap(e_, solve_.u(), map)),
+                                       run_);
+    if (all) map_ = std::move(map);
+    return all;
   }
 
   Mode mode_;

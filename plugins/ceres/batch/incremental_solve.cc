@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "alidade/state/tiles.h"
+#include "dense_front.h"
 #include "kkt_system.h"
 
 namespace alidade::ceres_batch {
@@ -260,7 +260,7 @@ bool IncrementalSolve::LineariseTerm(std::size_t k, Term& term) {
       if (of_run.first->epoch == epoch) {
         term.j.leftCols(states) += left;
       } else if (left.norm() > kTied * (a_y * place.by_x).norm()) {
-        ties_ = true;
+        ended_ = true;
         return run_.Fail("landmark " + std::to_string(of_run.id) +
                          " ties its first camera to those that see it later");
       }
@@ -388,12 +388,27 @@ bool IncrementalSolve::Eliminate() {
   while (from > 0 && nodes_[from - 1].r.size() == 0) --from;
   for (std::size_t k = from; k < nodes_.size(); ++k) {
     if (!StepTo(k)) return Fail("the batch has a singular pivot");
+    if (LosesDigits(k)) return false;
     if (nodes_[k].sigma.size() == 0) PutSigmas(k);
     if (k >= kEvery && (k - kEvery) % kEvery != 0) nodes_[k - kEvery].r.resize(0, 0);
   }
   back_ = std::min(back_, from);
   touched_ = nodes_.size();
   return true;
+}
+
+/// Whether node k has measurements that know so much more of its state than the data before that a
+/// step forward in time, which subtracts the one from the other, loses it: eps P-_ii H_ii.
+bool IncrementalSolve::LosesDigits(std::size_t k) {
+  const Node& node = nodes_[k];
+  const auto n = std::ssize(rows_), read = std::ssize(read_);
+  const double alpha = node.alpha, most = std::max(1e-6, 0.01 * above_);
+  const auto h = node.r.diagonal().head(read), q = node.r.diagonal().segment(n, read);
+  const double share = read == 0 ? 0.0 : h.cwiseProduct(-q).maxCoeff() / (alpha * alpha);
+  if (!(std::numeric_limits<double>::epsilon() * share > most)) return false;
+  ended_ = true;
+  return !Fail(
+      "the prior is so vague beside what is measured that steps forward in time lose digits");
 }
 
 /// Of the variables of node k, given the data up to it.
@@ -457,36 +472,18 @@ Eigen::Index IncrementalSolve::PlaceVariables(std::size_t k) {
 
 /// Puts R_{k-1} in its place.
 void IncrementalSolve::PutBefore(std::size_t k) {
-  struct Run {
-    Eigen::Index from, to, size;
-  };
   const Node& before = nodes_[k - 1];
-  std::vector<Run> runs;  // of variables that stay side by side
+  std::vector<RowRun> runs;
   Eigen::Index from = 0;
   for (const int v : before.variables) {
     Eigen::Index to = v == kState ? 0 : std::ssize(rows_);
     if (v >= 0) to = places_[static_cast<std::size_t>(v)];
-    const Eigen::Index rows = SizeOf(v);
-    if (!runs.empty() && runs.back().to + runs.back().size == to) {
-      runs.back().size += rows;
-    } else {
-      runs.push_back({from, to, rows});
-    }
-    from += rows;
+    Append({from, to, SizeOf(v)}, runs);
+    from += SizeOf(v);
   }
-  for (std::size_t j = 0; j < runs.size(); ++j) {
-    const Run& b = runs[j];
-    right_.segment(b.to, b.size) = before.right.segment(b.from, b.size);
-    front_.block(b.to, b.to, b.size, b.size) = before.r.block(b.from, b.from, b.size, b.size);
-    for (std::size_t i = j + 1; i < runs.size(); ++i) {
-      const Run& a = runs[i];
-      const auto part = before.r.block(a.from, b.from, a.size, b.size);
-      if (a.to > b.to) {
-        front_.block(a.to, b.to, a.size, b.size) = part;
-      } else {
-        front_.block(b.to, a.to, b.size, a.size) = part.transpose();
-      }
-    }
+  AddByRuns(runs, before.r, front_);
+  for (const RowRun& run : runs) {
+    right_.segment(run.to, run.size) = before.right.segment(run.from, run.size);
   }
 }
 
@@ -497,22 +494,14 @@ bool IncrementalSolve::StepTo(std::size_t k) {
   if (k > 0) PutBefore(k);
   AddMotion(k, p);
   for (const Term& term : node.terms) AddTerm(term, p);
-  node.r = front_.bottomRightCorner(m, m);
+  Eigen::PartialPivLU<Eigen::MatrixXd> d;
+  if (!ceres_batch::Eliminate(front_, p, d, node.x, node.r)) return false;
   node.right = right_.tail(m);
-  node.x.setZero(p, m);
-  node.y.setZero(p);
-  if (p == 0) return true;
-  const Eigen::MatrixXd d = front_.topLeftCorner(p, p).selfadjointView<Eigen::Lower>();
-  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(d);
-  if (!lu.matrixLU().allFinite() || !(lu.matrixLU().diagonal().cwiseAbs().minCoeff() > 0.0)) {
-    return false;
+  node.y = right_.head(p);
+  if (p > 0) {
+    node.right.noalias() -= node.x.transpose() * node.y;
+    node.y = d.solve(node.y).eval();
   }
-  node.y = lu.solve(right_.head(p));
-  if (m == 0) return true;
-  node.x = lu.solve(front_.bottomLeftCorner(m, p).transpose());
-  node.right.noalias() -= node.x.transpose() * right_.head(p);
-  const Eigen::MatrixXd transposed = node.x.transpose();
-  internal::AddSymmetricProduct(node.r, front_.bottomLeftCorner(m, p), transposed, -1.0);
   return true;
 }
 
@@ -770,6 +759,17 @@ bool IncrementalSolve::StoreLandmarks() {
   return true;
 }
 
+/// Whether that row of a constant has no noise where it is born.
+bool IncrementalSolve::IsExact(std::size_t constant, int row) const {
+  const Node& node = nodes_[constants_[constant].node];
+  Eigen::Index at = std::ssize(rows_) + row;
+  for (const std::size_t i : node.born) {
+    if (i == constant) break;
+    at += std::ssize(constants_[i].rows);
+  }
+  return !node.b.row(at).any();
+}
+
 Eigen::MatrixXd IncrementalSolve::Covariance() const {
   const Node& node = nodes_.back();
   const auto n = Eigen::Index{run_.initial_.covariance().size()};
@@ -783,7 +783,8 @@ Eigen::MatrixXd IncrementalSolve::Covariance() const {
     if (constant && v % 2 == 0) of = &constants_[static_cast<std::size_t>(v) / 2].rows;
     for (int i = 0; of != nullptr && i < SizeOf(v); ++i) {
       // What the prior knows exactly has no variance, not that of rounding.
-      if (nodes_.size() == 1 && v == kState && !node.b.row(i).any()) continue;
+      if (v == kState && nodes_.size() == 1 && !node.b.row(i).any()) continue;
+      if (constant && IsExact(static_cast<std::size_t>(v) / 2, i)) continue;
       rows.push_back((*of)[static_cast<std::size_t>(i)]);
       places.push_back(at + i);
     }

@@ -37,7 +37,7 @@ class IncrementalSolve {
   IncrementalSolve(CondensedRun& run, double relinearise_above);
 
   /// With the frames that the run has more than before. False, and problem(), where the estimates
-  /// do not settle or a model is not defined: it can go on from a Restart, unless ties().
+  /// do not settle or a model is not defined: it can go on from a Restart, unless ended().
   bool Solve();
   /// At the solution e, with the landmarks that the run has, of all its frames.
   bool Restart(const Eigen::VectorXd& e);
@@ -48,8 +48,9 @@ class IncrementalSolve {
   /// `map`, the landmarks that a filter has: place and covariance. Linear in the frames.
   bool PutMap(std::vector<LandmarkEstimate>& map) const;
   const std::string& problem() const { return problem_; }
-  /// Whether a landmark ties its first camera to those that see it later: there is no going on.
-  bool ties() const { return ties_; }
+  /// Whether there is no going on: a landmark ties its first camera to those that see it later, or
+  /// the prior is so vague that steps forward in time lose digits.
+  bool ended() const { return ended_; }
 
  private:
   using Inverse = CondensedRun::Inverse;
@@ -136,12 +137,14 @@ class IncrementalSolve {
   bool StepTo(std::size_t k);
   void AddMotion(std::size_t k, Eigen::Index p);
   void AddTerm(const Term& term, Eigen::Index p);
+  bool LosesDigits(std::size_t k);
   void PutSigmas(std::size_t k);
   std::optional<std::size_t> SolveRoot();
   std::size_t SolveBack(std::size_t least);
   /// What changes less, in sigma, is not told to the nodes before.
   double Kept() const { return 0.01 * above_; }
   Moved FindMoved(std::size_t from) const;
+  bool IsExact(std::size_t constant, int row) const;
   std::vector<double> ValuesOf(std::size_t k, bool constants) const;
   Eigen::VectorXd InputsOf(std::size_t k) const;
   Eigen::VectorXd InputsOfLandmark(std::size_t i, bool constants) const;
@@ -165,7 +168,7 @@ class IncrementalSolve {
   Eigen::VectorXd right_;             ///< its right side
   Eigen::PartialPivLU<Eigen::MatrixXd> root_;  ///< of the last R_k
   std::string problem_;
-  bool ties_ = false;
+  bool ended_ = false;
 };
 
 }  // namespace alidade::ceres_batch

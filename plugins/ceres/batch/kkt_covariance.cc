@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <limits>
 
 #include "kkt_system.h"
 
@@ -58,6 +59,20 @@ void KktSystem::Invert() {
     }
   }
   inverse_ = ldl_.Inverse(wanted);
+}
+
+double KktSystem::Inexactness() const {
+  const auto read = std::ssize(read_rows_);
+  Eigen::VectorXd squared = Eigen::VectorXd::Zero(read), p = squared;
+  for (const Node& node : nodes_) {
+    if (node.read < 0) continue;
+    const auto own = block_of_.find(KeyOf(node.read, node.read));
+    if (own == block_of_.end()) continue;
+    squared += ldl_.Block(own->second).diagonal().cwiseAbs2();
+    p = p.cwiseMax(Found(node.read, node.read).diagonal());
+  }
+  const Eigen::VectorXd share = squared.cwiseSqrt().cwiseProduct(p);
+  return read == 0 ? 0.0 : std::numeric_limits<double>::epsilon() * share.maxCoeff();
 }
 
 /// The covariance of two variables.

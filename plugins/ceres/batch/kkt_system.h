@@ -90,6 +90,9 @@ class KktSystem {
 
   /// Makes the covariances, for damping 0.
   void Invert();
+  /// By what share, about, rounding may change the variances of what sensors read: they lose what a
+  /// variance has more than the information of all frames, which it cancels in, eps P_ii |H_ii|.
+  double Inexactness() const;
   /// P of frame k.
   Eigen::MatrixXd Covariance(std::size_t k) const;
   /// `map`, the landmarks that a filter has at the end: place and covariance.

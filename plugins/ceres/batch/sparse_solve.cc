@@ -30,6 +30,17 @@ void SparseSolve::NoteNew(Timestamp timestamp, std::string& told,
   told = at_edge_;
 }
 
+void SparseSolve::NoteInexact(Timestamp timestamp, std::vector<Event>& events) const {
+  constexpr double kMost = 0.01;
+  const double share = kkt_.Inexactness();
+  if (!(share > kMost)) return;
+  events.push_back({timestamp, "inexact",
+                    "variances may be wrong by " +
+                        internal::RoundedText(std::min(100.0, 100.0 * share), 1) +
+                        " % and more, by rounding: a prior is very vague of what nothing else "
+                        "tells; a smaller sigma costs fewer digits"});
+}
+
 bool SparseSolve::TooLarge() {
   constexpr double kMostBytes = 16e9, kMostFlops = 1e13;
   if (kkt_.bytes() <= kMostBytes && flops() <= kMostFlops) return false;

@@ -45,6 +45,8 @@ class SparseSolve {
   const std::string& summary() const { return summary_; }
   /// As MapSolve::Note.
   void Note(Timestamp timestamp, std::vector<Event>& events) const;
+  /// The event `inexact`, where rounding leaves little of what the covariances are.
+  void NoteInexact(Timestamp timestamp, std::vector<Event>& events) const;
   /// As Note, of one solve after another: and the event `edge_of_domain` where other landmarks are
   /// held there than in `told`, which becomes those.
   void NoteNew(Timestamp timestamp, std::string& told, std::vector<Event>& events) const;

@@ -206,18 +206,19 @@ std::optional<double> ErrorOf(const ComparedEstimator& one, const std::string& k
   return known && CostOf(one) ? std::optional(found->second.mean) : std::nullopt;
 }
 
-/// Whether no estimator of `among` is both cheaper and more accurate.
+/// Whether no estimator of `among` is both cheaper and as accurate, but for rounding.
 bool IsOnFront(const ComparedEstimator& one, const Estimators& among, const std::string& key) {
   const auto error = ErrorOf(one, key);
   return error && std::ranges::none_of(among, [&](const ComparedEstimator& other) {
            const auto other_error = ErrorOf(other, key);
-           return other_error && *CostOf(other) < *CostOf(one) && *other_error < *error;
+           return other_error && *CostOf(other) < *CostOf(one) &&
+                  *other_error < *error * (1.0 + 1e-9);
          });
 }
 
 /// A figure of cost against accuracy.
 struct CostFigure {
-  std::string name, title;
+  std::string name, title, prefix;  ///< the prefix is that of its columns
   Estimators of;
   std::vector<std::string> kinds;  ///< of errors
 };
@@ -243,10 +244,12 @@ std::vector<std::string> KeysOf(const CostFigure& figure) {
 std::vector<CostFigure> CostFiguresOf(const Estimators& estimators) {
   CostFigure end{"cost",
                  "cost against the error at the end, where all have the same data",
+                 "",
                  estimators,
                  {"final_error:", "map.rmse", "map.sim3.rmse"}};
-  CostFigure online{"cost.online", "cost against the error, online estimators", {}, {"rmse:"}};
-  CostFigure smoothed{"cost.smoothed", "cost against the error, smoothed", {}, {"rmse:"}};
+  CostFigure online{"cost.online", "cost against the error, online estimators", "", {}, {"rmse:"}};
+  CostFigure smoothed{
+      "cost.smoothed", "cost against the error, smoothed", "smoothed.", {}, {"rmse:"}};
   for (const ComparedEstimator& one : estimators) {
     (one.smoothed ? smoothed : online).of.push_back(one);
   }
@@ -260,7 +263,8 @@ void WriteCost(const OutputFolder& folder, const Estimators& estimators,
   std::vector<std::string> header = {"estimator", "cpu_us", "cpu_us.start", "cpu_us.all"};
   for (const CostFigure& figure : figures) {
     for (const std::string& key : KeysOf(figure)) {
-      header.insert(header.end(), {key, "low." + key, "high." + key, "front." + key});
+      const std::string name = figure.prefix + key;
+      header.insert(header.end(), {name, "low." + name, "high." + name, "front." + name});
     }
   }
   CsvFile csv(folder, kCost, header);
@@ -309,6 +313,7 @@ FigureScript ScriptOf(const CostFigure& figure, const Estimators& estimators) {
   script.PanelHeight(230);
   const FigureFile file{kCost, std::ssize(estimators)};
   for (const std::string& key : KeysOf(figure)) {
+    const std::string name = figure.prefix + key;
     std::string title = key;
     std::ranges::replace(title, ':', ' ');
     script.Panel(title + ", mean over the runs and its 95 % interval", LabelOf(estimators, key));
@@ -320,9 +325,9 @@ FigureScript ScriptOf(const CostFigure& figure, const Estimators& estimators) {
       const auto of_row = [&](const std::string& column) {
         return "($0 == " + std::to_string(e) + " ? " + GnuplotColumn(column) + " : NaN)";
       };
-      const std::string x = of_row("cpu_us.all"), y = of_row(key);
+      const std::string x = of_row("cpu_us.all"), y = of_row(name);
       script.Curve(file,
-                   x + ':' + y + ':' + of_row("low." + key) + ':' + of_row("high." + key) +
+                   x + ':' + y + ':' + of_row("low." + name) + ':' + of_row("high." + name) +
                        " with yerrorbars" + StyleOf(e) + " pt 7 ps 0.9",
                    one.name);
       if (!one.values.contains("cpu_us.start")) continue;
@@ -334,9 +339,9 @@ FigureScript ScriptOf(const CostFigure& figure, const Estimators& estimators) {
       script.Curve(file, of_row("cpu_us") + ':' + y + " with points" + StyleOf(e) + " pt 6 ps 0.9",
                    one.name + ", the solve alone");
     }
-    const std::string on_front = "(" + GnuplotColumn("front." + key) + " == 1 ? ";
+    const std::string on_front = "(" + GnuplotColumn("front." + name) + " == 1 ? ";
     script.Curve(file,
-                 on_front + GnuplotColumn("cpu_us.all") + " : NaN):(" + GnuplotColumn(key) +
+                 on_front + GnuplotColumn("cpu_us.all") + " : NaN):(" + GnuplotColumn(name) +
                      ") with points pt 6 ps 2.2 lw 1 lc rgb '#888888'",
                  "none is cheaper and better");
   }

@@ -167,5 +167,58 @@ TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   }
 }
 
+// What is known exactly has no variance, not that of rounding.
+TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
+  System system = testing::DepthFilter();
+  for (Prior& prior : system.priors) {
+    if (system.layout[prior.block].name == "template.inverse_distance") prior.covariance.setZero();
+  }
+  const auto batch = MakeBatch(system, "mode: filtering\n");
+  for (int k = 0; k < 5; ++k) {
+    batch->Process(testing::FrameAt(0.1 * k, {{0, 26.0 / 0.3 + 0.1 * k}, {1, 1.0}}));
+    ASSERT_FALSE(batch->failed());
+    const MatrixXd p = batch->state().covariance().Dense();
+    EXPECT_EQ(p.row(2).norm(), 0.0);
+    EXPECT_GT(p(0, 0), 0.0);
+  }
+}
+
+// Steps forward in time would lose digits: all frames are solved as a whole.
+TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
+  System system = testing::LinearSystem();
+  for (Prior& prior : system.priors) prior.covariance *= 1e10;
+  const auto batch = MakeBatch(system, "mode: incremental\nrelinearise_above: 1e-9\n");
+  const auto dense = MakeBatch(system, "mode: filtering\nsolver: dense\n");
+  std::string said;
+  for (int k = 0; k < 20; ++k) {
+    const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
+    for (const Event& event : batch->Process(frame).events) said += event.kind + ": " + event.text;
+    dense->Process(frame);
+    ASSERT_FALSE(batch->failed() || dense->failed());
+    const MatrixXd p = dense->state().covariance().Dense();
+    for (Eigen::Index i = 0; i < p.rows(); ++i) {
+      const auto v = static_cast<std::size_t>(i);
+      EXPECT_NEAR(batch->state().values()[v], dense->state().values()[v],
+                  1e-6 * std::sqrt(p(i, i)));
+    }
+  }
+  EXPECT_EQ(
+      said,
+      "solved_as_a_whole: the prior is so vague beside what is measured that steps forward in "
+      "time lose digits; so are all frames from here on");
+}
+
+// A batch that is stopped has no map, not that of the filter that it starts from.
+TEST(CeresBatchEnds, AStoppedBatchHasNoMap) {
+  const Problem problem(6, 8);
+  for (const char* solver : {"sparse", "dense"}) {
+    const auto batch = MakeBatch(problem.Filter(), std::string("solver: ") + solver + '\n');
+    batch->StopWhen([] { return true; });
+    for (const Frame& frame : problem.frames) batch->Process(frame);
+    EXPECT_THROW(batch->Smooth([](std::size_t, const State&, const UpdateReport&) {}), Error);
+    EXPECT_TRUE(batch->landmarks().empty()) << solver;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

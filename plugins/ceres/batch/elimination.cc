@@ -14,7 +14,7 @@ constexpr int kMostPivots = 96;      // of a merged front
 constexpr double kMostWider = 1.15;  // border and pivots of the next group over the border
 constexpr double kMostFlops = 1.3;   // of a merged front over those of its two parts
 
-/// Of a front of p pivots and m rows of border, as BlockLdl factorises it: B D^-1 B', D^-1 B', D^-1.
+/// Of a front of p pivots and m rows of border, as Eliminate takes it: B D^-1 B', D^-1 B', D^-1.
 double FlopsOf(double p, double m) { return p * m * m + 2.0 * p * p * m + 2.0 / 3.0 * p * p * p; }
 
 /// The tree of the groups, one front each.

@@ -594,8 +594,8 @@ double LargestShare(const Eigen::VectorXd& by, const Eigen::VectorXd& sigma) {
 
 }  // namespace
 
-/// The solution of the last node. The first node that what changes is a part of; nothing where it is
-/// not finite.
+/// The solution of the last node. The first node that what changes is a part of; nothing where it
+/// is not finite.
 std::optional<std::size_t> IncrementalSolve::SolveRoot() {
   const std::size_t last = nodes_.size() - 1;
   const Node& root = nodes_[last];

@@ -246,8 +246,8 @@ void KktSystem::AddTerms() {
 /// From the last node back, or minimum degree, but for the first node: the one with fewer flops.
 /// From the last node back a landmark comes before the first node that sees it; where two nodes on
 /// end see it alone, which the motion ties in any case, before the second one. Where the first node
-/// comes last a covariance is a sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G'; else that of a vague first
-/// state is the difference of its prior's and one as large.
+/// comes last a covariance is a sum, P_k = Cov(x_k | x_k-1) + G P_k-1 G'; else that of a vague
+/// first state is the difference of its prior's and one as large.
 void KktSystem::ChooseOrder() {
   std::vector<std::vector<int>> before(nodes_.size());  // landmarks
   for (std::size_t i = 0; i < points_.size(); ++i) {

@@ -66,7 +66,11 @@ class Tracks : public Source {
     if (frames_ == options_.most || !NextFrame(frame.timestamp)) return false;
     while (frame_ < options_.start_frame) {
       EmitTracks(nullptr);
-      if (!NextFrame(frame.timestamp)) return false;
+      const std::string last = std::to_string(frame_);
+      if (NextFrame(frame.timestamp)) continue;
+      tracks_->FailLine("the last frame is " + last + ", before start_frame " +
+                            std::to_string(options_.start_frame),
+                        "start_frame at most " + last);
     }
     frame.measurements.clear();
     EmitTracks(&frame);

@@ -151,9 +151,10 @@ bool CondensedRun::Fail(std::string why) const {
 }
 
 bool CondensedRun::FailTooMany() const {
-  return Fail("more than " + std::to_string(most_inputs_) +
-              " noise inputs: the batch solves for all of them at once; a shorter series, or a "
-              "longer time between frames, has fewer");
+  return Fail(
+      "more than " + std::to_string(most_inputs_) +
+      " noise inputs: the batch solves for all of them at once; a shorter series or window, a "
+      "longer time between frames, or landmarks that are pruned have fewer");
 }
 
 /// As Linearised takes them.

@@ -223,7 +223,9 @@ bool SparseSolve::Descend() {
   constexpr double kSettled = 1e-9;              // sigma
   constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
   constexpr double kShort = 1e-3;                // sigma
-  constexpr int kRounded = 20;  // iterations, whose undamped steps are short and get no shorter
+  // Iterations whose undamped steps are short and get no shorter: the end, of those that tell
+  // nothing, and of all.
+  constexpr int kSame = 5, kRounded = 20;
   double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0, shortest = 0.0;
   int longer = 0;
   last_.clear();
@@ -252,7 +254,10 @@ bool SparseSolve::Descend() {
     ++iterations_;
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
       z_ = std::move(next.z);
-      if (mu == 0.0 && (left <= kSettled || (left <= kTells && left > 0.5 * before))) {
+      // Steps that shrink by q leave left q / (1 - q) to go.
+      const double rest = left < before ? left * left / (before - left) : left;
+      if (mu == 0.0 &&
+          ((left <= kSettled && rest <= kTells) || (left <= kTells && longer > kSame))) {
         if (!kkt_.LetGoOfEdge(z_)) return true;
         last_.clear();
       }

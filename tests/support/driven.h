@@ -66,6 +66,48 @@ struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
   }
 };
 
+/// A body driven by an inertial unit, whose biases walk: 15 rows of the tangent.
+///
+///   model      p' = p + v dt,   v' = v + (R(q) (f - b_f + w_f) + g) dt
+///              q' = q Exp((omega - b_omega + w_omega) dt),   b' = b + w_b dt
+///
+///   symbol          shape  unit          frame  meaning
+///   p, v            3      m, m/s        world  position, velocity
+///   q               4      -             -      world_from_body
+///   b_f, b_omega    3      m/s^2, rad/s  body   biases
+///   f, omega        3      m/s^2, rad/s  body   specific force, angular velocity: the control input
+///   w               12     -             -      white, of densities kDensities
+struct Inertial : Motion<12, Vec<3>, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
+  static constexpr std::array kBlocks{
+      Quantity{"position", "m", "", "x,y,z"}, Quantity{"velocity", "m/s", "", "x,y,z"},
+      Quantity{"orientation", "", "", "w,x,y,z"}, Quantity{"force_bias", "m/s^2", "", "x,y,z"},
+      Quantity{"rate_bias", "rad/s", "", "x,y,z"}};
+  using Input = Vec<6>;
+  static constexpr Quantity kInput{"readings", "", "", "fx,fy,fz,wx,wy,wz"};
+  static constexpr double kDensities[4] = {0.02, 0.002, 0.001, 0.0001};  // f, omega, their biases
+  template <class T>
+  void Step(const T* p, const T* v, const T* q, const T* b_f, const T* b_omega, const T* u,
+            const T* w, double dt_s, T* p1, T* v1, T* q1, T* b_f1, T* b_omega1) const {
+    constexpr double kGravity[3] = {0.0, 0.0, -9.81};
+    T force[3], turned[3], turn[3];
+    for (int i = 0; i < 3; ++i) {
+      force[i] = u[i] - b_f[i] + w[i];
+      turn[i] = (u[3 + i] - b_omega[i] + w[3 + i]) * dt_s;
+    }
+    UnitQuaternion::Rotate(q, force, turned);
+    UnitQuaternion::Plus(q, turn, q1);
+    for (int i = 0; i < 3; ++i) {
+      p1[i] = p[i] + v[i] * dt_s;
+      v1[i] = v[i] + (turned[i] + kGravity[i]) * dt_s;
+      b_f1[i] = b_f[i] + w[6 + i] * dt_s;
+      b_omega1[i] = b_omega[i] + w[9 + i] * dt_s;
+    }
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 12; ++i) l(i, i) = dt_s > 0.0 ? kDensities[i / 3] / std::sqrt(dt_s) : 0.0;
+  }
+};
+
 /// z = x + n
 struct Position3 : Sensor<Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position", "", "", "x,y,z"}};

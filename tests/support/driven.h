@@ -75,7 +75,7 @@ struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
 ///   p, v            3      m, m/s        world  position, velocity
 ///   q               4      -             -      world_from_body
 ///   b_f, b_omega    3      m/s^2, rad/s  body   biases
-///   f, omega        3      m/s^2, rad/s  body   specific force, angular velocity: the control input
+///   f, omega        3      m/s^2, rad/s  body   specific force, angular velocity: the input
 ///   w               12     -             -      white, of densities kDensities
 struct Inertial : Motion<12, Vec<3>, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{

@@ -260,6 +260,7 @@ bool SparseSolve::Descend() {
           ((left <= kSettled && rest <= kTells) || (left <= kTells && longer > kSame))) {
         if (!kkt_.LetGoOfEdge(z_)) return true;
         last_.clear();
+        longer = 0;
       }
       const double gain = unseen ? 1.0 : (cost - *next.cost) / predicted;
       mu *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
@@ -276,6 +277,7 @@ bool SparseSolve::Descend() {
       mu = left = 0.0;
       nu = 2.0;
       last_.clear();
+      longer = 0;
     }
     if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
       summary_ = run_.problem();
@@ -287,7 +289,8 @@ bool SparseSolve::Descend() {
 
 /// Of a descent whose next step is `left` sigma long. Whether its end will do.
 bool SparseSolve::EndUnsettled(double left, End end) {
-  constexpr double kLong = 1e-3;  // sigma
+  constexpr double kLong = 1e-3;   // sigma
+  constexpr double kVague = 1e-2;  // as rounding may make steps
   const bool spent = end == End::kSpent;
   const std::string larger =
       "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do";
@@ -302,10 +305,12 @@ bool SparseSolve::EndUnsettled(double left, End end) {
     }
     return kkt_.Linearise(z_, 0.0) && kkt_.Solve();
   }
-  summary_ = spent ? "not converged, the next step is " + internal::RoundedText(left, 3) +
-                         " sigma long; " + larger
-                   : "not converged: no step lowers the cost although the gradient is not zero; "
-                     "check the models' Jacobians with alidade check";
+  summary_ = spent
+                 ? "not converged, the next step is " + internal::RoundedText(left, 3) +
+                       " sigma long; " + larger +
+                       (left <= kVague ? ", or, where a prior is very vague, a smaller sigma" : "")
+                 : "not converged: no step lowers the cost although the gradient is not zero; "
+                   "check the models' Jacobians with alidade check";
   if (undefined_ > 0) {
     summary_ += ". Of " + std::to_string(iterations_) + " steps " + std::to_string(undefined_) +
                 " led to where a model is not defined: " + run_.problem();

@@ -402,9 +402,10 @@ bool IncrementalSolve::Eliminate() {
 bool IncrementalSolve::LosesDigits(std::size_t k) {
   const Node& node = nodes_[k];
   const auto n = std::ssize(rows_), read = std::ssize(read_);
+  if (read == 0) return false;
   const double alpha = node.alpha, most = std::max(1e-6, 0.01 * above_);
   const auto h = node.r.diagonal().head(read), q = node.r.diagonal().segment(n, read);
-  const double share = read == 0 ? 0.0 : h.cwiseProduct(-q).maxCoeff() / (alpha * alpha);
+  const double share = h.cwiseProduct(-q).maxCoeff() / (alpha * alpha);
   if (!(std::numeric_limits<double>::epsilon() * share > most)) return false;
   ended_ = true;
   return !Fail(

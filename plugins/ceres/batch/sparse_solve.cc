@@ -216,18 +216,46 @@ SparseSolve::Trial SparseSolve::NextPoint(double mu, double predicted) {
   return extrapolated ? *std::move(extrapolated) : AfterStep(predicted);
 }
 
+namespace {
+
+/// How long the undamped steps of a descent are, in sigma, and whether they still get shorter.
+struct Lengths {
+  double left = 0.0, before = 1.0;  ///< the last one, and the one before it
+  double shortest = 0.0;
+  int same = 0;  ///< iterations since the shortest
+
+  void Take(double length) {
+    before = left > 0.0 ? left : 1.0;
+    left = length;
+  }
+  /// An iteration. Whether rounding makes the steps: they are short, and for long no shorter.
+  bool Rounded() {
+    constexpr double kShort = 1e-3;
+    constexpr int kMost = 20;
+    if (left > kShort || same == 0 || left < 0.9 * shortest) {
+      shortest = left;
+      same = 0;
+    }
+    return ++same > kMost;
+  }
+  /// Whether what is left tells nothing. Steps that shrink by q leave left q / (1 - q) to go.
+  bool Settled() const {
+    constexpr double kSettled = 1e-9;
+    constexpr int kMost = 5;
+    const double rest = left < before ? left * left / (before - left) : left;
+    return (left <= kSettled && rest <= kTells) || (left <= kTells && same > kMost);
+  }
+};
+
+}  // namespace
+
 /// Levenberg-Marquardt: with the gain ratio g of a step that is taken,
 ///
 ///   mu <- mu max(1/3, 1 - (2 g - 1)^3),   and of one that is not, mu <- mu nu, nu <- 2 nu
 bool SparseSolve::Descend() {
-  constexpr double kSettled = 1e-9;              // sigma
   constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
-  constexpr double kShort = 1e-3;                // sigma
-  // Iterations whose undamped steps are short and get no shorter: the end, of those that tell
-  // nothing, and of all.
-  constexpr int kSame = 5, kRounded = 20;
-  double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0, shortest = 0.0;
-  int longer = 0;
+  double mu = 0.0, nu = 2.0;
+  Lengths lengths;
   last_.clear();
   note_.clear();
   ended_ = "converged";
@@ -239,28 +267,18 @@ bool SparseSolve::Descend() {
     HeedStop();
     const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.decrement());
     const double squared = kkt_.step().squaredNorm();
-    if (mu == 0.0) {
-      before = left > 0.0 ? left : 1.0;
-      left = std::sqrt(decrement);
-    }
+    if (mu == 0.0) lengths.Take(std::sqrt(decrement));
+    if (lengths.Rounded()) return EndUnsettled(lengths.left, End::kRounding);
     const double predicted = 0.5 * (decrement + mu * squared);
     const bool unseen = predicted <= kRounding * (1.0 + cost);
-    if (left > kShort || longer == 0 || left < 0.9 * shortest) {
-      shortest = left;
-      longer = 0;
-    }
-    if (++longer > kRounded) return EndUnsettled(left, End::kRounding);
     Trial next = NextPoint(mu, predicted);
     ++iterations_;
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
       z_ = std::move(next.z);
-      // Steps that shrink by q leave left q / (1 - q) to go.
-      const double rest = left < before ? left * left / (before - left) : left;
-      if (mu == 0.0 &&
-          ((left <= kSettled && rest <= kTells) || (left <= kTells && longer > kSame))) {
+      if (mu == 0.0 && lengths.Settled()) {
         if (!kkt_.LetGoOfEdge(z_)) return true;
         last_.clear();
-        longer = 0;
+        lengths.same = 0;
       }
       const double gain = unseen ? 1.0 : (cost - *next.cost) / predicted;
       mu *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
@@ -274,17 +292,17 @@ bool SparseSolve::Descend() {
       if (!(mu < kMost)) break;
     }
     if (kkt_.HoldAtEdge(z_)) {
-      mu = left = 0.0;
+      mu = 0.0;
       nu = 2.0;
       last_.clear();
-      longer = 0;
+      lengths = {};
     }
     if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
       summary_ = run_.problem();
       return false;
     }
   }
-  return EndUnsettled(left, mu < kMost ? End::kSpent : End::kNoneHelps);
+  return EndUnsettled(lengths.left, mu < kMost ? End::kSpent : End::kNoneHelps);
 }
 
 /// Of a descent whose next step is `left` sigma long. Whether its end will do.

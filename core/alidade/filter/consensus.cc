@@ -75,7 +75,7 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const Eigen::Index n = f.size(), m = own.dof;
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
-  pht = Eigen::Map<const Eigen::MatrixXd>(one.PHt.data(), n, m);
+  f.state.covariance().Project(one.jacobian(), pht.data(), s.data());
   s = Eigen::Map<const Eigen::MatrixXd>(own.s.data(), m, m);
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
   ForEachConsidered(f, std::span(matches_).subspan(hypothesis, 1),

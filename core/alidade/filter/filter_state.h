@@ -55,7 +55,8 @@ struct FilterState {
   } blocks;
   /// Matrices; what takes from it has a Workspace::Use around it.
   Scratch<Workspace> work;
-  Scratch<std::vector<double>> moved;  ///< values on the way to x
+  Scratch<std::vector<double>> moved;            ///< values on the way to x
+  Scratch<std::vector<JacobianRows>> jacobians;  ///< of the rows of an update
 
  private:
   void KeepFirstEstimates();

@@ -201,7 +201,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects
-  if (method->Expect(f, row) != Outcome::kAccepted) return std::nullopt;
+  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
   const Outcome outcome = gate_.Pass(f, row);  // gated: h at the estimate lies far from its mean
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   const Eigen::Index m = row.report->dof;

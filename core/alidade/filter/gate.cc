@@ -38,7 +38,7 @@ Gate::Gate(const System& system, const EkfOptions& options)
 
 Outcome Gate::Pass(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
-  if (!AllFinite(entry.s) || !AllFinite(row.PHt) || !AllFinite(entry.innovation)) {
+  if (!AllFinite(entry.s) || !AllFinite(row.H) || !AllFinite(entry.innovation)) {
     entry.s.clear();
     Note(f, "not_finite",
          "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");

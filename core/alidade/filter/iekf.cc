@@ -31,7 +31,6 @@ class Iterated : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Iterated>(*this); }
   Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  Outcome Expect(FilterState& f, Row& row) override { return linear_.Expect(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
@@ -204,7 +203,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       geometry.PlusJacobian(at[i], dx + offset, j.data());
       ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
     }
-    Linear::Project(f, *row);
+    Linear::TakeS(f, *row);
   }
   return true;
 }

@@ -41,16 +41,7 @@ Trouble Linear::Step(FilterState& f, double dt_s) {
 
 Outcome Linear::Predict(FilterState& f, Row& row) {
   const Outcome outcome = Linearise(f, row);
-  if (outcome == Outcome::kAccepted) Project(f, row);
-  return outcome;
-}
-
-Outcome Linear::Expect(FilterState& f, Row& row) {
-  const Outcome outcome = Linearise(f, row);
-  if (outcome != Outcome::kAccepted) return outcome;
-  row.PHt.clear();
-  row.report->s.assign(row.R.begin(), row.R.end());
-  f.state.covariance().AddProjection(row.jacobian(), row.report->s.data());
+  if (outcome == Outcome::kAccepted) TakeS(f, row);
   return outcome;
 }
 
@@ -122,10 +113,9 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   return outcome;
 }
 
-void Linear::Project(FilterState& f, Row& row) {
-  row.PHt.resize(static_cast<std::size_t>(f.size()) * static_cast<std::size_t>(row.report->dof));
+void Linear::TakeS(const FilterState& f, Row& row) {
   row.report->s.assign(row.R.begin(), row.R.end());
-  f.state.covariance().Project(row.jacobian(), row.PHt.data(), row.report->s.data());
+  f.state.covariance().AddProjection(row.jacobian(), row.report->s.data());
 }
 
 Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx) {
@@ -142,17 +132,18 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
 /// Few states and few rows, in arrays: CorrectLarge takes longer there.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
   constexpr std::size_t kMost = kSmall;
-  std::array<double, kMost * kMost> pht, s, w, gain;
+  std::array<double, kMost * kMost> s, w, gain;
   std::array<double, kMost> innovation, inverse_d, dx;
   const auto n = static_cast<std::size_t>(f.size());
   const int m = static_cast<int>(CountOf(rows));
   const auto all = static_cast<std::size_t>(m);
+  const Workspace::Use use(f.work);
+  const double* const pht = ProjectionOf(f, rows).data();
   std::size_t at = 0;
   for (const Row* row : rows) {
     const MeasurementReport& entry = *row->report;
     const JacobianRows h = row->jacobian();
     const auto k = static_cast<std::size_t>(entry.dof);
-    std::copy(row->PHt.begin(), row->PHt.end(), pht.begin() + at * n);
     std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
@@ -171,8 +162,8 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     at += k;
   }
   const SmallKernels& kernels = SmallKernelsFor(f.size());
-  if (!kernels.solve(m, pht.data(), s.data(), m, innovation.data(), w.data(), inverse_d.data(),
-                     dx.data(), gain.data())) {
+  if (!kernels.solve(m, pht, s.data(), m, innovation.data(), w.data(), inverse_d.data(), dx.data(),
+                     gain.data())) {
     return Outcome::kNotPd;
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.begin());

@@ -15,15 +15,14 @@ class Linear : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Linear>(*this); }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override;
-  Outcome Expect(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override {
     return CorrectBy(f, rows, nullptr);
   }
 
   /// The first part of Predict: h, H, R and the innovation at x.
   Outcome Linearise(FilterState& f, Row& row);
-  /// The second: P H' and S of a row that has H and R.
-  static void Project(FilterState& f, Row& row);
+  /// The second: S = H P H' + R of a row that has H and R.
+  static void TakeS(const FilterState& f, Row& row);
   /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
   Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
 

@@ -23,8 +23,6 @@ class Method {
   /// h, the innovation, R and S of a row by itself, and what Correct needs besides; kAccepted, or
   /// why they cannot be had, which it notes.
   virtual Outcome Predict(FilterState& f, Row& row) = 0;
-  /// Predict without what Correct needs, where that takes less.
-  virtual Outcome Expect(FilterState& f, Row& row) { return Predict(f, row); }
   /// One update with all rows, as Predict left them, R and S weighed since: all of it happens, or
   /// nothing. kAccepted, and the gain is in the reports by RecordGain; or why not, which it notes
   /// but for kNotPd and kNotFinite. A row that is the reason may have an outcome of its own, in its

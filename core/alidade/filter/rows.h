@@ -25,7 +25,6 @@ struct Row {
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
   std::vector<double> H;               ///< H, m rows of the place's width
   std::vector<double> R;               ///< R, m x m, row-major
-  std::vector<double> PHt;             ///< P H', n x m by columns, where the method has an H
   std::vector<const double*> roles;    ///< what fills its roles, as RolesAt last had it
   double weight = 1.0;                 ///< w of the robust loss; R is divided by it
   struct {

@@ -38,7 +38,6 @@ class Taped : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Taped>(*this); }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  Outcome Expect(FilterState& f, Row& row) override { return linear_.Expect(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
   /// From here on is another frame.

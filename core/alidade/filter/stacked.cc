@@ -59,9 +59,9 @@ Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
 
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
   Workspace::Matrix pht = f.work.Take(f.size(), CountOf(rows));
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    std::ranges::copy(row.PHt, pht.col(at).data());
-  });
+  f.jacobians.clear();
+  for (const Row* const row : rows) f.jacobians.push_back(row->jacobian());
+  f.state.covariance().Project(f.jacobians, f.work, pht.data());
   return pht;
 }
 
@@ -76,7 +76,7 @@ Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
 }
 
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
-  constexpr int kColumns = 64, kWidth = 8;  // of P H' that is turned at a time
+  constexpr int kColumns = 64, kWidth = kMostTransposed;  // of P H' turned at a time
   std::array<double, kColumns * kWidth> turned;
   const VectorKernels& kernels = BestVectorKernels();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
@@ -87,12 +87,8 @@ void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Work
         const int width = std::min(kWidth, part.size - first);
         for (Eigen::Index q = 0; q < end; q += kColumns) {
           const Eigen::Index columns = std::min<Eigen::Index>(kColumns, end - q);
-          for (Eigen::Index i = 0; i < columns; ++i) {
-            const double* const from = pht.col(q + i).data() + part.offset + first;
-            for (int c = 0; c < width; ++c) {
-              turned[static_cast<std::size_t>(c * kColumns + i)] = from[c];
-            }
-          }
+          CopyTransposed(width, columns, &pht(part.offset + first, q), pht.rows(), turned.data(),
+                         kColumns);
           kernels.combine(columns, width, h.rows, turned.data(), kColumns,
                           h.data + part.column + first, h.stride, &s(q, at), s.outerStride());
         }

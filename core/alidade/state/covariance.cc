@@ -8,6 +8,44 @@
 #include "alidade/state/vector_kernels.h"
 
 namespace alidade {
+namespace {
+
+/// The part at `next`, which moves on, with those that continue it in the state and in H.
+JacobianPart Joined(std::span<const JacobianPart> parts, std::size_t& next) {
+  JacobianPart part = parts[next++];
+  while (next < parts.size() && parts[next].offset == part.offset + part.size &&
+         parts[next].column == part.column + part.size) {
+    part.size += parts[next++].size;
+  }
+  return part;
+}
+
+bool Same(const JacobianPart& a, const JacobianPart& b) {
+  return a.offset == b.offset && a.size == b.size;
+}
+
+/// The first `end` parts of H that are the same as such a joined one, or all: whether there are any.
+bool Has(const JacobianRows& h, const JacobianPart& part, std::size_t end = ~std::size_t{0}) {
+  for (std::size_t next = 0; next < std::min(end, h.parts.size());) {
+    if (Same(Joined(h.parts, next), part)) return true;
+  }
+  return false;
+}
+
+/// Their columns, added up: J, by rows.
+void TakeColumns(const JacobianRows& h, const JacobianPart& part, double* j) {
+  std::fill_n(j, std::ptrdiff_t{h.rows} * part.size, 0.0);
+  for (std::size_t next = 0; next < h.parts.size();) {
+    const JacobianPart own = Joined(h.parts, next);
+    if (!Same(own, part)) continue;
+    for (int r = 0; r < h.rows; ++r) {
+      const double* const from = h.data + std::ptrdiff_t{r} * h.stride + own.column;
+      for (int c = 0; c < part.size; ++c) j[r * part.size + c] += from[c];
+    }
+  }
+}
+
+}  // namespace
 
 int Covariance::Add(int rows) {
   if (const int gap = TakeGap(rows); gap >= 0) return gap;
@@ -197,6 +235,10 @@ void Covariance::ProjectOutside(const JacobianRows& h, double* hphi) const {
 }
 
 void Covariance::AddProjection(const JacobianRows& h, double* s) const {
+  if (internal::IsSmall(*this) && h.whole && h.rows <= internal::kSmall) {
+    std::array<double, internal::kSmall * internal::kSmall> pht;
+    return Project(h, pht.data(), s);
+  }
   const auto row = [&](int i) { return h.data + static_cast<std::ptrdiff_t>(i) * h.stride; };
   for (const JacobianPart& right : h.parts) {
     for (int c = 0; c < right.size; ++c) {
@@ -216,37 +258,42 @@ void Covariance::AddProjection(const JacobianRows& h, double* s) const {
   }
 }
 
+/// pht += P J' for the columns of P that the part names, J of m rows.
+void Covariance::AddPart(const JacobianPart& part, int m, const double* j, long ldj,
+                         double* pht) const {
+  constexpr int kRows = 64, kColumns = internal::kMostTransposed;  // of P' copied at a time
+  std::array<double, kRows * kColumns> copy;
+  const internal::VectorKernels& kernels = internal::BestVectorKernels();
+  const long ld = p_.rows(), n = size_;
+  const int o = part.offset, end = part.offset + part.size;
+  for (int first = 0; first < part.size; first += kColumns) {
+    const int count = std::min(kColumns, part.size - first), diagonal = o + first;
+    // What P has in rows [diagonal, ...) left of and on its diagonal block.
+    for (int at = 0; at < end; at += kRows) {
+      const int rows = std::min(kRows, end - at);
+      const int left = std::clamp(diagonal - at, 0, rows);
+      internal::CopyTransposed(count, left, p_.data() + at * ld + diagonal, ld, copy.data(), kRows);
+      for (int i = left; i < rows; ++i) {
+        for (int c = 0; c < count; ++c) {
+          copy[static_cast<std::size_t>(c * kRows + i)] =
+              p_(std::max(at + i, diagonal + c), std::min(at + i, diagonal + c));
+        }
+      }
+      kernels.combine(rows, count, m, copy.data(), kRows, j + first, ldj, pht + at, n);
+    }
+  }
+  kernels.combine(n - end, part.size, m, p_.data() + end + o * ld, ld, j, ldj, pht + end, n);
+}
+
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
   if (internal::IsSmall(*this) && h.whole) {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
   }
-  constexpr int kRows = 64, kColumns = 8;  // of P' that is copied at a time
-  std::array<double, kRows * kColumns> copy;
-  const internal::VectorKernels& kernels = internal::BestVectorKernels();
-  const long ld = p_.rows(), n = size_;
+  const long n = size_;
   std::fill_n(pht, n * h.rows, 0.0);
   for (const JacobianPart& part : h.parts) {
-    const int o = part.offset, end = part.offset + part.size;
-    for (int first = 0; first < part.size; first += kColumns) {
-      const int count = std::min(kColumns, part.size - first);
-      const double* const j = h.data + part.column + first;
-      // What P has in rows [o + first, ...) left of and on its diagonal block.
-      for (int at = 0; at < end; at += kRows) {
-        const int rows = std::min(kRows, end - at);
-        for (int i = 0; i < rows; ++i) {
-          const int column = at + i;
-          const double* const below = p_.data() + column * ld + o + first;
-          for (int c = 0; c < count; ++c) {
-            copy[static_cast<std::size_t>(c) * kRows + static_cast<std::size_t>(i)] =
-                column <= o + first + c ? below[c] : p_(column, o + first + c);
-          }
-        }
-        kernels.combine(rows, count, h.rows, copy.data(), kRows, j, h.stride, pht + at, n);
-      }
-    }
-    kernels.combine(n - end, part.size, h.rows, p_.data() + end + o * ld, ld, h.data + part.column,
-                    h.stride, pht + end, n);
+    AddPart(part, h.rows, h.data + part.column, h.stride, pht);
   }
   for (int i = 0; i < h.rows; ++i) {
     for (int k = 0; k < h.rows; ++k) {
@@ -257,6 +304,42 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
       }
       s[i * h.rows + k] += sum;
     }
+  }
+}
+
+void Covariance::Project(std::span<const JacobianRows> rows, Workspace& work, double* pht) const {
+  const Workspace::Use use(work);
+  const long n = size_;
+  long m = 0, most = 0, widest = 0;
+  for (const JacobianRows& h : rows) {
+    m += h.rows;
+    most = std::max<long>(most, h.rows);
+    widest = std::max<long>(widest, h.stride);
+  }
+  if (internal::IsSmall(*this)) {
+    Workspace::Vector s = work.Take(most * most);
+    for (const JacobianRows& h : rows) {
+      Project(h, pht, s.data());
+      pht += n * h.rows;
+    }
+    return;
+  }
+  std::fill_n(pht, n * m, 0.0);
+  Workspace::Vector stacked = work.Take(m * widest);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t next = 0; next < rows[i].parts.size();) {
+      const std::size_t first = next;
+      const JacobianPart part = Joined(rows[i].parts, next);
+      const bool done = Has(rows[i], part, first) || (i > 0 && Has(rows[i - 1], part));
+      if (done) continue;
+      int count = 0;
+      for (std::size_t k = i; k < rows.size() && Has(rows[k], part); ++k) {
+        TakeColumns(rows[k], part, stacked.data() + std::ptrdiff_t{count} * part.size);
+        count += rows[k].rows;
+      }
+      AddPart(part, count, stacked.data(), part.size, pht);
+    }
+    pht += n * rows[i].rows;
   }
 }
 

@@ -283,6 +283,14 @@ ALIDADE_KERNELS(Avx512, Avx512Loops, "AVX-512", [[gnu::target("avx512f,avx2,fma"
 #endif
 #undef ALIDADE_KERNELS
 
+template <int kRowsOfAll>
+void CopyTransposedRows(long columns, const double* from, long ld, double* to, long ldt) {
+  for (long j = 0; j < columns; ++j) {
+#pragma GCC unroll 8
+    for (int i = 0; i < kRowsOfAll; ++i) to[j + i * ldt] = from[i + j * ld];
+  }
+}
+
 std::vector<VectorKernels> FindKernels() {
   std::vector<VectorKernels> found = {Baseline::kTable};
 #if defined(__x86_64__)
@@ -295,6 +303,14 @@ std::vector<VectorKernels> FindKernels() {
 }
 
 }  // namespace
+
+void CopyTransposed(int rows, long columns, const double* from, long ld, double* to, long ldt) {
+  static_assert(kMostTransposed == 8);
+  constexpr decltype(&CopyTransposedRows<1>) kCopies[] = {
+      CopyTransposedRows<1>, CopyTransposedRows<2>, CopyTransposedRows<3>, CopyTransposedRows<4>,
+      CopyTransposedRows<5>, CopyTransposedRows<6>, CopyTransposedRows<7>, CopyTransposedRows<8>};
+  if (rows > 0) kCopies[rows - 1](columns, from, ld, to, ldt);
+}
 
 std::span<const VectorKernels> AllVectorKernels() {
   static const std::vector<VectorKernels> all = FindKernels();

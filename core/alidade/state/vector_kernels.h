@@ -27,6 +27,10 @@ struct VectorKernels {
                   double* y, long ldy);
 };
 
+/// to(j, i) = from(i, j) of at most kMostTransposed rows, both by columns.
+constexpr int kMostTransposed = 8;
+void CopyTransposed(int rows, long columns, const double* from, long ld, double* to, long ldt);
+
 /// Those that this processor runs, the fastest last.
 std::span<const VectorKernels> AllVectorKernels();
 /// The fastest, or those that the environment variable ALIDADE_KERNELS names. Error kUsage where it

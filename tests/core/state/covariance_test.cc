@@ -66,6 +66,41 @@ TEST(Covariance, ProjectEqualsTheDenseProduct) {
   EXPECT_LT((added - Eigen::MatrixXd::Identity(2, 2) - s).norm(), kRounding * pht.norm());
 }
 
+TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
+  // Two blocks one after the other in P and in H, one that rows share, and one of a row's own; the
+  // last row has one block twice.
+  using Parts = std::vector<JacobianPart>;
+  const std::vector<std::pair<int, Parts>> rows = {
+      {2, {{0, 3, 0}, {3, 4, 3}, {20, 9, 7}}},
+      {1, {{0, 3, 0}, {3, 4, 3}, {9, 2, 7}}},
+      {2, {{3, 4, 0}, {20, 9, 4}}},
+      {3, {{0, 3, 0}, {3, 4, 3}}},
+      {1, {{30, 70, 0}, {3, 4, 70}, {3, 4, 75}, {20, 9, 80}}},
+  };
+  for (const std::vector<int>& blocks : {std::vector{3, 4, 2, 11, 9, 1, 70}, {100, 41}}) {
+    Random random(4);
+    const Covariance p = Make(blocks, random);
+    std::vector<RowMajor> data;
+    std::vector<JacobianRows> all;
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(9, p.size());
+    int at = 0;
+    for (const auto& [count, parts] : rows) data.push_back(RandomMatrix(count, 90, random));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto& [count, parts] = rows[i];
+      all.push_back({data[i].data(), count, 90, parts});
+      for (const JacobianPart& part : parts) {
+        dense.block(at, part.offset, count, part.size) +=
+            data[i].middleCols(part.column, part.size);
+      }
+      at += count;
+    }
+    Workspace work;
+    Eigen::MatrixXd pht(p.size(), 9);
+    p.Project(all, work, pht.data());
+    EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kRounding * pht.norm());
+  }
+}
+
 TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
   Random random(3);
   Covariance p = Make({2, 3, 1, 2}, random);

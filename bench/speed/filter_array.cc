@@ -111,7 +111,7 @@ int Main(int rounds, int count) {
   all.push_back(Enter("StaticEkf, one by one", std::make_shared<OneByOne>(count, targets), targets,
                       count, expected));
   std::vector<int> widths;
-  for (const int lanes : {2, 4, 8}) {
+  for (const int lanes : {2, 4, 16}) {
     if (!internal::HasLanes(lanes)) continue;
     const std::string name = "StaticEkfArray, " + std::to_string(lanes) + " lanes";
     std::vector<double> depths;

@@ -8,12 +8,19 @@
 //   mrpt      mrpt::bayes::CKalmanFilterCapable, where it is installed, to 300 landmarks
 //   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
 //             P = (I - K H) P
+//   joseph    the same with P = (I - K H) P (I - K H)' + K R K'
+//   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, where it is installed; none
+//             of what else there is to a frame. OPENBLAS_CORETYPE tells it a processor that it does
+//             not know.
+//
+// Then the exponents of time over states: of a step, of a frame that measures 20 landmarks, and of
+// dropping a landmark and initialising another.
 //
 // Then, with `covariance: compressed`, frames that measure 20 of N landmarks, of which so many
 // change from one to the next, beside frames of the full covariance; to catch up is part of
 // the mean.
 //
-//   bench_slam [--size N/observed ...] [--no-compressed]
+//   bench_slam [--size N/observed ...] [--no-compressed] [--no-exponents]
 #include <CLI/CLI.hpp>
 #include <Eigen/Cholesky>
 #include <array>
@@ -35,6 +42,17 @@
 #include "bench/speed/interleaved.h"
 #include "bench/speed/slam_peer.h"
 #include "support/temporary_folder.h"
+
+#ifdef ALIDADE_BENCH_OPENBLAS
+extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
+            const int* n, const double* alpha, const double* a, const int* lda, double* b,
+            const int* ldb);
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+}
+#endif
 
 namespace alidade::bench {
 namespace {
@@ -80,13 +98,16 @@ class Slam {
   }
 
   void operator()() { Take(observed_); }
+  void Step() { filter_->Push(NextTime(), {}); }
   long size() const { return filter_->state().covariance().size(); }
   bool used_all() const { return used_ == taken_; }
   const Filter& filter() const { return *filter_; }
 
  private:
+  Timestamp NextTime() { return TimestampFromSeconds(count_++ / 30.0); }
   void Take(int count) {
-    const double t = count_++ / 30.0;
+    const Timestamp at = NextTime();
+    const double t = Seconds(at);
     const double x = 0.2 * std::sin(t), y = 0.1 * std::sin(1.3 * t);
     const long first = std::lround(std::floor(others_ * count_));
     std::vector<Reading> readings;
@@ -97,7 +118,7 @@ class Slam {
                           {320.0 + 525.0 * (p[0] - x) / p[2], 240.0 + 525.0 * (p[1] - y) / p[2]},
                           static_cast<std::int64_t>(i)});
     }
-    const UpdateReport& report = filter_->Push(TimestampFromSeconds(t), readings);
+    const UpdateReport& report = filter_->Push(at, readings);
     for (const MeasurementReport& entry : report.measurements()) {
       taken_ += 1;
       used_ += entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised;
@@ -156,17 +177,82 @@ Peak PeakOf(const std::string& kernels) {
 }
 
 /// The update as books write it.
-struct Textbook {
+struct Dense {
   Eigen::MatrixXd p, h, r;
-  Textbook(long n, long m)
+  Dense(long n, long m)
       : p(Eigen::MatrixXd::Identity(n, n)),
         h(1e-3 * Eigen::MatrixXd::Random(m, n)),
         r(Eigen::MatrixXd::Identity(m, m)) {}
-  void operator()() {
+  Eigen::MatrixXd Gain() const {
     const Eigen::MatrixXd s = h * p * h.transpose() + r;
-    const Eigen::MatrixXd k = s.llt().solve(h * p).transpose();
+    return s.llt().solve(h * p).transpose();
+  }
+  void Textbook() {
+    const Eigen::MatrixXd k = Gain();
     p = (Eigen::MatrixXd::Identity(p.rows(), p.rows()) - k * h) * p;
   }
+  void Joseph() {
+    const Eigen::MatrixXd k = Gain();
+    const Eigen::MatrixXd a = Eigen::MatrixXd::Identity(p.rows(), p.rows()) - k * h;
+    p = a * p * a.transpose() + k * r * k.transpose();
+  }
+};
+
+#ifdef ALIDADE_BENCH_OPENBLAS
+/// Of an update by m rows of n states: the factor, the division and the product.
+struct OpenBlas {
+  Eigen::MatrixXd p, pht, s, w, l;
+  OpenBlas(long n, long m)
+      : p(Eigen::MatrixXd::Identity(n, n)),
+        pht(1e-3 * Eigen::MatrixXd::Random(n, m)),
+        s(Eigen::MatrixXd::Identity(m, m)) {}
+  void operator()() {
+    w = pht;
+    l = s;
+    const auto n = static_cast<int>(w.rows()), m = static_cast<int>(w.cols());
+    int info = 0;
+    dpotrf_("L", &m, l.data(), &m, &info);
+    const double one = 1.0, minus = -1.0;
+    dtrsm_("R", "L", "T", "N", &n, &m, &one, l.data(), &m, w.data(), &n);
+    dsyrk_("L", "N", &n, &m, &minus, w.data(), &n, &one, p.data(), &n);
+  }
+};
+#endif
+
+/// A camera and N landmarks, of which one is dropped and another initialised, in turn.
+class Exchange {
+ public:
+  explicit Exchange(int landmarks) : landmarks_(static_cast<std::size_t>(landmarks)) {
+    const Space camera{"camera", "", "", {}, Geometry::Vector(kCamera)};
+    camera_ = state_.Declare("cam.camera", "cam", camera);
+    const std::vector<double> x(kCamera);
+    state_.Add(camera_, x.data(), Eigen::MatrixXd::Identity(kCamera, kCamera));
+    for (BlockId& landmark : landmarks_) landmark = Initialise();
+  }
+  void operator()() {
+    BlockId& landmark = landmarks_[next_++ % landmarks_.size()];
+    state_.Drop(landmark);
+    landmark = Initialise();
+  }
+  long size() const { return state_.covariance().size(); }
+
+ private:
+  static constexpr int kCamera = 12, kLandmark = 6;
+  BlockId Initialise() {
+    const BlockId id = state_.Declare("landmarks." + std::to_string(names_++), "landmarks", space_);
+    state_.Initialise({&id, 1}, value_.data(), {&camera_, 1}, jacobian_, own_);
+    return id;
+  }
+
+  State state_;
+  BlockId camera_ = -1;
+  std::vector<BlockId> landmarks_;
+  std::size_t next_ = 0;
+  long names_ = 0;
+  const Space space_{"landmark", "", "", {}, Geometry::Vector(kLandmark)};
+  const std::array<double, kLandmark> value_{};
+  const RowMajor jacobian_ = RowMajor::Random(kLandmark, kCamera);
+  const Eigen::MatrixXd own_ = Eigen::MatrixXd::Identity(kLandmark, kLandmark);
 };
 
 double Mean(const Contender& one) {
@@ -212,6 +298,45 @@ void CompareCompressed(const PluginHost& host, const Config& config, const Confi
   }
 }
 
+/// The slope of log(time) over log(states), by least squares.
+void PrintExponent(const char* name, const std::vector<long>& states,
+                   const std::vector<Contender>& contenders) {
+  const auto count = static_cast<double>(states.size());
+  double sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const double x = std::log(static_cast<double>(states[i]));
+    const double y = std::log(contenders[i].Quantile(0.01));
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
+  }
+  std::printf("ratio exponent/%s %.2f\n", name, (count * sxy - sx * sy) / (count * sxx - sx * sx));
+}
+
+void CompareSizes(const PluginHost& host, const Config& config, int rounds) {
+  constexpr int kSizes[] = {100, 200, 400, 1000}, kObserved = 20;
+  std::vector<std::unique_ptr<Slam>> slams;
+  std::vector<std::unique_ptr<Exchange>> exchanges;
+  std::vector<Contender> step, frame, exchange;
+  std::vector<long> states;
+  for (const int size : kSizes) {
+    Slam* const slam =
+        slams.emplace_back(std::make_unique<Slam>(host, config, size, kObserved, kObserved)).get();
+    Exchange* const one = exchanges.emplace_back(std::make_unique<Exchange>(size)).get();
+    states.push_back(slam->size());
+    step.push_back({"step", [slam] { slam->Step(); }, 1.0, {}});
+    frame.push_back({"frame", [slam] { (*slam)(); }, 1.0, {}});
+    exchange.push_back({"exchange", [one] { (*one)(); }, 1.0, {}});
+  }
+  Interleave(step, 10 * rounds);
+  Interleave(frame, rounds);
+  Interleave(exchange, 10 * rounds);
+  PrintExponent("step", states, step);
+  PrintExponent("frame_20", states, frame);
+  PrintExponent("exchange", states, exchange);
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("A frame of an EKF at the size of SLAM, relative to the peak of the processor");
   int rounds = 15;
@@ -226,6 +351,8 @@ int Main(int argc, char** argv) {
   app.add_flag("--compressed,!--no-compressed", compressed, "the compressed covariance too");
   app.add_option("--frames", frames, "of the compressed covariance")->capture_default_str();
   app.add_flag("--peers,!--no-peers", peers, "the dense update and other libraries too");
+  bool exponents = true;
+  app.add_flag("--exponents,!--no-exponents", exponents, "of time over states too");
   CLI11_PARSE(app, argc, argv);
 
   const testing::TemporaryFolder temporary;
@@ -253,12 +380,20 @@ int Main(int argc, char** argv) {
     volatile double sink = 0.0;
     std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
                                          {"frame", [&] { slam(); }, 1.0, {}}};
-    const bool dense = peers && n < 3000;
-    std::unique_ptr<Textbook> book;
-    if (dense) {
-      book = std::make_unique<Textbook>(n, m);
-      contenders.push_back({"textbook", [&] { (*book)(); }, 1.0, {}});
+    std::unique_ptr<Dense> book, joseph;
+    if (peers && n < 3000) {
+      book = std::make_unique<Dense>(n, m);
+      contenders.push_back({"textbook", [&] { book->Textbook(); }, 1.0, {}});
+      joseph = std::make_unique<Dense>(n, m);
+      contenders.push_back({"joseph", [&] { joseph->Joseph(); }, 1.0, {}});
     }
+#ifdef ALIDADE_BENCH_OPENBLAS
+    std::unique_ptr<OpenBlas> openblas;
+    if (peers) {
+      openblas = std::make_unique<OpenBlas>(n, m);
+      contenders.push_back({"openblas", [&] { (*openblas)(); }, 1.0, {}});
+    }
+#endif
 #ifdef ALIDADE_BENCH_MRPT
     std::unique_ptr<SlamPeer> mrpt;
     if (peers && n < 3000) {
@@ -277,6 +412,7 @@ int Main(int argc, char** argv) {
       PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
     }
   }
+  if (exponents) CompareSizes(host, config, rounds);
   if (compressed) {
     Config of_compressed = load();
     of_compressed.Set("estimators.ekf.covariance", "compressed", "");

@@ -218,10 +218,10 @@ void LaneStep<S, Motions...>::NoiseOf(const Model& model, double dt_s,
   } else {  // lane by lane
     for (int lane = 0; lane < S::kCount; ++lane) {
       double one[n_w * n_w + 1] = {}, own[kAmbient];
-      For<kAmbient>([&](auto i) { own[i] = s_.x[i].v[lane]; });
+      For<kAmbient>([&](auto i) { own[i] = s_.x[i].lane(lane); });
       const double* const x[] = {own + Offset(first + static_cast<int>(I))...};
       detail::CallSqrtQ(model, x, dt_s, {one, n_w}, indices);
-      For<n_w * n_w>([&](auto i) { l[i].v[lane] = one[i]; });
+      For<n_w * n_w>([&](auto i) { l[i].SetLane(lane, one[i]); });
     }
   }
 }

@@ -25,81 +25,117 @@ void For(const F& f) {
 inline constinit thread_local bool lanes_differ = false;
 
 /// Vectors of the compiler.
-template <int kLanes>
+template <int kWidth>
 struct VectorsOf;
-#define ALIDADE_VECTORS_OF(LANES)                                        \
+#define ALIDADE_VECTORS_OF(WIDTH)                                        \
   template <>                                                            \
-  struct VectorsOf<LANES> {                                              \
-    typedef double Numbers __attribute__((vector_size(LANES * 8)));      \
-    typedef std::int64_t Truths __attribute__((vector_size(LANES * 8))); \
-    typedef std::int8_t Bytes __attribute__((vector_size(LANES)));       \
+  struct VectorsOf<WIDTH> {                                              \
+    typedef double Numbers __attribute__((vector_size(WIDTH * 8)));      \
+    typedef std::int64_t Truths __attribute__((vector_size(WIDTH * 8))); \
+    typedef std::int8_t Bytes __attribute__((vector_size(WIDTH)));       \
   };
 ALIDADE_VECTORS_OF(2)
 ALIDADE_VECTORS_OF(4)
 ALIDADE_VECTORS_OF(8)
 #undef ALIDADE_VECTORS_OF
 
+/// Lanes are kParts vectors of kWidth: two vectors side by side, of which neither waits for the
+/// other, keep a processor busy that one would leave waiting for its last result.
+template <int kLanes>
+struct Parts {
+  static constexpr int kWidth = kLanes < 8 ? kLanes : 8, kParts = kLanes / kWidth;
+  using Vectors = VectorsOf<kWidth>;
+};
+
 /// A comparison of packs, lane by lane; for Select and AllOf alone. What is combined of several is
 /// a number, 1 for true and 0 for false: of masks AVX-512 has another kind than the others, and
 /// the compiler would take them apart.
 template <int kLanes>
-struct PackMask {
-  typename VectorsOf<kLanes>::Truths v;  ///< -1: true, 0: false
+struct PackMask : Parts<kLanes> {
+  using Base = Parts<kLanes>;
+  typename Base::Vectors::Truths v[Base::kParts];  ///< -1: true, 0: false
 
-  explicit PackMask(const typename VectorsOf<kLanes>::Truths& lanes) : v(lanes) {}
+  PackMask() = default;
   // Not trivial: else packs would go from function to function in registers, of which each
   // instruction set has others.
-  PackMask(const PackMask& other) : v(other.v) {}
-  /// The lanes' bytes side by side.
-  std::uint64_t Bytes() const {
-    using Byte = typename VectorsOf<kLanes>::Bytes;
-    const Byte bytes = __builtin_convertvector(v, Byte);
+  PackMask(const PackMask& other) {
+    For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
+  }
+  /// The bytes of one part's lanes side by side.
+  std::uint64_t Bytes(int part) const {
+    using Byte = typename Base::Vectors::Bytes;
+    const Byte bytes = __builtin_convertvector(v[part], Byte);
     std::uint64_t bits = 0;
-    std::memcpy(&bits, &bytes, kLanes);
+    std::memcpy(&bits, &bytes, Base::kWidth);
     return bits;
   }
 };
 template <int kLanes>
 bool Any(const PackMask<kLanes>& mask) {
-  return mask.Bytes() != 0;
+  std::uint64_t any = 0;
+  For<Parts<kLanes>::kParts>([&](auto k) { any |= mask.Bytes(k); });
+  return any != 0;
 }
 
 /// kLanes numbers, an element of as many filters. Arithmetic is lane by lane. A comparison is a
 /// bool: that of every lane where they agree, else that of lane 0, and `lanes_differ` is set.
 template <int kLanes>
-struct Pack {
-  using Vector = typename VectorsOf<kLanes>::Numbers;
+struct Pack : Parts<kLanes> {
+  using Base = Parts<kLanes>;
+  using Vector = typename Base::Vectors::Numbers;
+  using Truths = typename Base::Vectors::Truths;
   using Mask = PackMask<kLanes>;
   static constexpr int kCount = kLanes;
-  Vector v;
+  Vector v[Base::kParts];
 
   Pack() = default;
   Pack(double all) {  // NOLINT(google-explicit-constructor): as double has it
     const Vector zero = {};
-    v = zero + all;  // a sum: a mere copy is made number by number
+    ForParts([&](auto k) { v[k] = zero + all; });  // a sum: a mere copy is made number by number
   }
-  explicit Pack(const Vector& lanes) : v(lanes) {}
-  Pack(const Pack& other) : v(other.v) {}  // not trivial, for the reason of PackMask
-  Pack& operator=(const Pack& other) {
-    v = other.v;
+  Pack(const Pack& other) {  // not trivial, for the reason of PackMask
+    ForParts([&](auto k) { v[k] = other.v[k]; });
+  }
+  Pack& operator=(const Pack& other) {  // NOLINT(bugprone-unhandled-self-assignment): numbers
+    ForParts([&](auto k) { v[k] = other.v[k]; });
     return *this;
   }
+  double lane(int i) const { return v[i / Base::kWidth][i % Base::kWidth]; }
+  void SetLane(int i, double value) { v[i / Base::kWidth][i % Base::kWidth] = value; }
 
-  friend Pack operator+(const Pack& a, const Pack& b) { return Pack(a.v + b.v); }
-  friend Pack operator-(const Pack& a, const Pack& b) { return Pack(a.v - b.v); }
-  friend Pack operator*(const Pack& a, const Pack& b) { return Pack(a.v * b.v); }
-  friend Pack operator/(const Pack& a, const Pack& b) { return Pack(a.v / b.v); }
-  friend Pack operator-(const Pack& a) { return Pack(-a.v); }
+  friend Pack operator+(const Pack& a, const Pack& b) {
+    return Each([&](auto k, Vector& to) { to = a.v[k] + b.v[k]; });
+  }
+  friend Pack operator-(const Pack& a, const Pack& b) {
+    return Each([&](auto k, Vector& to) { to = a.v[k] - b.v[k]; });
+  }
+  friend Pack operator*(const Pack& a, const Pack& b) {
+    return Each([&](auto k, Vector& to) { to = a.v[k] * b.v[k]; });
+  }
+  friend Pack operator/(const Pack& a, const Pack& b) {
+    return Each([&](auto k, Vector& to) { to = a.v[k] / b.v[k]; });
+  }
+  friend Pack operator-(const Pack& a) {
+    return Each([&](auto k, Vector& to) { to = -a.v[k]; });
+  }
   friend Pack operator+(const Pack& a) { return a; }
   Pack& operator+=(const Pack& other) { return *this = *this + other; }
   Pack& operator-=(const Pack& other) { return *this = *this - other; }
   Pack& operator*=(const Pack& other) { return *this = *this * other; }
   Pack& operator/=(const Pack& other) { return *this = *this / other; }
 
-  friend Mask Less(const Pack& a, const Pack& b) { return Mask(a.v < b.v); }
-  friend Mask LessEqual(const Pack& a, const Pack& b) { return Mask(a.v <= b.v); }
-  friend Mask NotEqual(const Pack& a, const Pack& b) { return Mask(a.v != b.v); }
-  friend Mask Equal(const Pack& a, const Pack& b) { return Mask(a.v == b.v); }
+  friend Mask Less(const Pack& a, const Pack& b) {
+    return Compare([&](auto k, Truths& to) { to = a.v[k] < b.v[k]; });
+  }
+  friend Mask LessEqual(const Pack& a, const Pack& b) {
+    return Compare([&](auto k, Truths& to) { to = a.v[k] <= b.v[k]; });
+  }
+  friend Mask NotEqual(const Pack& a, const Pack& b) {
+    return Compare([&](auto k, Truths& to) { to = a.v[k] != b.v[k]; });
+  }
+  friend Mask Equal(const Pack& a, const Pack& b) {
+    return Compare([&](auto k, Truths& to) { to = a.v[k] == b.v[k]; });
+  }
   friend bool operator<(const Pack& a, const Pack& b) { return Agreed(Less(a, b)); }
   friend bool operator>(const Pack& a, const Pack& b) { return Agreed(Less(b, a)); }
   friend bool operator<=(const Pack& a, const Pack& b) { return Agreed(LessEqual(a, b)); }
@@ -108,27 +144,50 @@ struct Pack {
   friend bool operator!=(const Pack& a, const Pack& b) { return !(a == b); }
 
  private:
+  template <class F>
+  static void ForParts(const F& f) {
+    For<Base::kParts>(f);
+  }
+  template <class F>
+  static Pack Each(const F& f) {
+    Pack result;
+    ForParts([&](auto k) { f(k, result.v[k]); });
+    return result;
+  }
+  template <class F>
+  static Mask Compare(const F& f) {
+    Mask result;
+    ForParts([&](auto k) { f(k, result.v[k]); });
+    return result;
+  }
   static bool Agreed(const Mask& mask) {
-    constexpr std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * kLanes);
-    const std::uint64_t bytes = mask.Bytes();
-    if (__builtin_expect(bytes == all, 1)) return true;
-    if (bytes == 0) return false;
+    constexpr std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * Base::kWidth);
+    std::uint64_t every = all, any = 0;
+    ForParts([&](auto k) {
+      const std::uint64_t bytes = mask.Bytes(k);
+      every &= bytes;
+      any |= bytes;
+    });
+    if (__builtin_expect(every == all, 1)) return true;
+    if (any == 0) return false;
     lanes_differ = true;
-    return (bytes & 1) != 0;
+    return (mask.Bytes(0) & 1) != 0;
   }
 };
 
 inline double Select(bool mask, double a, double b) { return mask ? a : b; }
 template <int kLanes>
 Pack<kLanes> Select(const PackMask<kLanes>& mask, const Pack<kLanes>& a, const Pack<kLanes>& b) {
-  return Pack<kLanes>(mask.v ? a.v : b.v);
+  Pack<kLanes> result;
+  For<Parts<kLanes>::kParts>([&](auto k) { result.v[k] = mask.v[k] ? a.v[k] : b.v[k]; });
+  return result;
 }
 
 /// f of each lane.
 template <int kLanes, class F>
 Pack<kLanes> Map(const Pack<kLanes>& a, const F& f) {
   Pack<kLanes> result;
-  for (int i = 0; i < kLanes; ++i) result.v[i] = f(a.v[i]);
+  for (int i = 0; i < kLanes; ++i) result.SetLane(i, f(a.lane(i)));
   return result;
 }
 #define ALIDADE_PACK_FUNCTION(NAME)                           \
@@ -158,7 +217,7 @@ Pack<kLanes> abs(const Pack<kLanes>& a) {
 template <int kLanes>
 Pack<kLanes> atan2(const Pack<kLanes>& y, const Pack<kLanes>& x) {
   Pack<kLanes> result;
-  for (int i = 0; i < kLanes; ++i) result.v[i] = std::atan2(y.v[i], x.v[i]);
+  for (int i = 0; i < kLanes; ++i) result.SetLane(i, std::atan2(y.lane(i), x.lane(i)));
   return result;
 }
 

@@ -8,7 +8,7 @@ namespace alidade::internal {
 namespace {
 
 /// Of the kernels, the slowest first.
-constexpr int kLaneCounts[] = {2, 4, 8};
+constexpr int kLaneCounts[] = {2, 4, 16};
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "alidade/base/error.h"
@@ -12,14 +13,14 @@
 namespace alidade {
 
 namespace internal {
-/// Lanes of the packs that BestVectorKernels has: 2, 4 or 8.
+/// Lanes of the packs that BestVectorKernels has: 2, 4 or 16.
 int BestLanes();
 /// Whether the processor runs packs of so many.
 bool HasLanes(int lanes);
 }  // namespace internal
 
 /// Many filters of one layout, each a StaticEkf<Motions...> of its own: one for each target. As a
-/// structure of arrays they are stepped 2, 4 or 8 at a time, by the instruction set that the
+/// structure of arrays they are stepped 2, 4 or 16 at a time, by the instruction set that the
 /// processor has (or the environment variable ALIDADE_KERNELS names).
 ///
 ///   symbol     shape              meaning
@@ -54,7 +55,7 @@ class StaticEkfArray {
         statuses_(tiles_.size() * kTile, Status::kOk) {}
 
   int size() const { return count_; }
-  /// Of the packs: 2 (SSE2), 4 (AVX2) or 8 (AVX-512), as many as the processor runs.
+  /// Of the packs: 2 (SSE2), 4 (AVX2) or 16 (AVX-512), as many as the processor runs.
   int lanes() const { return lanes_; }
   void set_lanes(int lanes) {
     ALIDADE_EXPECTS(internal::HasLanes(lanes));
@@ -118,7 +119,7 @@ class StaticEkfArray {
   }
 
  private:
-  static constexpr int kTile = 8;
+  static constexpr int kTile = 16;
   using Lanes = internal::LaneStep<double, Motions...>;
   template <class S>
   using State = internal::LaneState<S, Motions...>;
@@ -171,7 +172,7 @@ class StaticEkfArray {
       refused_ = 0;
     }
 #if defined(__x86_64__)
-    if (lanes_ == 8) {
+    if (lanes_ == 16) {
       RunAvx512(work);
     } else if (lanes_ == 4) {
       RunAvx2(work);
@@ -191,7 +192,7 @@ class StaticEkfArray {
   }
   template <class Work>
   [[gnu::target("avx512f,avx2,fma")]] ALIDADE_FLATTEN void RunAvx512(const Work& work) {
-    RunTiles<8>(work);
+    RunTiles<16>(work);
   }
 #endif
   template <class Update>
@@ -204,9 +205,10 @@ class StaticEkfArray {
     static_assert(Model::Measurement::kAmbient == Model::Measurement::kTangent,
                   "a StaticEkfArray has measurements of vectors and angles: use StaticEkf");
     static_assert(internal::AreFlat<typename Model::Spaces>::value, "of vectors and angles");
-    static_assert(internal::PredictsWith<Model, internal::Dual<internal::Pack<8>, Blocks::kTangent>,
-                                         typename Blocks::Indices>::value,
-                  "Predict is no template on the scalar: use StaticEkf");
+    static_assert(
+        internal::PredictsWith<Model, internal::Dual<internal::Pack<16>, Blocks::kTangent>,
+                               typename Blocks::Indices>::value,
+        "Predict is no template on the scalar: use StaticEkf");
   }
 
   template <int kLanes, class Work>
@@ -218,12 +220,16 @@ class StaticEkfArray {
   template <int kLanes>
   static internal::Pack<kLanes> Load(const double* from) {
     internal::Pack<kLanes> pack;
-    std::memcpy(&pack.v, from, sizeof pack.v);
+    constexpr int kWidth = internal::Parts<kLanes>::kWidth;
+    internal::For<internal::Parts<kLanes>::kParts>(
+        [&](auto k) { std::memcpy(&pack.v[k], from + k * kWidth, sizeof pack.v[k]); });
     return pack;
   }
-  template <class T>
-  static void Store(double* to, const T& pack) {
-    std::memcpy(to, &pack.v, sizeof pack.v);
+  template <int kLanes>
+  static void Store(double* to, const internal::Pack<kLanes>& pack) {
+    constexpr int kWidth = internal::Parts<kLanes>::kWidth;
+    internal::For<internal::Parts<kLanes>::kParts>(
+        [&](auto k) { std::memcpy(to + k * kWidth, &pack.v[k], sizeof pack.v[k]); });
   }
   /// Elements [first, first + kLanes) of `all`, the last one where it ends.
   template <int kLanes, class T>
@@ -282,6 +288,19 @@ class StaticEkfArray {
     const Roots roots = RootsOf(dt_s[0]);
     return step.Predict(dt_s[0], &roots);
   }
+  /// Side by side where the model's Valid is a template, else lane by lane.
+  template <class Model, int kLanes, class Valid>
+  static bool AllValid(const Model& sensor, const internal::Pack<kLanes>* z, const Valid& valid) {
+    if constexpr (requires { sensor.Valid(z); }) {
+      const bool differed = std::exchange(internal::lanes_differ, false);
+      const bool all = sensor.Valid(z);
+      return !std::exchange(internal::lanes_differ, differed) && all;
+    } else {
+      bool all = true;
+      internal::For<kLanes>([&](auto lane) { all = all && valid(lane); });
+      return all;
+    }
+  }
   template <int kLanes, class Update, class Step>
   bool UpdatePack(int first, const Update& update, Step& step) {
     using S = internal::Pack<kLanes>;
@@ -301,9 +320,7 @@ class StaticEkfArray {
         for (int i = 0; i < m; ++i) one[i] = from[i][lane];
         return detail::CallValid(update.sensor, nullptr, one);
       };
-      bool all = true;
-      internal::For<kLanes>([&](auto lane) { all = all && valid(lane); });
-      if (!all) {
+      if (!AllValid(update.sensor, z, valid)) {
         double each[kLanes];
         for (int lane = 0; lane < kLanes; ++lane) each[lane] = valid(lane) ? 1.0 : 0.0;
         active = Load<kLanes>(each);

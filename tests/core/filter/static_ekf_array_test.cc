@@ -54,7 +54,7 @@ struct Gyrocompass : Sensor<Product<Angle, Vec<2>>, Angle, Vec<1>> {
 /// The lanes that this processor runs.
 std::vector<int> AllLanes() {
   std::vector<int> all;
-  for (const int lanes : {2, 4, 8}) {
+  for (const int lanes : {2, 4, 16}) {
     if (internal::HasLanes(lanes)) all.push_back(lanes);
   }
   return all;

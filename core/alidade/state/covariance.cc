@@ -24,7 +24,7 @@ bool Same(const JacobianPart& a, const JacobianPart& b) {
   return a.offset == b.offset && a.size == b.size;
 }
 
-/// The first `end` parts of H that are the same as such a joined one, or all: whether there are any.
+/// Whether any of the first `end` parts of H is the same as such a joined one.
 bool Has(const JacobianRows& h, const JacobianPart& part, std::size_t end = ~std::size_t{0}) {
   for (std::size_t next = 0; next < std::min(end, h.parts.size());) {
     if (Same(Joined(h.parts, next), part)) return true;

@@ -226,7 +226,7 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   if (any) AddFiles(out, comparison);
   if (any) no_figure = WriteSeedReport(out.files(), comparison, compared.config, StopRequested);
   if (!no_figure.empty()) Log(LogLevel::kWarning, "figures: " + no_figure);
-  out.Write(seeds.sweep, compared.config);
+  out.Write(seeds.sweep, Summarise(seeds.sweep), compared.config);
   if (any) Report(comparison, arguments, folder);
   if (seeds.sweep.stopped && seeds.beyond_budget == 0) {
     TellStopped(seeds.sweep.done.size(), options.runs);

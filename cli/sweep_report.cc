@@ -22,11 +22,10 @@ bool ReportFailures(const SweepResult& result, const std::string& where) {
   return failed > 0;
 }
 
-/// The tables of a sweep, and the names of its main files.
-template <class Result>
-void TellWritten(const std::filesystem::path& path, const Result& result,
+/// The table of a sweep, and the names of its main files.
+void TellWritten(const std::filesystem::path& path, const std::string& table,
                  const std::vector<std::string>& names) {
-  std::string text = SweepTable(result) + "\nwrote " + path.string() + '\n';
+  std::string text = table + "\nwrote " + path.string() + '\n';
   for (const std::string& name : names) text += "  " + (path / name).string() + '\n';
   Print(text);
 }
@@ -42,10 +41,11 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, bool quiet) {
   const bool failed = ReportFailures(result, "");
   if (result.stopped) TellStopped(result.done.size(), result.runs);
-  WithWhatIsKept(folder, [&] { folder.Write(result, config); });
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  WithWhatIsKept(folder, [&] { folder.Write(result, summaries, config); });
   if (!quiet) {
     TellKept(folder.resumed(), path);
-    TellWritten(path, result, {"table.md", "sweep.json", "runs.csv"});
+    TellWritten(path, SweepTable(result, summaries), {"table.md", "sweep.json", "runs.csv"});
   }
   return CodeOf(result.stopped, failed);
 }
@@ -70,7 +70,7 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
     const std::string reprojection = "figures/reprojection.svg";
     if (std::filesystem::exists(path / reprojection)) names.insert(names.begin(), reprojection);
-    TellWritten(path, sweep, names);
+    TellWritten(path, SweepTable(sweep), names);
   }
   if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
   return CodeOf(sweep.stopped(), failed);

@@ -81,14 +81,17 @@ bool Has(const InstructionSet& set) {
 }  // namespace
 
 std::uint32_t InstructionSetsOfProcessor() {
-  std::uint32_t isa = 0;
+  static const std::uint32_t all = [] {  // a virtual machine asks its host each time
+    std::uint32_t isa = 0;
 #if defined(__x86_64__)
-  const std::uint32_t saved = SavedRegisters();
-  for (const InstructionSet& set : kKnown) {
-    if (Has(set) && (saved & set.saved) == set.saved) isa |= set.isa;
-  }
+    const std::uint32_t saved = SavedRegisters();
+    for (const InstructionSet& set : kKnown) {
+      if (Has(set) && (saved & set.saved) == set.saved) isa |= set.isa;
+    }
 #endif
-  return isa;
+    return isa;
+  }();
+  return all;
 }
 
 std::string InstructionSetNames(std::uint32_t isa) {

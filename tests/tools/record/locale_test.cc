@@ -29,7 +29,8 @@ void RecordAll(const fs::path& folder) {
   SweepFolder sweep(folder / "sweep", false);
   SweepOptions options;
   options.runs = 2;
-  sweep.Write(Sweep(config, Host(), options), config);
+  const SweepResult result = Sweep(config, Host(), options);
+  sweep.Write(result, Summarise(result), config);
 }
 
 TEST(CommaLocale, ChangesNoByteOfWhatIsWritten) {

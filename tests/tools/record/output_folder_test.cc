@@ -690,7 +690,9 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
     fail_at = n;
     fail_error = n % 2 == 0 ? EDQUOT : EIO;
     std::string text;
-    const auto write = [&] { SweepFolder(folder / "out", false).Write(result, config); };
+    const auto write = [&] {
+      SweepFolder(folder / "out", false).Write(result, Summarise(result), config);
+    };
     const int code = CodeOf(write, &text);
     const bool failed = fail_at <= 0;
     fail_at = 0;

@@ -61,8 +61,10 @@ TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 5.6);
 }
 
+std::string TableOf(const SweepResult& result) { return SweepTable(result, Summarise(result)); }
+
 TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
-  EXPECT_EQ(SweepTable(SixRuns()),
+  EXPECT_EQ(TableOf(SixRuns()),
             "                                      ekf\n"
             "rmse x        3.000 [1.100, 2.000, 5.600]\n"
             "runs used                               3\n"
@@ -80,9 +82,9 @@ TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
   const std::string line =
       "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
       "overconfident\n";
-  EXPECT_TRUE(SweepTable(result).ends_with(line)) << SweepTable(result);
+  EXPECT_TRUE(TableOf(result).ends_with(line)) << TableOf(result);
   for (SweepRun& run : result.done) run.estimators[0].metrics["nees.mean:x"] = 2.0;
-  EXPECT_EQ(SweepTable(result).find("bounds"), std::string::npos);
+  EXPECT_EQ(TableOf(result).find("bounds"), std::string::npos);
 }
 
 TEST(SweepTable, FoldsAsAComparisonDoes) {
@@ -95,7 +97,7 @@ TEST(SweepTable, FoldsAsAComparisonDoes) {
     }
   }
   // 12 of the label and three times 29 are 99 characters; the fourth goes below.
-  const std::string table = SweepTable(result);
+  const std::string table = TableOf(result);
   EXPECT_EQ(table.find('\n'), 99u) << table;
   EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -10,6 +11,7 @@
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/in_step.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
 #include "alidade/sweep/shards.h"
@@ -127,13 +129,6 @@ std::string SweepJson(const VariedSweep& sweep) {
                              {"values", std::move(values)}});
 }
 
-/// Adds the keys of a map to another, both in their order: far cheaper than a search for each.
-template <class Map>
-void AddKeys(const Map& from, Map& to) {
-  auto place = to.begin();
-  for (const auto& [key, value] : from) place = std::next(to.try_emplace(place, key, value));
-}
-
 /// Keys that any run has, in the order of a comparison.
 RunResult AllKeys(const Parts& parts) {
   RunResult all;
@@ -141,8 +136,9 @@ RunResult AllKeys(const Parts& parts) {
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
       for (const EstimatorResult& one : run.estimators) {
-        AddKeys(one.metrics, keys.metrics);
-        AddKeys(one.counts, keys.counts);
+        const auto nothing = [](auto&&...) {};
+        internal::InStep(one.metrics, keys.metrics, nothing);
+        internal::InStep(one.counts, keys.counts, nothing);
       }
     }
   }
@@ -155,25 +151,43 @@ std::vector<std::string> Header(const std::string& key, std::vector<std::string>
   return header;
 }
 
+/// Columns of a table, which go by names of their own order.
+template <class Value>
+struct Columns {
+  std::vector<std::string> names;
+  std::map<std::string, std::size_t> places;  ///< by name
+  std::vector<const Value*> cells;
+
+  explicit Columns(std::vector<std::string> of) : names(std::move(of)) {
+    for (std::size_t i = 0; i < names.size(); ++i) places[names[i]] = i;
+  }
+  /// Of a row with those values, none of other names; null: it has none.
+  template <class Map>
+  const std::vector<const Value*>& Of(const Map& values) {
+    cells.assign(names.size(), nullptr);
+    internal::InStep(values, places,
+                     [&](const Value& value, std::size_t at) { cells[at] = &value; });
+    return cells;
+  }
+};
+
 void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const RunResult all = AllKeys(parts);
-  const std::vector<std::string> metrics = internal::OrderedMetrics(all);
-  const std::vector<std::string> counts = internal::OrderedCounts(all);
+  Columns<double> metrics(internal::OrderedMetrics(all));
+  Columns<std::int64_t> counts(internal::OrderedCounts(all));
   std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
-  header.insert(header.end(), metrics.begin(), metrics.end());
-  header.insert(header.end(), counts.begin(), counts.end());
+  header.insert(header.end(), metrics.names.begin(), metrics.names.end());
+  header.insert(header.end(), counts.names.begin(), counts.names.end());
   CsvFile csv(folder, "runs.csv", header);
   const auto write_run = [&](const Part& part, const SweepRun& run, const EstimatorResult& one) {
     if (!key.empty()) csv.Text(part.value);
     csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
     csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
-    for (const std::string& metric : metrics) {
-      const auto found = one.metrics.find(metric);
-      found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
+    for (const double* const value : metrics.Of(one.metrics)) {
+      value == nullptr ? csv.Empty() : csv.Number(*value);
     }
-    for (const std::string& count : counts) {
-      const auto found = one.counts.find(count);
-      csv.Integer(found == one.counts.end() ? 0 : found->second);
+    for (const std::int64_t* const count : counts.Of(one.counts)) {
+      csv.Integer(count == nullptr ? 0 : *count);
     }
     csv.EndRow();
   };
@@ -240,10 +254,10 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
   impl_->folder.Write(name, text);
 }
 
-void SweepFolder::Write(const SweepResult& result, const Config& config) {
+void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
+                        const Config& config) {
   const OutputFolder& folder = impl_->folder;
   impl_->WriteConfig(config);
-  const std::vector<SweepSummary> summaries = Summarise(result);
   folder.Write("sweep.json", SweepJson(result, summaries));
   const Parts parts = {{&result, ""}};
   WriteRuns(folder, parts, "");

@@ -13,6 +13,7 @@
 #include "alidade/base/signal_stack.h"
 #include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/in_step.h"
 #include "alidade/sweep/processors.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
@@ -216,16 +217,14 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         if (!run.Uses(one)) continue;
         ++summary.used;
         summary.inconsistent += one.inconsistent ? 1 : 0;
-        auto place = values.begin();  // both maps are in the order of their keys
-        for (const auto& [key, value] : one.metrics) {
-          if (std::isnan(value)) continue;
-          place = values.try_emplace(place, key);
-          place->second.push_back(value);
-          ++place;
-        }
+        internal::InStep(one.metrics, values, [](double value, std::vector<double>& list) {
+          if (!std::isnan(value)) list.push_back(value);
+        });
       }
     }
-    for (auto& [key, list] : values) summary.metrics[key] = SpreadOf(std::move(list));
+    for (auto& [key, list] : values) {
+      if (!list.empty()) summary.metrics[key] = SpreadOf(std::move(list));
+    }
   }
   return summaries;
 }

@@ -126,8 +126,7 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
 
 namespace alidade {
 
-std::string SweepTable(const SweepResult& result) {
-  const std::vector<SweepSummary> summaries = Summarise(result);
+std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
   return internal::RightAlignedTable(internal::NamesOf(summaries), internal::TableRows(summaries)) +
          internal::NeesLines(summaries) + internal::ReferenceLines(result);
 }

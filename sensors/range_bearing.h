@@ -59,10 +59,7 @@ struct RangeBearing
     L[0] = T(sigma_range_m);
     L[4] = L[8] = T(sigma_bearing_rad);
   }
-  template <class T>
-  bool Valid(const T* z) const {
-    return z[0] > T(0.0) && z[0] <= T(max_range_m);
-  }
+  bool Valid(const double* z) const { return z[0] > 0.0 && z[0] <= max_range_m; }
   template <class T>
   bool Initialise(const T* position, const T* orientation, const T* z, T* landmark) const {
     if (!(z[0] > T(0.0))) return false;

@@ -4,7 +4,7 @@
 // inverse depth, of which some are observed, beside
 //
 //   peak      the operations of the update alone, at the rate at which this processor multiplies
-//             and adds, measured in turns with the rest
+//             and adds, measured in turns with frames and nothing else
 //   mrpt      mrpt::bayes::CKalmanFilterCapable, where it is installed, to 300 landmarks
 //   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
 //             P = (I - K H) P
@@ -12,6 +12,8 @@
 //   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, where it is installed; none
 //             of what else there is to a frame. OPENBLAS_CORETYPE tells it a processor that it does
 //             not know.
+//
+// The others are measured in turns with frames too, which find the caches emptied by them.
 //
 // Then the exponents of time over states: of a step, of a frame that measures 20 landmarks, and of
 // dropping a landmark and initialising another.
@@ -298,6 +300,57 @@ void CompareCompressed(const PluginHost& host, const Config& config, const Confi
   }
 }
 
+/// The update of n states by m rows in other ways.
+std::vector<Contender> PeersOf([[maybe_unused]] int landmarks, [[maybe_unused]] int observed,
+                               long n, long m) {
+  std::vector<Contender> peers;
+  if (n < 3000) {
+    peers.push_back(
+        {"textbook", [dense = std::make_shared<Dense>(n, m)] { dense->Textbook(); }, 1.0, {}});
+    peers.push_back(
+        {"joseph", [dense = std::make_shared<Dense>(n, m)] { dense->Joseph(); }, 1.0, {}});
+  }
+#ifdef ALIDADE_BENCH_OPENBLAS
+  peers.push_back({"openblas", [blas = std::make_shared<OpenBlas>(n, m)] { (*blas)(); }, 1.0, {}});
+#endif
+#ifdef ALIDADE_BENCH_MRPT
+  if (n < 3000) {
+    const std::shared_ptr<SlamPeer> mrpt = MakeMrptSlam(landmarks, observed);
+    peers.push_back({"mrpt", [mrpt] { mrpt->Frame(); }, 1.0, {}});
+  }
+#endif
+  return peers;
+}
+
+void CompareSize(const PluginHost& host, const Config& config, const std::string& size,
+                 const Peak& peak, int rounds, bool peers) {
+  const int landmarks = std::atoi(size.c_str());
+  const int observed = std::atoi(size.c_str() + size.find('/') + 1);
+  Slam slam(host, config, landmarks, observed, observed);
+  const long n = slam.size(), m = 2L * observed;
+  volatile double sink = 0.0;
+  std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
+                                       {"frame", [&] { slam(); }, 1.0, {}}};
+  // By themselves: dense matrices leave nothing in the caches.
+  Interleave(contenders, 4 * rounds);
+  const double least = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
+                       peak.operations * contenders[0].Quantile(0.01);
+  std::printf("%s: %ld states, %ld rows, %.3f ms a frame\n", size.c_str(), n, m,
+              1e-6 * contenders[1].Quantile(0.5));
+  std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / least);
+  contenders[1].ns.clear();
+  if (peers) {
+    for (Contender& peer : PeersOf(landmarks, observed, n, m)) {
+      contenders.push_back(std::move(peer));
+    }
+  }
+  if (contenders.size() > 2) Interleave(contenders, rounds);
+  if (!slam.used_all()) throw std::runtime_error("not every measurement was used");
+  for (std::size_t i = 2; i < contenders.size(); ++i) {
+    PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
+  }
+}
+
 /// The slope of log(time) over log(states), by least squares.
 void PrintExponent(const char* name, const std::vector<long>& states,
                    const std::vector<Contender>& contenders) {
@@ -329,8 +382,11 @@ void CompareSizes(const PluginHost& host, const Config& config, int rounds) {
     frame.push_back({"frame", [slam] { (*slam)(); }, 1.0, {}});
     exchange.push_back({"exchange", [one] { (*one)(); }, 1.0, {}});
   }
-  Interleave(step, 10 * rounds);
   Interleave(frame, rounds);
+  for (const auto& slam : slams) {
+    if (!slam->used_all()) throw std::runtime_error("not every measurement was used");
+  }
+  Interleave(step, 10 * rounds);
   Interleave(exchange, 10 * rounds);
   PrintExponent("step", states, step);
   PrintExponent("frame_20", states, frame);
@@ -372,49 +428,7 @@ int Main(int argc, char** argv) {
   const std::string kernels = internal::BestVectorKernels().name;
   const Peak peak = PeakOf(kernels);
   std::printf("kernels: %s\n", kernels.c_str());
-  for (const std::string& size : sizes) {
-    const int landmarks = std::atoi(size.c_str());
-    const int observed = std::atoi(size.c_str() + size.find('/') + 1);
-    Slam slam(host, config, landmarks, observed, observed);
-    const long n = slam.size(), m = 2L * observed;
-    volatile double sink = 0.0;
-    std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
-                                         {"frame", [&] { slam(); }, 1.0, {}}};
-    // By themselves: dense matrices leave nothing in the caches.
-    Interleave(contenders, 4 * rounds);
-    const double least = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
-                         peak.operations * contenders[0].Quantile(0.01);
-    std::printf("%s: %ld states, %ld rows, %.3f ms a frame\n", size.c_str(), n, m,
-                1e-6 * contenders[1].Quantile(0.5));
-    std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / least);
-    contenders[1].ns.clear();
-    std::unique_ptr<Dense> book, joseph;
-    if (peers && n < 3000) {
-      book = std::make_unique<Dense>(n, m);
-      contenders.push_back({"textbook", [&] { book->Textbook(); }, 1.0, {}});
-      joseph = std::make_unique<Dense>(n, m);
-      contenders.push_back({"joseph", [&] { joseph->Joseph(); }, 1.0, {}});
-    }
-#ifdef ALIDADE_BENCH_OPENBLAS
-    std::unique_ptr<OpenBlas> openblas;
-    if (peers) {
-      openblas = std::make_unique<OpenBlas>(n, m);
-      contenders.push_back({"openblas", [&] { (*openblas)(); }, 1.0, {}});
-    }
-#endif
-#ifdef ALIDADE_BENCH_MRPT
-    std::unique_ptr<SlamPeer> mrpt;
-    if (peers && n < 3000) {
-      mrpt = MakeMrptSlam(landmarks, observed);
-      contenders.push_back({"mrpt", [&] { mrpt->Frame(); }, 1.0, {}});
-    }
-#endif
-    if (contenders.size() > 2) Interleave(contenders, rounds);
-    if (!slam.used_all()) throw std::runtime_error("not every measurement was used");
-    for (std::size_t i = 2; i < contenders.size(); ++i) {
-      PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
-    }
-  }
+  for (const std::string& size : sizes) CompareSize(host, config, size, peak, rounds, peers);
   if (exponents) CompareSizes(host, config, rounds);
   if (compressed) {
     Config of_compressed = load();

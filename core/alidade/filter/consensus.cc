@@ -73,15 +73,14 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const Row& one = *matches_[hypothesis];
   const MeasurementReport& own = *one.report;
   const Eigen::Index n = f.size(), m = own.dof;
-  Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
+  const std::span<Row* const> itself = std::span(matches_).subspan(hypothesis, 1);
+  Workspace::Matrix pht = ProjectionOf(f, itself), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
-  f.state.covariance().Project(one.jacobian(), pht.data(), s.data());
   s = Eigen::Map<const Eigen::MatrixXd>(own.s.data(), m, m);
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
-  ForEachConsidered(f, std::span(matches_).subspan(hypothesis, 1),
-                    [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
-                      pht.block(offset, at, size, k).setZero();
-                    });
+  ForEachConsidered(f, itself, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
+    pht.block(offset, at, size, k).setZero();
+  });
   Factorise(s);  // positive definite: it has passed the gate
   s.triangularView<Eigen::Lower>().solveInPlace(y);
   s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);

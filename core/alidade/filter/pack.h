@@ -47,7 +47,7 @@ struct Parts {
   using Vectors = VectorsOf<kWidth>;
 };
 
-/// A comparison of packs, lane by lane; for Select and AllOf alone. What is combined of several is
+/// A comparison of packs, lane by lane; for Select and Any alone. What is combined of several is
 /// a number, 1 for true and 0 for false: of masks AVX-512 has another kind than the others, and
 /// the compiler would take them apart.
 template <int kLanes>

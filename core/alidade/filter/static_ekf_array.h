@@ -30,9 +30,10 @@ bool HasLanes(int lanes);
 /// Models are those of StaticEkf, their functions templates on the scalar. Where a model compares
 /// numbers and filters side by side differ in the answer, where one of them goes beyond what is
 /// finite, and where dt_s differs, they are stepped one by one: to the same numbers, but slower
-/// than StaticEkf. Blocks and measurements are vectors and angles, and there are neither control
-/// inputs nor numbers that come with a measurement (compile errors).
-/// Numbers differ from those of StaticEkf by rounding. A step allocates nothing.
+/// than StaticEkf. Valid of a sensor may be a template on the scalar too: it is then asked of all
+/// side by side, and one by one only where they differ. Blocks and measurements are vectors and
+/// angles, and there are neither control inputs nor numbers that come with a measurement (compile
+/// errors). Numbers differ from those of StaticEkf by rounding. A step allocates nothing.
 template <class... Motions>
 class StaticEkfArray {
  public:

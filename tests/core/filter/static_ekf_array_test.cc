@@ -49,6 +49,8 @@ struct Gyrocompass : Sensor<Product<Angle, Vec<2>>, Angle, Vec<1>> {
     l[7] = T(-0.1);
     l[8] = T(0.3);
   }
+  /// No template: asked of one filter after the other.
+  bool Valid(const double* z) const { return z[1] > -1.0; }
 };
 
 /// The lanes that this processor runs.
@@ -182,7 +184,7 @@ TEST(StaticEkfArray, HasAnglesAndMeasurementsOfSeveralNumbers) {
       array.Set<1>(i, 0.5, 0.2);
     }
     Random random(7);
-    int gated = 0, wrapped = 0;
+    int gated = 0, wrapped = 0, invalid = 0;
     for (int frame = 0; frame < 40; ++frame) {
       std::vector<double> z(3 * kCount);
       std::vector<StaticOutcome> outcomes(kCount);
@@ -198,6 +200,7 @@ TEST(StaticEkfArray, HasAnglesAndMeasurementsOfSeveralNumbers) {
         ASSERT_EQ(singles[i].Predict(0.1), Status::kOk);
         const double own[] = {z[i], z[kCount + i], z[2 * kCount + i]};
         ASSERT_EQ(outcomes[i], (singles[i].Update<0, 1>(sensor, own, 6.0)));
+        invalid += outcomes[i] == StaticOutcome::kInvalid ? 1 : 0;
         gated += outcomes[i] == StaticOutcome::kGated ? 1 : 0;
         wrapped += *singles[i].value<0>() < -1.0 ? 1 : 0;
         ASSERT_NO_FATAL_FAILURE(ExpectSameFilter(array, static_cast<int>(i), singles[i]));
@@ -205,6 +208,7 @@ TEST(StaticEkfArray, HasAnglesAndMeasurementsOfSeveralNumbers) {
     }
     EXPECT_GT(gated, 10);
     EXPECT_GT(wrapped, 10);
+    EXPECT_GT(invalid, 5);
   }
 }
 

@@ -79,7 +79,8 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
   };
   for (const std::vector<int>& blocks : {std::vector{3, 4, 2, 11, 9, 1, 70}, {100, 41}}) {
     Random random(4);
-    const Covariance p = Make(blocks, random);
+    Covariance p = Make(blocks, random);
+    if (blocks.size() > 2) p.Release(9, 11);  // a gap, of zeros
     std::vector<RowMajor> data;
     std::vector<JacobianRows> all;
     Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(9, p.size());
@@ -99,6 +100,21 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
     p.Project(all, work, pht.data());
     EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kRounding * pht.norm());
   }
+}
+
+TEST(Covariance, ProjectOfFewStatesEqualsTheDenseProduct) {
+  Random random(5);
+  const Covariance p = Make({2, 3}, random);
+  const RowMajor h = RandomMatrix(3, 5, random);
+  const std::vector<JacobianPart> parts = {{0, 2, 0}, {2, 3, 2}};
+  const std::vector<JacobianRows> rows = {{h.data(), 2, 5, parts, true},
+                                          {h.data() + 10, 1, 5, parts, true}};
+  Workspace work;
+  Eigen::MatrixXd pht(5, 3), s = Eigen::MatrixXd::Zero(2, 2);
+  p.Project(rows, work, pht.data());
+  EXPECT_LT((pht - p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
+  p.AddProjection(rows[0], s.data());
+  EXPECT_LT((s - h.topRows(2) * pht.leftCols(2)).norm(), kRounding * pht.norm());
 }
 
 TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {

@@ -61,6 +61,19 @@ TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 5.6);
 }
 
+TEST(Summarise, LeavesOutWhatIsNotANumber) {
+  SweepResult result = SixRuns();
+  for (SweepRun& run : result.done) {
+    run.estimators[0].metrics["rmse:never"] = std::numeric_limits<double>::quiet_NaN();
+  }
+  result.done[0].estimators[0].metrics["rmse:x"] = std::numeric_limits<double>::quiet_NaN();
+  result.done[1].estimators[0].metrics["rmse:a"] = 7.0;  // of one run, before the others' keys
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 4.0);
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:a").mean, 7.0);
+}
+
 std::string TableOf(const SweepResult& result) { return SweepTable(result, Summarise(result)); }
 
 TEST(SweepTable, HasQuantilesAndCountsOfRuns) {

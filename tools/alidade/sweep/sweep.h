@@ -119,7 +119,8 @@ struct SweepSummary {
 };
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 
-/// Mean [p05, p50, p95] of the main metrics, one column for each estimator, for a terminal.
+/// Mean [p05, p50, p95] of the main metrics, one column for each estimator, for a terminal;
+/// `summaries` are those of Summarise(result).
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries);
 /// For each estimator a table with a row for each value: means of the main metrics.
 std::string SweepTable(const VariedSweep& sweep);
@@ -158,7 +159,7 @@ class SweepFolder {
   const internal::OutputFolder& files() const;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);
-  /// Errors: kCannotCreate, kIo.
+  /// `summaries` are those of Summarise(result). Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
              const Config& config);
   /// Returns why there is no figure, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.

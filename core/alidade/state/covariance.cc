@@ -275,7 +275,7 @@ void Covariance::AddPart(const JacobianPart& part, int m, const double* j, long 
       internal::CopyTransposed(count, left, p_.data() + at * ld + diagonal, ld, copy.data(), kRows);
       for (int i = left; i < rows; ++i) {
         for (int c = 0; c < count; ++c) {
-          copy[static_cast<std::size_t>(c * kRows + i)] =
+          copy[static_cast<std::size_t>(c) * kRows + static_cast<std::size_t>(i)] =
               p_(std::max(at + i, diagonal + c), std::min(at + i, diagonal + c));
         }
       }

@@ -236,7 +236,6 @@ class Exchange {
     state_.Drop(landmark);
     landmark = Initialise();
   }
-  long size() const { return state_.covariance().size(); }
 
  private:
   static constexpr int kCamera = 12, kLandmark = 6;

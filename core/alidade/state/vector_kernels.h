@@ -27,8 +27,8 @@ struct VectorKernels {
                   double* y, long ldy);
 };
 
-/// to(j, i) = from(i, j) of at most kMostTransposed rows, both by columns.
 constexpr int kMostTransposed = 8;
+/// to(j, i) = from(i, j) of at most kMostTransposed rows, both by columns.
 void CopyTransposed(int rows, long columns, const double* from, long ld, double* to, long ldt);
 
 /// Those that this processor runs, the fastest last.

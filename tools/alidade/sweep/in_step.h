@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <iterator>
-
 namespace alidade::internal {
 
 /// take(value in `from`, value in `to`) for each key of `from`; keys that `to` lacks it gets. Both

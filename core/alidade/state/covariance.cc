@@ -239,20 +239,29 @@ void Covariance::AddProjection(const JacobianRows& h, double* s) const {
     std::array<double, internal::kSmall * internal::kSmall> pht;
     return Project(h, pht.data(), s);
   }
+  constexpr int kRows = 8;  // of H P at a time
   const auto row = [&](int i) { return h.data + static_cast<std::ptrdiff_t>(i) * h.stride; };
-  for (const JacobianPart& right : h.parts) {
-    for (int c = 0; c < right.size; ++c) {
-      const int b = right.offset + c;
-      for (int i = 0; i < h.rows; ++i) {
-        double sum = 0.0;  // row i of H P, column b
+  for (int first = 0; first < h.rows; first += kRows) {
+    const int count = std::min(kRows, h.rows - first);
+    for (const JacobianPart& right : h.parts) {
+      for (int c = 0; c < right.size; ++c) {
+        const int b = right.offset + c;
+        std::array<double, kRows> hp{};  // H P, column b
         for (const JacobianPart& left : h.parts) {
-          const double* const j = row(i) + left.column;
-          for (int d = 0; d < left.size; ++d) {
-            const int a = left.offset + d;
-            sum += j[d] * p_(std::max(a, b), std::min(a, b));
-          }
+          const auto add = [&](int d, double p) {
+            for (int i = 0; i < count; ++i) {
+              hp[static_cast<std::size_t>(i)] += row(first + i)[left.column + d] * p;
+            }
+          };
+          const int above = std::clamp(b - left.offset, 0, left.size);
+          for (int d = 0; d < above; ++d) add(d, p_(b, left.offset + d));
+          for (int d = above; d < left.size; ++d) add(d, p_(left.offset + d, b));
         }
-        for (int k = 0; k < h.rows; ++k) s[i * h.rows + k] += sum * row(k)[right.column + c];
+        for (int i = 0; i < count; ++i) {
+          double* const si = s + std::ptrdiff_t{first + i} * h.rows;
+          const double value = hp[static_cast<std::size_t>(i)];
+          for (int k = 0; k < h.rows; ++k) si[k] += value * row(k)[right.column + c];
+        }
       }
     }
   }

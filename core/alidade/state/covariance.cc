@@ -45,6 +45,31 @@ void TakeColumns(const JacobianRows& h, const JacobianPart& part, double* j) {
   }
 }
 
+/// The M rows of s += H P H' from `first` on; returns M. Each entry of P is taken once for all.
+template <int M>
+int AddRows(const Eigen::MatrixXd& p, const JacobianRows& h, int first, double* s) {
+  const auto row = [&](int i) { return h.data + std::ptrdiff_t{i} * h.stride; };
+  for (const JacobianPart& right : h.parts) {
+    for (int c = 0; c < right.size; ++c) {
+      const int b = right.offset + c;
+      double hp[M] = {};  // column b of H P
+      for (const JacobianPart& left : h.parts) {
+        const auto add = [&](int d, double value) {
+          for (int i = 0; i < M; ++i) hp[i] += row(first + i)[left.column + d] * value;
+        };
+        const int above = std::clamp(b - left.offset, 0, left.size);
+        for (int d = 0; d < above; ++d) add(d, p(b, left.offset + d));
+        for (int d = above; d < left.size; ++d) add(d, p(left.offset + d, b));
+      }
+      for (int i = 0; i < M; ++i) {
+        double* const to = s + std::ptrdiff_t{first + i} * h.rows;
+        for (int k = 0; k < h.rows; ++k) to[k] += hp[i] * row(k)[right.column + c];
+      }
+    }
+  }
+  return M;
+}
+
 }  // namespace
 
 int Covariance::Add(int rows) {
@@ -239,30 +264,16 @@ void Covariance::AddProjection(const JacobianRows& h, double* s) const {
     std::array<double, internal::kSmall * internal::kSmall> pht;
     return Project(h, pht.data(), s);
   }
-  constexpr int kRows = 8;  // of H P at a time
-  const auto row = [&](int i) { return h.data + static_cast<std::ptrdiff_t>(i) * h.stride; };
-  for (int first = 0; first < h.rows; first += kRows) {
-    const int count = std::min(kRows, h.rows - first);
-    for (const JacobianPart& right : h.parts) {
-      for (int c = 0; c < right.size; ++c) {
-        const int b = right.offset + c;
-        std::array<double, kRows> hp{};  // H P, column b
-        for (const JacobianPart& left : h.parts) {
-          const auto add = [&](int d, double p) {
-            for (int i = 0; i < count; ++i) {
-              hp[static_cast<std::size_t>(i)] += row(first + i)[left.column + d] * p;
-            }
-          };
-          const int above = std::clamp(b - left.offset, 0, left.size);
-          for (int d = 0; d < above; ++d) add(d, p_(b, left.offset + d));
-          for (int d = above; d < left.size; ++d) add(d, p_(left.offset + d, b));
-        }
-        for (int i = 0; i < count; ++i) {
-          double* const si = s + std::ptrdiff_t{first + i} * h.rows;
-          const double value = hp[static_cast<std::size_t>(i)];
-          for (int k = 0; k < h.rows; ++k) si[k] += value * row(k)[right.column + c];
-        }
-      }
+  for (int first = 0; first < h.rows;) {
+    switch (h.rows - first) {
+      case 1:
+        first += AddRows<1>(p_, h, first, s);
+        break;
+      case 2:
+        first += AddRows<2>(p_, h, first, s);
+        break;
+      default:
+        first += AddRows<3>(p_, h, first, s);
     }
   }
 }

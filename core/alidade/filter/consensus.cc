@@ -74,9 +74,10 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const MeasurementReport& own = *one.report;
   const Eigen::Index n = f.size(), m = own.dof;
   const std::span<Row* const> itself = std::span(matches_).subspan(hypothesis, 1);
-  Workspace::Matrix pht = ProjectionOf(f, itself), s = f.work.Take(m, m);
+  Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
-  s = Eigen::Map<const Eigen::MatrixXd>(own.s.data(), m, m);
+  s = Eigen::Map<const RowMajor>(one.R.data(), m, m);
+  f.state.covariance().Project(one.jacobian(), pht.data(), s.data());
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
   ForEachConsidered(f, itself, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
     pht.block(offset, at, size, k).setZero();

@@ -99,9 +99,9 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
   for (bool defined = true;; defined = Relinearise(f, rows, dx.data())) {
     const Workspace::Use use(f.work);
     const Stacked at = Stack(f, rows);
-    const Workspace::Matrix pht = ProjectionOf(f, rows);
+    const Panels pht = ProjectionOf(f, rows);
     s = r = at.noise;
-    AddProjected(rows, pht, s);
+    AddProjected(f, pht, s);
     if (!defined || !Factorise(s) || !Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
       MoveTo(f, linearised.data());
@@ -116,7 +116,7 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
     s.triangularView<Eigen::Lower>().solveInPlace(y);
     s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
     step = -dx;
-    step.noalias() += pht * y;
+    AddProduct(step, pht, y);
     step_v = -v;
     step_v.noalias() += at.h.transpose() * y;
     residual.noalias() = at.h * step;

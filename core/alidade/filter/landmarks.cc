@@ -60,9 +60,9 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
                      InverseDistanceSigma(state, landmark), camera);
 }
 
-/// J P J' of the blocks of a landmark; `pjt` is memory of n x 3, n the size of P.
+/// J P J' of the blocks of a landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
-                             const LandmarkPoint& point, double* pjt) {
+                             const LandmarkPoint& point) {
   std::array<JacobianPart, 3> parts{};  // a landmark with a place has as many blocks at most
   std::size_t used = 0;
   int column = 0;
@@ -74,13 +74,12 @@ Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
   }
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   const std::span present(parts.data(), used);
-  state.covariance().Project({point.jacobian.data(), 3, column, present}, pjt, covariance.data());
+  state.covariance().AddProjection({point.jacobian.data(), 3, column, present}, covariance.data());
   return covariance;
 }
 
-/// Of a landmark in the state; `pjt` as above.
-LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkRecord& landmark,
-                            double* pjt) {
+/// Of a landmark in the state.
+LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkRecord& landmark) {
   LandmarkEstimate one;
   one.id = id;
   one.generation = landmark.generation;
@@ -98,17 +97,17 @@ LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkR
       const Block& block = state.layout()[of];
       if (block.space.name != "landmark_position" || block.geometry().tangent != 3) continue;
       one.position = Eigen::Map<const Eigen::Vector3d>(state.value(of));
-      const JacobianPart part{block.tangent_offset, 3, 0};
-      const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> j = Eigen::Matrix3d::Identity();
-      one.covariance.setZero();
-      state.covariance().Project({j.data(), 3, 3, {&part, 1}}, pjt, one.covariance.data());
+      one.covariance = state.covariance()
+                           .lower()
+                           .block<3, 3>(block.tangent_offset, block.tangent_offset)
+                           .selfadjointView<Eigen::Lower>();
     }
     return one;
   }
   const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
   if (!point) return one;
   one.position = point->position;
-  one.covariance = CovarianceOf(state, landmark, *point, pjt);
+  one.covariance = CovarianceOf(state, landmark, *point);
   return one;
 }
 
@@ -339,9 +338,7 @@ Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
 
 /// Puts what is known of it, as long as it is in the state, into the report.
 void Landmarks::NoteRemoval(FilterState& f, std::int64_t id, const LandmarkRecord& landmark) {
-  const Workspace::Use use(f.work);
-  double* const pjt = f.work.Take(f.state.covariance().size(), 3).data();
-  f.report.removed_landmarks.push_back(EstimateOf(f.state, id, landmark, pjt));
+  f.report.removed_landmarks.push_back(EstimateOf(f.state, id, landmark));
   f.report.removed_landmarks.back().removed = f.timestamp;
 }
 
@@ -390,6 +387,7 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
   for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
   bool asked_map = prior_.adapt_after == 0;
+  Reserve(f, rows);
   const int with_prior =
       prior_.min_observations > 0 ? prior_.min_observations : options_.min_observations;
   for (Row& row : rows) {
@@ -411,6 +409,16 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
     ++f.report.landmarks.initialised;
     ++measured;
   }
+}
+
+/// Takes memory for all that wait at once: the first frame has many.
+void Landmarks::Reserve(FilterState& f, std::span<const Row> rows) const {
+  int size = 0;
+  for (const Row& row : rows) {
+    if (!Has(row) || row.report->outcome != Outcome::kNotReady) continue;
+    for (const Space& space : FamilyOf(row).roles) size += space.geometry.tangent;
+  }
+  f.state.covariance().Reserve(size);
 }
 
 /// A row that was used of each landmark in the state, by id; the first one of several.
@@ -510,9 +518,8 @@ std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
     return Estimates(whole);
   }
   std::vector<LandmarkEstimate> estimates;
-  std::vector<double> pjt(3 * static_cast<std::size_t>(state.covariance().size()));
   for (const auto& [id, landmark] : landmarks_) {
-    if (landmark.in_state()) estimates.push_back(EstimateOf(state, id, landmark, pjt.data()));
+    if (landmark.in_state()) estimates.push_back(EstimateOf(state, id, landmark));
   }
   return estimates;
 }

@@ -86,6 +86,7 @@ class Landmarks {
   void Convert(FilterState& f, std::span<Row> rows);
   bool ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark, const Row& row);
   void InitialiseNew(FilterState& f, std::span<Row> rows);
+  void Reserve(FilterState& f, std::span<const Row> rows) const;
   void FindMeasured(std::span<Row> rows);
   double PriorInverseDistance(const State& state);
   Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);

@@ -14,10 +14,10 @@ namespace alidade::internal {
 namespace {
 
 /// The variances of P - W W' + E E'; E has the given rows.
-void VariancesAfter(const Covariance& p, const Workspace::Matrix& w, std::span<const int> rows,
+void VariancesAfter(const Covariance& p, const Panels& w, std::span<const int> rows,
                     const Workspace::Matrix& e, Workspace::Vector& left) {
   for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i);
-  for (Eigen::Index k = 0; k < w.cols(); ++k) left -= w.col(k).cwiseAbs2();
+  SubtractSquares(left, w);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     left[rows[i]] += e.row(static_cast<Eigen::Index>(i)).squaredNorm();
   }
@@ -132,19 +132,19 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
 /// Few states and few rows, in arrays: CorrectLarge takes longer there.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
   constexpr std::size_t kMost = kSmall;
-  std::array<double, kMost * kMost> s, w, gain;
+  std::array<double, kMost * kMost> pht, own_s, s, w, gain;
   std::array<double, kMost> innovation, inverse_d, dx;
   const auto n = static_cast<std::size_t>(f.size());
   const int m = static_cast<int>(CountOf(rows));
   const auto all = static_cast<std::size_t>(m);
-  const Workspace::Use use(f.work);
-  const double* const pht = ProjectionOf(f, rows).data();
   std::size_t at = 0;
   for (const Row* row : rows) {
     const MeasurementReport& entry = *row->report;
     const JacobianRows h = row->jacobian();
     const auto k = static_cast<std::size_t>(entry.dof);
     std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
+    std::fill_n(own_s.begin(), k * k, 0.0);  // H P H', which S has
+    f.state.covariance().Project(h, pht.data() + at * n, own_s.data());
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
       for (std::size_t j = 0; j < at; ++j) {  // H of this row times P H' of those before
@@ -162,8 +162,8 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     at += k;
   }
   const SmallKernels& kernels = SmallKernelsFor(f.size());
-  if (!kernels.solve(m, pht, s.data(), m, innovation.data(), w.data(), inverse_d.data(), dx.data(),
-                     gain.data())) {
+  if (!kernels.solve(m, pht.data(), s.data(), m, innovation.data(), w.data(), inverse_d.data(),
+                     dx.data(), gain.data())) {
     return Outcome::kNotPd;
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.begin());
@@ -182,20 +182,22 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
 
 /// The rows of P that are considered, in lost_. There the optimal gain is K* = W L^-1, and K is it
 /// with zeros for what is considered.
-Linear::Lost Linear::FindLost(FilterState& f, std::span<Row* const> rows,
-                              const Workspace::Matrix& w, const Workspace::Matrix& l) {
+Linear::Lost Linear::FindLost(FilterState& f, std::span<Row* const> rows, const Panels& w,
+                              const Workspace::Matrix& l) {
   lost_.clear();
   ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index, Eigen::Index) {
     for (int i = 0; i < size; ++i) lost_.push_back(offset + i);
   });
   std::ranges::sort(lost_);
   lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
-  const Eigen::Index count = std::ssize(lost_), m = w.cols();
+  const Eigen::Index count = std::ssize(lost_), m = w.columns;
   Lost lost{f.work.Take(count, m), f.work.Take(count, m)};
   Workspace::Matrix &gain = lost.gain, &e = lost.e;
   if (count == 0) return lost;
   e.setZero();
-  for (Eigen::Index i = 0; i < count; ++i) gain.row(i) = w.row(lost_[static_cast<std::size_t>(i)]);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    for (Eigen::Index i = 0; i < count; ++i) gain(i, k) = w(lost_[static_cast<std::size_t>(i)], k);
+  }
   Divide(l, gain);
   ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
     const Eigen::Index i = std::ranges::lower_bound(lost_, offset) - lost_.begin();
@@ -213,18 +215,20 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const Workspace::Use use(f.work);
   Covariance& p = f.state.covariance();
   const Workspace::Vector innovation = InnovationOf(f, rows);
-  Workspace::Matrix w = ProjectionOf(f, rows), l = NoiseOf(f, rows);
-  const Eigen::Index n = w.rows(), m = w.cols();
+  const Panels w = ProjectionOf(f, rows);
+  Workspace::Matrix l = NoiseOf(f, rows);
+  const Eigen::Index n = w.rows, m = w.columns;
   Workspace::Matrix gain = f.work.Take(n, m), outside = OutsideOf(f, rows);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n), left = f.work.Take(n);
-  AddProjected(rows, w, l);
+  AddProjected(f, w, l);
   if (!Factorise(l)) return Outcome::kNotPd;
   if (n == 0) return Outcome::kAccepted;  // nothing to correct
   DivideByTransposed(l, w);
   const auto [lost_gain, e] = FindLost(f, rows, w, l);
   y = innovation;
   l.triangularView<Eigen::Lower>().solveInPlace(y);
-  dx.noalias() = w * y;
+  dx.setZero();
+  AddProduct(dx, w, y);
   for (std::size_t i = 0; i < lost_.size(); ++i) {
     dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(innovation);
   }
@@ -236,7 +240,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const bool recorded =
       std::ranges::any_of(rows, [](const Row* row) { return GainIsRecorded(*row); });
   if (cancels || recorded) {
-    gain = w;
+    Copy(w, gain);
     Divide(l, gain);
     for (std::size_t i = 0; i < lost_.size(); ++i) {
       gain.row(lost_[i]) = lost_gain.row(static_cast<Eigen::Index>(i));
@@ -246,12 +250,14 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     const bool left_psd = Joseph(p.lower(), gain, JacobianOf(f, rows), NoiseOf(f, rows), f.work);
     if (!left_psd) return Outcome::kNotPd;
   } else {
-    AddOuterProduct(p.lower(), w, -1.0);
+    SubtractOuterProduct(p.lower(), w);
     AddOuterProduct(p.lower(), lost_, e);
   }
   if (f.state.postponed() != nullptr) {
     DivideByTransposed(l, outside);
-    f.state.CorrectPostponed(outside, w, y);
+    Workspace::Matrix columns = f.work.Take(n, m);
+    Copy(w, columns);
+    f.state.CorrectPostponed(outside, columns, y);
   }
   f.state.MoveTo(f.moved);
   if (recorded) RecordGain(f, rows, gain.data());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/filter/method.h"
+#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 
@@ -35,7 +36,7 @@ class Linear : public Method {
   struct Lost {
     Workspace::Matrix gain, e;
   };
-  Lost FindLost(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix& w,
+  Lost FindLost(FilterState& f, std::span<Row* const> rows, const Panels& w,
                 const Workspace::Matrix& l);
 
   // Memory that is kept from row to row.

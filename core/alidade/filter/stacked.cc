@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 
@@ -57,12 +57,16 @@ Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
   return innovation;
 }
 
-Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Matrix pht = f.work.Take(f.size(), CountOf(rows));
+Panels ProjectionOf(FilterState& f, std::span<Row* const> rows) {
+  const Panels pht = TakePanels(f.work, f.size(), CountOf(rows));
   f.jacobians.clear();
   for (const Row* const row : rows) f.jacobians.push_back(row->jacobian());
-  f.state.covariance().Project(f.jacobians, f.work, pht.data());
+  f.state.covariance().Project(f.jacobians, pht);
   return pht;
+}
+
+void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s) {
+  BestVectorKernels().add_projected(pht.rows, f.jacobians, pht.data, s.data(), s.outerStride());
 }
 
 Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
@@ -73,29 +77,6 @@ Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
     p.ProjectOutside(row.jacobian(), outside.data() + at * outside.rows());
   });
   return outside;
-}
-
-void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
-  constexpr int kColumns = 64, kWidth = kMostTransposed;  // of P H' turned at a time
-  std::array<double, kColumns * kWidth> turned;
-  const VectorKernels& kernels = BestVectorKernels();
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    const JacobianRows h = row.jacobian();
-    const Eigen::Index end = at + h.rows;
-    for (const JacobianPart& part : h.parts) {
-      for (int first = 0; first < part.size; first += kWidth) {
-        const int width = std::min(kWidth, part.size - first);
-        for (Eigen::Index q = 0; q < end; q += kColumns) {
-          const Eigen::Index columns = std::min<Eigen::Index>(kColumns, end - q);
-          CopyTransposed(width, columns, &pht(part.offset + first, q), pht.rows(), turned.data(),
-                         kColumns);
-          kernels.combine(columns, width, h.rows, turned.data(), kColumns,
-                          h.data + part.column + first, h.stride, &s(q, at), s.outerStride());
-        }
-      }
-    }
-  });
-  s.triangularView<Eigen::StrictlyLower>() = s.transpose();
 }
 
 Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values) {

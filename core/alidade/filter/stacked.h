@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "alidade/filter/filter_state.h"
+#include "alidade/state/vector_kernels.h"
 
 /// The rows of an update as whole matrices, m rows in all, n = size of P: what methods share.
 namespace alidade::internal {
@@ -17,15 +18,15 @@ struct Stacked {
 
 /// The rows as they are, in f.work.
 Stacked Stack(FilterState& f, std::span<Row* const> rows);
-/// H, R, the innovation and P H' (n x m) of all rows, in f.work.
+/// H, R, the innovation and P H' (n x m, as the kernels take it) of all rows, in f.work.
 Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
-Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows);
+Panels ProjectionOf(FilterState& f, std::span<Row* const> rows);
 /// (H Phi)' of all rows, k x m, in f.work: see Covariance.
 Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows);
-/// s += H P H' of all rows, m x m, s symmetric before and after, from P H'.
-void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s);
+/// The lower triangle of s += H P H', m x m, from the P H' that ProjectionOf returned last.
+void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
 /// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
 template <class Zero>

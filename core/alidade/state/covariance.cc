@@ -10,41 +10,6 @@
 namespace alidade {
 namespace {
 
-/// The part at `next`, which moves on, with those that continue it in the state and in H.
-JacobianPart Joined(std::span<const JacobianPart> parts, std::size_t& next) {
-  JacobianPart part = parts[next++];
-  while (next < parts.size() && parts[next].offset == part.offset + part.size &&
-         parts[next].column == part.column + part.size) {
-    part.size += parts[next++].size;
-  }
-  return part;
-}
-
-bool Same(const JacobianPart& a, const JacobianPart& b) {
-  return a.offset == b.offset && a.size == b.size;
-}
-
-/// Whether any of the first `end` parts of H is the same as such a joined one.
-bool Has(const JacobianRows& h, const JacobianPart& part, std::size_t end = ~std::size_t{0}) {
-  for (std::size_t next = 0; next < std::min(end, h.parts.size());) {
-    if (Same(Joined(h.parts, next), part)) return true;
-  }
-  return false;
-}
-
-/// Their columns, added up: J, by rows.
-void TakeColumns(const JacobianRows& h, const JacobianPart& part, double* j) {
-  std::fill_n(j, std::ptrdiff_t{h.rows} * part.size, 0.0);
-  for (std::size_t next = 0; next < h.parts.size();) {
-    const JacobianPart own = Joined(h.parts, next);
-    if (!Same(own, part)) continue;
-    for (int r = 0; r < h.rows; ++r) {
-      const double* const from = h.data + std::ptrdiff_t{r} * h.stride + own.column;
-      for (int c = 0; c < part.size; ++c) j[r * part.size + c] += from[c];
-    }
-  }
-}
-
 /// The M rows of s += H P H' from `first` on; returns M. Each entry of P is taken once for all.
 template <int M>
 int AddRows(const Eigen::MatrixXd& p, const JacobianRows& h, int first, double* s) {
@@ -75,15 +40,19 @@ int AddRows(const Eigen::MatrixXd& p, const JacobianRows& h, int first, double* 
 int Covariance::Add(int rows) {
   if (const int gap = TakeGap(rows); gap >= 0) return gap;
   const int offset = size_;
-  if (size_ + rows > p_.rows()) {
-    const Eigen::Index capacity = std::max<Eigen::Index>(2 * p_.rows(), size_ + rows);
-    Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(capacity, capacity);
-    larger.topLeftCorner(size_, size_) = p_.topLeftCorner(size_, size_);
-    p_.swap(larger);
-  }
+  Reserve(rows);
   size_ += rows;
   if (outside_ > 0) GrowOutside(0);
   return offset;
+}
+
+void Covariance::Reserve(int rows) {
+  if (size_ + rows <= p_.rows()) return;
+  // An eighth more than asked for: a landmark that takes another form is there twice for a while.
+  const Eigen::Index needed = size_ + rows, capacity = std::max(2 * p_.rows(), needed + needed / 8);
+  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(capacity, capacity);
+  larger.topLeftCorner(size_, size_) = p_.topLeftCorner(size_, size_);
+  p_.swap(larger);
 }
 
 void Covariance::Clear() {
@@ -278,43 +247,13 @@ void Covariance::AddProjection(const JacobianRows& h, double* s) const {
   }
 }
 
-/// pht += P J' for the columns of P that the part names, J of m rows.
-void Covariance::AddPart(const JacobianPart& part, int m, const double* j, long ldj,
-                         double* pht) const {
-  constexpr int kRows = 64, kColumns = internal::kMostTransposed;  // of P' copied at a time
-  std::array<double, kRows * kColumns> copy;
-  const internal::VectorKernels& kernels = internal::BestVectorKernels();
-  const long ld = p_.rows(), n = size_;
-  const int o = part.offset, end = part.offset + part.size;
-  for (int first = 0; first < part.size; first += kColumns) {
-    const int count = std::min(kColumns, part.size - first), diagonal = o + first;
-    // What P has in rows [diagonal, ...) left of and on its diagonal block.
-    for (int at = 0; at < end; at += kRows) {
-      const int rows = std::min(kRows, end - at);
-      const int left = std::clamp(diagonal - at, 0, rows);
-      internal::CopyTransposed(count, left, p_.data() + at * ld + diagonal, ld, copy.data(), kRows);
-      for (int i = left; i < rows; ++i) {
-        for (int c = 0; c < count; ++c) {
-          copy[static_cast<std::size_t>(c) * kRows + static_cast<std::size_t>(i)] =
-              p_(std::max(at + i, diagonal + c), std::min(at + i, diagonal + c));
-        }
-      }
-      kernels.combine(rows, count, m, copy.data(), kRows, j + first, ldj, pht + at, n);
-    }
-  }
-  kernels.combine(n - end, part.size, m, p_.data() + end + o * ld, ld, j, ldj, pht + end, n);
-}
-
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
   if (internal::IsSmall(*this) && h.whole) {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
   }
   const long n = size_;
-  std::fill_n(pht, n * h.rows, 0.0);
-  for (const JacobianPart& part : h.parts) {
-    AddPart(part, h.rows, h.data + part.column, h.stride, pht);
-  }
+  internal::BestVectorKernels().project(p_.data(), p_.rows(), n, {&h, 1}, pht, 1, n);
   for (int i = 0; i < h.rows; ++i) {
     for (int k = 0; k < h.rows; ++k) {
       double sum = 0.0;
@@ -327,40 +266,9 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
   }
 }
 
-void Covariance::Project(std::span<const JacobianRows> rows, Workspace& work, double* pht) const {
-  const Workspace::Use use(work);
-  const long n = size_;
-  long m = 0, most = 0, widest = 0;
-  for (const JacobianRows& h : rows) {
-    m += h.rows;
-    most = std::max<long>(most, h.rows);
-    widest = std::max<long>(widest, h.stride);
-  }
-  if (internal::IsSmall(*this)) {
-    Workspace::Vector s = work.Take(most * most);
-    for (const JacobianRows& h : rows) {
-      Project(h, pht, s.data());
-      pht += n * h.rows;
-    }
-    return;
-  }
-  std::fill_n(pht, n * m, 0.0);
-  Workspace::Vector stacked = work.Take(m * widest);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (std::size_t next = 0; next < rows[i].parts.size();) {
-      const std::size_t first = next;
-      const JacobianPart part = Joined(rows[i].parts, next);
-      const bool done = Has(rows[i], part, first) || (i > 0 && Has(rows[i - 1], part));
-      if (done) continue;
-      int count = 0;
-      for (std::size_t k = i; k < rows.size() && Has(rows[k], part); ++k) {
-        TakeColumns(rows[k], part, stacked.data() + std::ptrdiff_t{count} * part.size);
-        count += rows[k].rows;
-      }
-      AddPart(part, count, stacked.data(), part.size, pht);
-    }
-    pht += n * rows[i].rows;
-  }
+void Covariance::Project(std::span<const JacobianRows> rows, const internal::Panels& pht) const {
+  internal::BestVectorKernels().project(p_.data(), p_.rows(), size_, rows, pht.data, pht.columns,
+                                        pht.height);
 }
 
 Eigen::MatrixXd Covariance::Dense() const {

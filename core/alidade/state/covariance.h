@@ -12,6 +12,10 @@
 
 namespace alidade {
 
+namespace internal {
+struct Panels;
+}  // namespace internal
+
 /// Matrices as they cross the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -53,6 +57,8 @@ class Covariance {
   /// Takes `rows` > 0 new rows, uncorrelated and zero, and returns their offset; a gap that holds
   /// them, the smallest, is used before the end. Amortised O(n).
   int Add(int rows);
+  /// Takes memory for `rows` more at once, or twice what there was. Add does so too.
+  void Reserve(int rows);
   /// Gives [offset, offset + rows) back. O(n).
   void Release(int offset, int rows);
   /// Moves rows into the smallest gap that holds them, releases where they were, and returns their
@@ -75,9 +81,8 @@ class Covariance {
 
   /// pht = P H' (n x m, by columns) and s += H P H' (m x m). O(n m k), k the columns of H's parts.
   void Project(const JacobianRows& h, double* pht, double* s) const;
-  /// pht = P H' of all `rows`, one after the other: n x m, m in all. Faster than one by one where
-  /// they have parts in common.
-  void Project(std::span<const JacobianRows> rows, Workspace& work, double* pht) const;
+  /// pht = P H' of all rows, one after the other: n x m, m in all.
+  void Project(std::span<const JacobianRows> rows, const internal::Panels& pht) const;
   /// s += H P H' alone (m x m). O(m k^2).
   void AddProjection(const JacobianRows& h, double* s) const;
 
@@ -111,7 +116,6 @@ class Covariance {
 
  private:
   int TakeGap(int rows);
-  void AddPart(const JacobianPart& part, int m, const double* j, long ldj, double* pht) const;
   void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
   void Clear(int offset, int rows);
   void PropagateOutside(std::span<const JacobianPart> parts, const double* f);

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/state/tiles.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-
-#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -17,6 +14,16 @@ void ForEachTile(Eigen::Index size, const Take& take) {
 
 Strided ByColumns(const ConstMatrixRef& a) { return {a.data(), 1, a.outerStride()}; }
 Strided Transposed(const ConstMatrixRef& a) { return {a.data(), a.outerStride(), 1}; }
+
+/// Calls take(first, count, a) for the panels: rows [first, first + count), which `a` begins with.
+template <class Take>
+void ForEachPanel(const Panels& panels, const Take& take) {
+  for (Eigen::Index at = 0; at < panels.rows; at += panels.height) {
+    const Eigen::Map<const Eigen::MatrixXd> all(&panels(at, 0), panels.height, panels.columns);
+    const Eigen::Index count = std::min(panels.height, panels.rows - at);
+    take(at, count, all);
+  }
+}
 
 /// C <- C + sign A B of the given depth.
 void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
@@ -59,6 +66,38 @@ void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b) {
                                            b.outerStride());
 }
 
+void DivideByTransposed(const ConstMatrixRef& l, const Panels& b) {
+  BestVectorKernels().divide_panels(b.rows, b.columns, l.data(), l.outerStride(), b.data);
+}
+
+void SubtractOuterProduct(MatrixRef c, const Panels& w) {
+  BestVectorKernels().subtract_outer_product(w.rows, w.columns, w.data, c.data(), c.outerStride());
+}
+
+void AddProduct(VectorRef y, const Panels& a, const ConstVectorRef& x) {
+  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
+    BestVectorKernels().combine(count, a.columns, 1, panel.data(), a.height, x.data(), a.columns,
+                                y.data() + at, y.size());
+  });
+}
+
+void SubtractSquares(VectorRef y, const Panels& a) {
+  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
+    y.segment(at, count) -= panel.topRows(count).rowwise().squaredNorm();
+  });
+}
+
+void Copy(const Panels& a, MatrixRef to) {
+  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
+    to.middleRows(at, count) = panel.topRows(count);
+  });
+}
+
+Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m) {
+  const long height = BestVectorKernels().panel_rows;
+  return {work.Take((n + height - 1) / height * height, m).data(), n, m, height};
+}
+
 void Divide(const ConstMatrixRef& l, MatrixRef b) {
   ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
     const Eigen::Index j = l.rows() - from_end - columns;
@@ -92,21 +131,7 @@ bool Joseph(MatrixRef p, const ConstMatrixRef& k, const ConstMatrixRef& h, const
 }
 
 bool Factorise(MatrixRef s) {
-  if (!s.allFinite()) return false;
-  bool positive = true;
-  ForEachTile(s.rows(), [&](Eigen::Index j, Eigen::Index columns) {
-    if (!positive) return;
-    MatrixRef diagonal = s.block(j, j, columns, columns);
-    AddOuterProduct(diagonal, s.block(j, 0, columns, j), -1.0);
-    const Eigen::LLT<MatrixRef> llt(diagonal);
-    positive = llt.info() == Eigen::Success && (diagonal.diagonal().array() > 0.0).all();
-    const Eigen::Index below = s.rows() - j - columns;
-    MatrixRef panel = s.block(j + columns, j, below, columns);
-    AddProductWithTransposed(panel, s.block(j + columns, 0, below, j), s.block(j, 0, columns, j),
-                             -1.0);
-    DivideByTransposed(diagonal, panel);
-  });
-  return positive;
+  return BestVectorKernels().factorise(s.rows(), s.data(), s.outerStride());
 }
 
 }  // namespace alidade::internal

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "alidade/base/workspace.h"
+#include "alidade/state/vector_kernels.h"
 
 /// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen
 /// is in tiles that it works on the stack: nothing is allocated in the steady state.
@@ -12,6 +13,8 @@ namespace alidade::internal {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
 using ConstMatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
+using VectorRef = Eigen::Ref<Eigen::VectorXd>;
+using ConstVectorRef = Eigen::Ref<const Eigen::VectorXd>;
 
 constexpr Eigen::Index kTile = 32;  // what the kernels leave to Eigen is small then
 
@@ -29,6 +32,17 @@ void AddSymmetricProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrix
 void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a);
 /// B <- B L^-T, L the lower triangle of `l`.
 void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b);
+/// B <- B L^-T of panels, and the lower triangle of C <- C - W W'.
+void DivideByTransposed(const ConstMatrixRef& l, const Panels& b);
+void SubtractOuterProduct(MatrixRef c, const Panels& w);
+/// y <- y + A x.
+void AddProduct(VectorRef y, const Panels& a, const ConstVectorRef& x);
+/// y_i <- y_i - |row i of A|^2.
+void SubtractSquares(VectorRef y, const Panels& a);
+/// to <- A.
+void Copy(const Panels& a, MatrixRef to);
+/// n x m numbers of any value, as the kernels of this processor take them.
+Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m);
 /// B <- B L^-1, L the lower triangle of `l`.
 void Divide(const ConstMatrixRef& l, MatrixRef b);
 /// The lower triangle of P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m,

@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include "alidade/state/covariance.h"
+
 /// The inner loops of large products and factors, once for each instruction set: this build asks
 /// for none, the processor it runs on is asked at run time. The sets differ by rounding alone.
 namespace alidade::internal {
@@ -11,6 +13,19 @@ namespace alidade::internal {
 struct Strided {
   const double* data;
   long row_step, column_step;
+};
+
+/// A matrix in panels of `height` rows one after the other, each by columns: the kernels take it as
+/// it is. What the last panel has below the last row counts for nothing.
+struct Panels {
+  double* data;
+  long rows, columns, height;
+
+  long panel_size() const { return height * columns; }
+  long size() const { return (rows + height - 1) / height * panel_size(); }
+  double& operator()(long i, long j) const {
+    return data[i / height * panel_size() + j * height + i % height];
+  }
 };
 
 struct VectorKernels {
@@ -25,11 +40,25 @@ struct VectorKernels {
   /// Y <- Y + X J' of few columns: X rows x k by columns, J m x k by rows, Y rows x m.
   void (*combine)(long rows, long k, long m, const double* x, long ldx, const double* j, long ldj,
                   double* y, long ldy);
-};
 
-constexpr int kMostTransposed = 8;
-/// to(j, i) = from(i, j) of at most kMostTransposed rows, both by columns.
-void CopyTransposed(int rows, long columns, const double* from, long ld, double* to, long ldt);
+  /// Puts L of a symmetric S = L L', m x m by columns, in place of its lower triangle; false unless
+  /// that is finite and positive definite.
+  bool (*factorise)(long m, double* s, long lds);
+
+  long panel_rows;  ///< the height of the panels of what follows
+  /// B <- B L^-T, B rows x m in panels.
+  void (*divide_panels)(long rows, long m, const double* l, long ldl, double* panels);
+  /// The lower triangle of C <- C - W W', W n x m in panels, C by columns.
+  void (*subtract_outer_product)(long n, long m, const double* panels, double* c, long ldc);
+  /// P H' (n x m) of all rows of H, of the lower triangle of P, n x n by columns. Its rows from a
+  /// multiple `at` of panel_rows on begin at pht + at * row_step: panels have row_step = m and
+  /// ldpht = panel_rows, a matrix 1 and n or more.
+  void (*project)(const double* p, long ld, long n, std::span<const JacobianRows> rows, double* pht,
+                  long row_step, long ldpht);
+  /// The lower triangle of S <- S + H P H', m x m by columns, of P H' (n x m) in panels.
+  void (*add_projected)(long n, std::span<const JacobianRows> rows, const double* panels, double* s,
+                        long lds);
+};
 
 /// Those that this processor runs, the fastest last.
 std::span<const VectorKernels> AllVectorKernels();

@@ -165,10 +165,12 @@ TEST(CompressedEkf, IsTheFullOneWithAConsensusAndLosses) {
   EXPECT_GT(run.counts_.rescued, 0);
 }
 
+// It catches up three times. After that the filter goes astray, and rounding grows tenfold every
+// few frames: two sets of kernels are as far apart as the two forms.
 TEST(CompressedEkf, IsTheFullOneWithAConsiderRole) {
   const auto change = [](System& system) { system.sensors[0].roles[0].mode = RoleMode::kConsider; };
   WallRun run(WithPrior(0.45, 0.1), WithGate(), CovarianceForm::kCompressed, change);
-  ASSERT_NO_FATAL_FAILURE(run.Go(80));
+  ASSERT_NO_FATAL_FAILURE(run.Go(60));
   run.ExpectSame();
 }
 

@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <limits>
+#include <vector>
 
 #include "alidade/base/random.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 namespace {
@@ -81,6 +84,132 @@ TEST(VectorKernels, DividesAsEigen) {
         EXPECT_LE(Difference(product, before.topRows(rows)), 1e-12) << kernels.name << rows << m;
         EXPECT_EQ(b.bottomRows(3), before.bottomRows(3)) << kernels.name << rows;
       }
+    }
+  }
+}
+
+/// `m` in panels, with what is not a number below its last row.
+std::vector<double> InPanels(const MatrixXd& m, long height) {
+  Panels panels{nullptr, m.rows(), m.cols(), height};
+  std::vector<double> data(static_cast<std::size_t>(panels.size()),
+                           std::numeric_limits<double>::quiet_NaN());
+  panels.data = data.data();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    for (Eigen::Index j = 0; j < m.cols(); ++j) panels(i, j) = m(i, j);
+  }
+  return data;
+}
+
+TEST(VectorKernels, PanelsAreDividedAsMatricesAre) {
+  Random random(5);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index rows : kRowCounts) {
+      for (const Eigen::Index m : {0, 1, 4, 9, 64, 300, 600}) {
+        MatrixXd l = 0.1 * Drawn(m, m, random);
+        l.diagonal().array() += 2.0;
+        const MatrixXd before = Drawn(rows, m, random);
+        std::vector<double> data = InPanels(before, kernels.panel_rows);
+        kernels.divide_panels(rows, m, l.data(), l.outerStride(), data.data());
+        const Panels panels{data.data(), rows, m, kernels.panel_rows};
+        MatrixXd b(rows, m);
+        Copy(panels, b);
+        const MatrixXd product = b * MatrixXd(l.triangularView<Eigen::Lower>()).transpose();
+        EXPECT_LE(Difference(product, before), 1e-12) << kernels.name << rows << ' ' << m;
+      }
+    }
+  }
+}
+
+TEST(VectorKernels, OuterProductOfPanelsLeavesWhatIsAboveItAndBesideIt) {
+  Random random(6);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index n : {0, 1, 5, 8, 11, 24, 31, 47, 200, 413}) {
+      for (const Eigen::Index m : {0, 1, 7, 300}) {
+        const MatrixXd w = Drawn(n, m, random), before = Drawn(n + 3, n + 1, random);
+        MatrixXd c = before, expected = before;
+        expected.topLeftCorner(n, n).triangularView<Eigen::Lower>() -= MatrixXd(w * w.transpose());
+        const std::vector<double> data = InPanels(w, kernels.panel_rows);
+        kernels.subtract_outer_product(n, m, data.data(), c.data(), c.outerStride());
+        EXPECT_LE(Difference(c, expected), 1e-12) << kernels.name << n << ' ' << m;
+        expected.topLeftCorner(n, n).triangularView<Eigen::Lower>().setZero();
+        c.topLeftCorner(n, n).triangularView<Eigen::Lower>().setZero();
+        EXPECT_EQ(c, expected) << kernels.name << n << ' ' << m;
+      }
+    }
+  }
+}
+
+/// Rows of H with parts of their own, parts that several have, and one that a row has twice.
+struct SparseRows {
+  SparseRows(int n, Random& random) {
+    const auto part = [n](int offset, int size, int column) {
+      return JacobianPart{std::min(offset, n - 1), std::min(size, n - std::min(offset, n - 1)),
+                          column};
+    };
+    parts = {{},
+             {part(0, 7, 0), part(20, 3, 7)},
+             {part(0, 7, 0), part(23, 6, 7)},
+             {part(2, 1, 0), part(40, 30, 1), part(2, 1, 31)},
+             {part(n - 1, 1, 0)}};
+    counts = {2, 2, 3, 1, 9};
+    for (const int count : counts) data.emplace_back(Drawn(40, count, random));
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      rows.push_back({data[i].data(), counts[i], 40, parts[i]});
+    }
+    dense = MatrixXd::Zero(17, n);
+    for (Eigen::Index i = 0, at = 0; i < 5; at += counts[static_cast<std::size_t>(i)], ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      for (const JacobianPart& one : parts[k]) {
+        dense.block(at, one.offset, counts[k], one.size) +=
+            data[k].middleRows(one.column, one.size).transpose();
+      }
+    }
+  }
+
+  std::vector<std::vector<JacobianPart>> parts;
+  std::vector<int> counts;
+  std::vector<MatrixXd> data;  ///< each transposed
+  std::vector<JacobianRows> rows;
+  MatrixXd dense;
+};
+
+TEST(VectorKernels, ProjectsAsTheDenseProduct) {
+  Random random(8);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const int n : {1, 2, 7, 8, 23, 24, 25, 26, 31, 48, 55, 100, 193}) {
+      const SparseRows h(n, random);
+      MatrixXd p = Drawn(n, n, random), s = Drawn(17, 17, random);
+      p.triangularView<Eigen::StrictlyUpper>().fill(std::numeric_limits<double>::quiet_NaN());
+      const MatrixXd whole = p.selfadjointView<Eigen::Lower>(),
+                     expected = whole * h.dense.transpose();
+      std::vector<double> data = InPanels(MatrixXd::Zero(n, 17), kernels.panel_rows);
+      const Panels pht{data.data(), n, 17, kernels.panel_rows};
+      kernels.project(p.data(), n, n, h.rows, pht.data, 17, kernels.panel_rows);
+      MatrixXd copied(n, 17), matrix(n, 17);
+      Copy(pht, copied);
+      EXPECT_LE(Difference(copied, expected), 1e-13) << kernels.name << n;
+      kernels.project(p.data(), n, n, h.rows, matrix.data(), 1, n);
+      EXPECT_EQ(matrix, copied) << kernels.name << n;
+
+      MatrixXd sum = s;
+      sum.triangularView<Eigen::Lower>() += h.dense * expected;
+      kernels.add_projected(n, h.rows, pht.data, s.data(), 17);
+      EXPECT_LE(Difference(s, sum), 1e-13) << kernels.name << n;
+    }
+  }
+}
+
+TEST(VectorKernels, FactorisesAsEigen) {
+  Random random(9);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index m : {0, 1, 3, 4, 8, 9, 24, 25, 80, 300}) {
+      const MatrixXd root = Drawn(m, m, random);
+      MatrixXd s = root * root.transpose() + MatrixXd::Identity(m, m);
+      const Eigen::LLT<MatrixXd> llt(s);
+      s.triangularView<Eigen::StrictlyUpper>().fill(std::numeric_limits<double>::quiet_NaN());
+      EXPECT_TRUE(kernels.factorise(m, s.data(), m)) << kernels.name << m;
+      const MatrixXd l = s.triangularView<Eigen::Lower>();
+      EXPECT_LE(Difference(l, llt.matrixL()), 1e-12) << kernels.name << m;
     }
   }
 }

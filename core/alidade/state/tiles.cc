@@ -19,7 +19,8 @@ Strided Transposed(const ConstMatrixRef& a) { return {a.data(), a.outerStride(),
 template <class Take>
 void ForEachPanel(const Panels& panels, const Take& take) {
   for (Eigen::Index at = 0; at < panels.rows; at += panels.height) {
-    const Eigen::Map<const Eigen::MatrixXd> all(&panels(at, 0), panels.height, panels.columns);
+    const Eigen::Map<const Eigen::MatrixXd> all(panels.data + at * panels.columns, panels.height,
+                                                panels.columns);
     const Eigen::Index count = std::min(panels.height, panels.rows - at);
     take(at, count, all);
   }

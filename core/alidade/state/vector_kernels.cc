@@ -369,16 +369,19 @@ struct Loops {
   using Block = Vector[kLanes];
   static constexpr auto kAll = std::make_integer_sequence<int, kLanes>{};
 
-  /// Swaps elements (i, j + d) and (i + d, j) of a block where neither i nor j has the bit d; k are
-  /// 0, 1, ... kLanes - 1.
-  template <int d, int... k>
-  [[gnu::always_inline]] static void Exchange(Block& a, std::integer_sequence<int, k...> /*k*/) {
+  /// Swaps elements (i, j + kBit) and (i + kBit, j) of a block where neither i nor j has that bit;
+  /// kIndex are 0, 1, ... kLanes - 1.
+  template <int kBit, int... kIndex>
+  [[gnu::always_inline]] static void Exchange(Block& a,
+                                              std::integer_sequence<int, kIndex...> /*all*/) {
 #pragma GCC unroll 8
     for (int i = 0; i < kLanes; ++i) {
-      if ((i & d) != 0) continue;
-      const Vector first = a[i], second = a[i + d];
-      a[i] = __builtin_shufflevector(first, second, ((k & d) != 0 ? k - d + kLanes : k)...);
-      a[i + d] = __builtin_shufflevector(first, second, ((k & d) != 0 ? k + kLanes : k + d)...);
+      if ((i & kBit) != 0) continue;
+      const Vector first = a[i], second = a[i + kBit];
+      a[i] = __builtin_shufflevector(first, second,
+                                     ((kIndex & kBit) != 0 ? kIndex - kBit + kLanes : kIndex)...);
+      a[i + kBit] = __builtin_shufflevector(
+          first, second, ((kIndex & kBit) != 0 ? kIndex + kLanes : kIndex + kBit)...);
     }
   }
 
@@ -401,22 +404,21 @@ struct Loops {
     }
   }
 
-  /// Elements c, c + 1, ... of the first vector, those before of the other.
-  template <int c, int... k>
+  /// Elements kFirst, kFirst + 1, ... of the first vector, those before of the other.
+  template <int kFirst, int... kIndex>
   [[gnu::always_inline]] static Vector FromPlace(const Vector& from, const Vector& before,
-                                                 std::integer_sequence<int, k...> /*k*/) {
-    return __builtin_shufflevector(from, before, (k < c ? k + kLanes : k)...);
+                                                 std::integer_sequence<int, kIndex...> /*all*/) {
+    return __builtin_shufflevector(from, before, (kIndex < kFirst ? kIndex + kLanes : kIndex)...);
   }
 
-  /// A block on the diagonal of a symmetric matrix, of its lower triangle; c are 0, 1, ...
-  /// kLanes - 1.
-  template <int... c>
+  /// A block on the diagonal of a symmetric matrix, of its lower triangle; kIndex as above.
+  template <int... kIndex>
   [[gnu::always_inline]] static void TakeOwn(const double* from, long ld, double* to,
-                                             std::integer_sequence<int, c...> all) {
+                                             std::integer_sequence<int, kIndex...> all) {
     Block lower, upper;
-    ((upper[c] = lower[c] = Load(from + c * ld)), ...);
+    ((upper[kIndex] = lower[kIndex] = Load(from + kIndex * ld)), ...);
     Transpose(upper);
-    (Store(to + c * kRows, FromPlace<c>(lower[c], upper[c], all)), ...);
+    (Store(to + kIndex * kRows, FromPlace<kIndex>(lower[kIndex], upper[kIndex], all)), ...);
   }
 
   /// Rows and columns [at, at + count), kRows at most, of the symmetric P; zeros below.
@@ -499,7 +501,7 @@ struct Loops {
   /// The same, in a register: the compiler would load it for each row again, and P H' waits for its
   /// loads (a quarter of its time).
   [[gnu::always_inline]] static Vector Held(Vector v) {
-#if defined(__x86_64__)
+#if defined(__x86_64__) && !defined(__clang__)
     asm("" : "+v"(v));
 #endif
     return v;

@@ -387,21 +387,11 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
   for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
   bool asked_map = prior_.adapt_after == 0;
-  Reserve(f, rows);
-  const int with_prior =
-      prior_.min_observations > 0 ? prior_.min_observations : options_.min_observations;
+  Reserve(f, rows, options_.max_per_frame - measured);
   for (Row& row : rows) {
     if (measured >= options_.max_per_frame) return;
-    if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
-        row.binding->model.initialised_role() != FamilyOf(row).first) {
-      continue;
-    }
-    const auto found = landmarks_.find(row.measurement->landmark);
-    const bool takes_prior = row.binding->model.prior_size() > 0;
-    if (found == landmarks_.end() || found->second.in_state() ||
-        found->second.observations < (takes_prior ? with_prior : options_.min_observations)) {
-      continue;
-    }
+    const auto found = FindWaiting(f, row);
+    if (found == landmarks_.end()) continue;
     if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state);
     asked_map = true;
     row.report->outcome = Initialise(f, found->first, row, found->second);
@@ -411,12 +401,28 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
   }
 }
 
-/// Takes memory for all that wait at once: the first frame has many.
-void Landmarks::Reserve(FilterState& f, std::span<const Row> rows) const {
+/// The landmark that the row may initialise, or the end.
+Landmarks::ById::iterator Landmarks::FindWaiting(const FilterState& f, const Row& row) {
+  if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
+      row.binding->model.initialised_role() != FamilyOf(row).first) {
+    return landmarks_.end();
+  }
+  const bool takes_prior = row.binding->model.prior_size() > 0 && prior_.min_observations > 0;
+  const int least = takes_prior ? prior_.min_observations : options_.min_observations;
+  const auto found = landmarks_.find(row.measurement->landmark);
+  const bool waits =
+      found != landmarks_.end() && !found->second.in_state() && found->second.observations >= least;
+  return waits ? found : landmarks_.end();
+}
+
+/// Takes memory at once for those that may come, `most`: the first frame has many.
+void Landmarks::Reserve(FilterState& f, std::span<const Row> rows, std::ptrdiff_t most) {
   int size = 0;
   for (const Row& row : rows) {
-    if (!Has(row) || row.report->outcome != Outcome::kNotReady) continue;
-    for (const Space& space : FamilyOf(row).roles) size += space.geometry.tangent;
+    if (most <= 0) break;
+    if (FindWaiting(f, row) == landmarks_.end()) continue;
+    for (const Space& role : FamilyOf(row).roles) size += role.shared() ? 0 : role.geometry.tangent;
+    --most;
   }
   f.state.covariance().Reserve(size);
 }

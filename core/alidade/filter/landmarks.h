@@ -86,7 +86,8 @@ class Landmarks {
   void Convert(FilterState& f, std::span<Row> rows);
   bool ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark, const Row& row);
   void InitialiseNew(FilterState& f, std::span<Row> rows);
-  void Reserve(FilterState& f, std::span<const Row> rows) const;
+  ById::iterator FindWaiting(const FilterState& f, const Row& row);
+  void Reserve(FilterState& f, std::span<const Row> rows, std::ptrdiff_t most);
   void FindMeasured(std::span<Row> rows);
   double PriorInverseDistance(const State& state);
   Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);

@@ -132,7 +132,7 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
 /// Few states and few rows, in arrays: CorrectLarge takes longer there.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
   constexpr std::size_t kMost = kSmall;
-  std::array<double, kMost * kMost> pht, own_s, s, w, gain;
+  std::array<double, kMost * kMost> pht, hpht, s, w, gain;
   std::array<double, kMost> innovation, inverse_d, dx;
   const auto n = static_cast<std::size_t>(f.size());
   const int m = static_cast<int>(CountOf(rows));
@@ -143,8 +143,8 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     const JacobianRows h = row->jacobian();
     const auto k = static_cast<std::size_t>(entry.dof);
     std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
-    std::fill_n(own_s.begin(), k * k, 0.0);  // H P H', which S has
-    f.state.covariance().Project(h, pht.data() + at * n, own_s.data());
+    std::fill_n(hpht.begin(), k * k, 0.0);  // not wanted: the report has S
+    f.state.covariance().Project(h, pht.data() + at * n, hpht.data());
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
       for (std::size_t j = 0; j < at; ++j) {  // H of this row times P H' of those before

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "alidade/filter/method.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/panels.h"
 
 namespace alidade::internal {
 

@@ -2,9 +2,9 @@
 #include "alidade/filter/stacked.h"
 
 #include <algorithm>
-#include <array>
 
 #include "alidade/state/tiles.h"
+#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/filter/filter_state.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/panels.h"
 
 /// The rows of an update as whole matrices, m rows in all, n = size of P: what methods share.
 namespace alidade::internal {

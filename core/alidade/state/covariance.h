@@ -9,12 +9,9 @@
 
 #include "alidade/base/eigen_alignment.h"
 #include "alidade/base/workspace.h"
+#include "alidade/state/panels.h"
 
 namespace alidade {
-
-namespace internal {
-struct Panels;
-}  // namespace internal
 
 /// Matrices as they cross the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -57,7 +54,7 @@ class Covariance {
   /// Takes `rows` > 0 new rows, uncorrelated and zero, and returns their offset; a gap that holds
   /// them, the smallest, is used before the end. Amortised O(n).
   int Add(int rows);
-  /// Takes memory for `rows` more at once, or twice what there was. Add does so too.
+  /// Takes memory for `rows` more at once, and an eighth, or twice what there was. Add does so too.
   void Reserve(int rows);
   /// Gives [offset, offset + rows) back. O(n).
   void Release(int offset, int rows);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "alidade/state/vector_kernels.h"
+
 namespace alidade::internal {
 namespace {
 

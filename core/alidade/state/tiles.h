@@ -5,7 +5,7 @@
 #include <span>
 
 #include "alidade/base/workspace.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/panels.h"
 
 /// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen
 /// is in tiles that it works on the stack: nothing is allocated in the steady state.

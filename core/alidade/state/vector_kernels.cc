@@ -26,9 +26,10 @@ class Buffer {
  public:
   double* Take(long size) {
     if (size > size_) {
-      size_ = std::max(size, 2 * size_);
+      const long larger = std::max(size, 2 * size_);
       data_.reset(static_cast<double*>(
-          ::operator new(static_cast<std::size_t>(size_) * sizeof(double), kLine)));
+          ::operator new(static_cast<std::size_t>(larger) * sizeof(double), kLine)));
+      size_ = larger;
     }
     return data_.get();
   }
@@ -58,6 +59,7 @@ std::span<const Run> RunsOf(std::span<const JacobianRows> rows, long n) {
     for (const JacobianPart& part : h.parts) std::fill_n(has.begin() + part.offset, part.size, 1);
   }
   runs.clear();
+  runs.reserve(static_cast<std::size_t>(n + 1) / 2);
   for (auto at = has.begin(); at != has.end();) {
     const auto first = std::find(at, has.end(), char{1});
     at = std::find(first, has.end(), char{0});
@@ -391,7 +393,7 @@ struct Loops {
     if constexpr (kLanes > 4) Exchange<4>(a, kAll);
   }
 
-  /// to(i, j) = from(j, i), i < count <= kLanes, j < kLanes, both by columns.
+  /// to(i, j) = from(j, i), i, j < kLanes, i < count, both by columns.
   [[gnu::always_inline]] static void Transpose(long count, const double* from, long ld, double* to,
                                                long ldt) {
     Block a;
@@ -498,7 +500,7 @@ struct Loops {
     }
   }
 
-  /// The same, in a register: the compiler would load it for each row again, and P H' waits for its
+  /// `v`, in a register: the compiler would load it for each row again, and P H' waits for its
   /// loads (a quarter of its time).
   [[gnu::always_inline]] static Vector Held(Vector v) {
 #if defined(__x86_64__) && !defined(__clang__)

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "alidade/state/covariance.h"
+#include "alidade/state/panels.h"
 
 /// The inner loops of large products and factors, once for each instruction set: this build asks
 /// for none, the processor it runs on is asked at run time. The sets differ by rounding alone.
@@ -13,19 +14,6 @@ namespace alidade::internal {
 struct Strided {
   const double* data;
   long row_step, column_step;
-};
-
-/// A matrix in panels of `height` rows one after the other, each by columns: the kernels take it as
-/// it is. What the last panel has below the last row counts for nothing.
-struct Panels {
-  double* data;
-  long rows, columns, height;
-
-  long panel_size() const { return height * columns; }
-  long size() const { return (rows + height - 1) / height * panel_size(); }
-  double& operator()(long i, long j) const {
-    return data[i / height * panel_size() + j * height + i % height];
-  }
 };
 
 struct VectorKernels {
@@ -52,7 +40,7 @@ struct VectorKernels {
   void (*subtract_outer_product)(long n, long m, const double* panels, double* c, long ldc);
   /// P H' (n x m) of all rows of H, of the lower triangle of P, n x n by columns. Its rows from a
   /// multiple `at` of panel_rows on begin at pht + at * row_step: panels have row_step = m and
-  /// ldpht = panel_rows, a matrix 1 and n or more.
+  /// ldpht = panel_rows, a matrix 1 and n.
   void (*project)(const double* p, long ld, long n, std::span<const JacobianRows> rows, double* pht,
                   long row_step, long ldpht);
   /// The lower triangle of S <- S + H P H', m x m by columns, of P H' (n x m) in panels.

@@ -77,6 +77,17 @@ TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
             Outcome::kInitialised);
 }
 
+TEST(Landmarks, ThatHaveToWaitTakeNoMemory) {
+  LandmarkOptions options;
+  options.max_per_frame = 2;
+  Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
+  std::vector<Observation> many;
+  for (int id = 0; id < 200; ++id) many.push_back({id, {0.01 * id, 0, 1}});
+  EXPECT_EQ(ekf.Process(FrameOf(0.0, many)).landmarks.initialised, 2);
+  const Covariance& p = ekf.state().covariance();
+  EXPECT_LE(p.lower().outerStride(), 2 * p.size());
+}
+
 // FAULTS 39
 TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   LandmarkOptions options;

@@ -118,7 +118,7 @@ TEST(Covariance, ProjectOfFewStatesEqualsTheDenseProduct) {
   EXPECT_LT((pht - p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
   EXPECT_LT((s - h * pht).norm(), kRounding * pht.norm());
   p.AddProjection(rows, added.data());
-  EXPECT_EQ(added, s);
+  EXPECT_LT((added - h * p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
 }
 
 TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "alidade/base/random.h"
@@ -141,6 +142,8 @@ TEST(VectorKernels, OuterProductOfPanelsLeavesWhatIsAboveItAndBesideIt) {
 
 /// Rows of H with parts of their own, parts that several have, and one that a row has twice.
 struct SparseRows {
+  static constexpr int kRows = 57;  ///< of more than one panel of any kernels
+
   SparseRows(int n, Random& random) {
     const auto part = [n](int offset, int size, int column) {
       return JacobianPart{std::min(offset, n - 1), std::min(size, n - std::min(offset, n - 1)),
@@ -151,12 +154,12 @@ struct SparseRows {
              {part(0, 7, 0), part(23, 6, 7)},
              {part(2, 1, 0), part(40, 30, 1), part(2, 1, 31)},
              {part(n - 1, 1, 0)}};
-    counts = {2, 2, 3, 1, 9};
+    counts = {2, 2, 3, 1, kRows - 8};
     for (const int count : counts) data.emplace_back(Drawn(40, count, random));
     for (std::size_t i = 0; i < parts.size(); ++i) {
       rows.push_back({data[i].data(), counts[i], 40, parts[i]});
     }
-    dense = MatrixXd::Zero(17, n);
+    dense = MatrixXd::Zero(kRows, n);
     for (Eigen::Index i = 0, at = 0; i < 5; at += counts[static_cast<std::size_t>(i)], ++i) {
       const auto k = static_cast<std::size_t>(i);
       for (const JacobianPart& one : parts[k]) {
@@ -178,38 +181,59 @@ TEST(VectorKernels, ProjectsAsTheDenseProduct) {
   for (const VectorKernels& kernels : AllVectorKernels()) {
     for (const int n : {1, 2, 7, 8, 23, 24, 25, 26, 31, 48, 55, 100, 193}) {
       const SparseRows h(n, random);
-      MatrixXd p = Drawn(n, n, random), s = Drawn(17, 17, random);
+      constexpr int m = SparseRows::kRows;
+      MatrixXd p = Drawn(n, n, random), s = Drawn(m, m, random);
       p.triangularView<Eigen::StrictlyUpper>().fill(std::numeric_limits<double>::quiet_NaN());
       const MatrixXd whole = p.selfadjointView<Eigen::Lower>(),
                      expected = whole * h.dense.transpose();
-      std::vector<double> data = InPanels(MatrixXd::Zero(n, 17), kernels.panel_rows);
-      const Panels pht{data.data(), n, 17, kernels.panel_rows};
-      kernels.project(p.data(), n, n, h.rows, pht.data, 17, kernels.panel_rows);
-      MatrixXd copied(n, 17), matrix(n, 17);
+      std::vector<double> data = InPanels(MatrixXd::Zero(n, m), kernels.panel_rows);
+      const Panels pht{data.data(), n, m, kernels.panel_rows};
+      kernels.project(p.data(), n, n, h.rows, pht.data, m, kernels.panel_rows);
+      MatrixXd copied(n, m), matrix(n, m + 1);
       Copy(pht, copied);
       EXPECT_LE(Difference(copied, expected), 1e-13) << kernels.name << n;
+      matrix.col(m).setConstant(7.0);
       kernels.project(p.data(), n, n, h.rows, matrix.data(), 1, n);
-      EXPECT_EQ(matrix, copied) << kernels.name << n;
+      EXPECT_EQ(matrix.leftCols(m), copied) << kernels.name << n;
+      EXPECT_TRUE((matrix.col(m).array() == 7.0).all()) << kernels.name << n;
 
       MatrixXd sum = s;
       sum.triangularView<Eigen::Lower>() += h.dense * expected;
-      kernels.add_projected(n, h.rows, pht.data, s.data(), 17);
+      kernels.add_projected(n, h.rows, pht.data, s.data(), m);
       EXPECT_LE(Difference(s, sum), 1e-13) << kernels.name << n;
     }
   }
 }
 
-TEST(VectorKernels, FactorisesAsEigen) {
+TEST(VectorKernels, FactorisesAsEigenAndLeavesTheRest) {
   Random random(9);
   for (const VectorKernels& kernels : AllVectorKernels()) {
     for (const Eigen::Index m : {0, 1, 3, 4, 8, 9, 24, 25, 80, 300}) {
       const MatrixXd root = Drawn(m, m, random);
-      MatrixXd s = root * root.transpose() + MatrixXd::Identity(m, m);
-      const Eigen::LLT<MatrixXd> llt(s);
-      s.triangularView<Eigen::StrictlyUpper>().fill(std::numeric_limits<double>::quiet_NaN());
-      EXPECT_TRUE(kernels.factorise(m, s.data(), m)) << kernels.name << m;
-      const MatrixXd l = s.triangularView<Eigen::Lower>();
-      EXPECT_LE(Difference(l, llt.matrixL()), 1e-12) << kernels.name << m;
+      const MatrixXd s = root * root.transpose() + MatrixXd::Identity(m, m);
+      const MatrixXd l = Eigen::LLT<MatrixXd>(s).matrixL();
+      MatrixXd found = MatrixXd::Constant(m + 3, m, -1e300), expected = found;
+      found.topRows(m).triangularView<Eigen::Lower>() = s;
+      expected.topRows(m).triangularView<Eigen::Lower>() = l;
+      EXPECT_TRUE(kernels.factorise(m, found.data(), m + 3)) << kernels.name << m;
+      EXPECT_LE(Difference(found.topRows(m).triangularView<Eigen::Lower>(), l), 1e-12)
+          << kernels.name << m;
+      found.topRows(m).triangularView<Eigen::Lower>() = l;
+      EXPECT_EQ(found, expected) << kernels.name << m;
+    }
+  }
+}
+
+TEST(VectorKernels, WhatHasNoFactorIsRefused) {
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const auto& [i, j] : {std::pair{0, 0}, {30, 30}, {70, 70}, {1, 0}, {30, 2}, {70, 30}}) {
+      for (const double wrong :
+           {-2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+            -std::numeric_limits<double>::infinity()}) {
+        MatrixXd s = MatrixXd::Identity(71, 71);
+        s(i, j) = wrong;
+        EXPECT_FALSE(kernels.factorise(71, s.data(), 71)) << kernels.name << i << ' ' << j;
+      }
     }
   }
 }

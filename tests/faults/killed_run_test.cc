@@ -43,8 +43,8 @@ class KilledRun : public ProgramTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
-  /// At a random moment: of its whole time, or (every other round) of that after its first rows. One
-  /// that had ended before tells that it takes less than `took_s`: the machine has less to do now.
+  /// At a random moment: of its whole time, or (every other round) of that after its first rows.
+  /// One that had ended before tells that it takes less than `took_s`: less runs beside it now.
   void Kill(const Arguments& arguments, int round, double& took_s) {
     const pid_t process = Start(arguments);
     if (round % 2 == 1) {

@@ -88,17 +88,19 @@ struct Loops {
     std::memcpy(to, &v, sizeof v);
   }
 
-  /// sum += A B of a panel of A, kRows rows, and one of B, kColumns columns.
+  /// sum += A B of the first kHeight vectors of a panel of A and kColumns columns of B, the rows of
+  /// B `step` apart.
+  template <int kHeight>
   [[gnu::always_inline]] static void Multiply(long depth, const double* a, const double* b,
-                                              Tile& sum) {
-    for (long k = 0; k < depth; ++k, a += kRows, b += kColumns) {
-      Vector left[kVectors];
+                                              long step, Vector (&sum)[kColumns][kHeight]) {
+    for (long k = 0; k < depth; ++k, a += kRows, b += step) {
+      Vector left[kHeight];
 #pragma GCC unroll 8
-      for (int v = 0; v < kVectors; ++v) left[v] = Load(a + v * kLanes);
+      for (int v = 0; v < kHeight; ++v) left[v] = Load(a + v * kLanes);
 #pragma GCC unroll 8
       for (int c = 0; c < kColumns; ++c) {
 #pragma GCC unroll 8
-        for (int v = 0; v < kVectors; ++v) sum[c][v] += left[v] * b[c];
+        for (int v = 0; v < kHeight; ++v) sum[c][v] += left[v] * b[c];
       }
     }
   }
@@ -182,7 +184,7 @@ struct Loops {
               const long shift = i + p - (j + q);  // of the tile below C's diagonal
               if (lower && shift + kRows <= 0) continue;
               Tile sum = {};
-              Multiply(deep, left + p * deep, right + q * deep, sum);
+              Multiply(deep, left + p * deep, right + q * deep, kColumns, sum);
               AddTile(sum, std::min<long>(kRows, high - p), std::min<long>(kColumns, wide - q),
                       !lower || shift >= kColumns - 1, shift, c + i + p + (j + q) * ldc, ldc);
             }
@@ -304,16 +306,7 @@ struct Loops {
                                                   long rows, long columns, long shift, double* c,
                                                   long ldc) {
     Vector sum[kColumns][kHeight] = {};
-    for (long k = 0; k < depth; ++k, a += kRows, b += kRows) {
-      Vector left[kHeight];
-#pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) left[v] = Load(a + v * kLanes);
-#pragma GCC unroll 8
-      for (int j = 0; j < kColumns; ++j) {
-#pragma GCC unroll 8
-        for (int v = 0; v < kHeight; ++v) sum[j][v] += left[v] * b[j];
-      }
-    }
+    Multiply(depth, a, b, kRows, sum);
 #pragma GCC unroll 8
     for (int j = 0; j < kColumns; ++j) {
       if (j >= columns) return;
@@ -537,8 +530,8 @@ struct Loops {
   }
 
   /// All columns of Y = X H'.
-  [[gnu::always_inline]] static void Multiply(const JacobianRows& h, const double* x, double* y,
-                                              long ldy) {
+  [[gnu::always_inline]] static void MultiplyByRows(const JacobianRows& h, const double* x,
+                                                    double* y, long ldy) {
     long row = 0;
     for (; row + 4 <= h.rows; row += 4) MultiplyRows<4>(h, row, x, y + row * ldy, ldy);
     if (h.rows - row == 3) MultiplyRows<3>(h, row, x, y + row * ldy, ldy);
@@ -561,7 +554,7 @@ struct Loops {
       const long ldy = fits ? ldpht : kRows;
       double* y = fits ? pht + at * row_step : last;
       for (const JacobianRows& h : rows) {
-        Multiply(h, x, y, ldy);
+        MultiplyByRows(h, x, y, ldy);
         y += h.rows * ldy;
       }
       for (long k = 0; !fits && k < m; ++k) {
@@ -586,7 +579,7 @@ struct Loops {
       long k = 0;
       for (const JacobianRows& h : rows) {
         if (k >= end) break;  // to the right of the diagonal
-        Multiply(h, x, y, kRows);
+        MultiplyByRows(h, x, y, kRows);
         for (long c = 0; c < h.rows; ++c, ++k) {
           for (long i = std::max(at, k); i < end; ++i) s[i + k * lds] += y[c * kRows + i - at];
         }

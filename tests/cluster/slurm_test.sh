@@ -95,11 +95,12 @@ eventually test -e "$work/first"
 eventually has_ended
 diff -r "$work/first_whole" "$work/first" || fail "the merged shards are others"
 
-# Cancelled while the second shard is running: what is finished is kept, nothing is merged.
+# Cancelled while both shards are running: what is finished is kept, nothing is merged.
 runs=(--runs 800 --set source.duration_s=60)
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
-has_begun() { compgen -G "$work/second.shards/.2.partial-*/.keep"; }
-eventually has_begun
+has_begun() { compgen -G "$work/second.shards/.$1.partial-*/.keep"; }
+eventually has_begun 1
+eventually has_begun 2
 scancel --name=sweep
 eventually has_ended
 [[ ! -e $work/second ]] || fail "it was merged without a shard"

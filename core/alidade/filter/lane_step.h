@@ -31,8 +31,8 @@ namespace internal {
 inline bool Less(double a, double b) { return a < b; }
 inline bool LessEqual(double a, double b) { return a <= b; }
 inline bool Equal(double a, double b) { return a == b; }
-inline bool NotEqual(double a, double b) { return a != b; }
 inline bool Any(bool mask) { return mask; }
+inline bool All(bool mask) { return mask; }
 
 /// Whether a geometry has one coordinate for each direction of its tangent.
 template <class G>
@@ -98,6 +98,7 @@ template <class S, class... Motions>
 class LaneStep {
  public:
   using State = LaneState<S, Motions...>;
+  using Flags = internal::Flags<S>;
   using Spaces = typename State::Composed::Spaces;
   static constexpr int kAmbient = State::kAmbient, kTangent = State::kTangent;
   static constexpr int kBlocks = State::Composed::kBlocks;
@@ -120,24 +121,23 @@ class LaneStep {
   /// What became of a measurement; of a pack, of the lanes that are active.
   struct Result {
     StaticOutcome outcome;  ///< of those that are not accepted
-    S accepted;             ///< 1 or 0
+    Flags accepted;
   };
-  /// `active` is 1 or 0.
   template <class Model, int... Roles>
-  Result Update(const ArrayUpdate<Model, Roles...>& update, const S* z, const S& active);
+  Result Update(const ArrayUpdate<Model, Roles...>& update, const S* z, const Flags& active);
 
   /// Whether all is finite: x, P, and of a pack every S, which besides was positive. Of a pack no
-  /// too where their sum is not.
+  /// too where their sum is not. Of P the diagonal tells, as no other element is larger.
   bool IsFinite() const {
     S sum = doubt_, other(0.0);
     if constexpr (std::is_same_v<S, double>) {  // 0 times what is not finite is not a number
       for (const double one : s_.x) sum += 0.0 * one;
-      for (const double one : s_.p) sum += 0.0 * one;
+      For<kTangent>([&](auto i) { sum += 0.0 * s_.p[At(i, i)]; });
     } else {
       For<kAmbient>([&](auto i) { sum += s_.x[i]; });
-      For<State::kTriangle>([&](auto i) { (i % 2 == 0 ? other : sum) += s_.p[i]; });
+      For<kTangent>([&](auto i) { (i % 2 == 0 ? other : sum) += s_.p[At(i, i)]; });
     }
-    return !Any(NotEqual(S(0.0 * (sum + other)), S(0.0)));
+    return All(Mask(And(sound_, Equal(S(0.0 * (sum + other)), S(0.0)))));
   }
 
  private:
@@ -194,12 +194,16 @@ class LaneStep {
   void Hold(const S& goes_on, Transition<N, kNoise>& t);
   template <std::size_t M, int N, int kNoise>
   void Take(const Transition<N, kNoise>& t);
+  Result CorrectByRow(const S (&pht)[kTangent][1], const S& s, const S& innovation, double gate,
+                      const Flags& active);
   template <int kRows>
   Result Correct(const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
-                 const S& active);
+                 const Flags& active);
+  Result Corrected(const Flags& accepted);
 
   State& s_;
-  S doubt_{0.0};  ///< not finite where a pack has to be done lane by lane
+  S doubt_{0.0};                 ///< of a pack: not finite where it has to be done lane by lane
+  Flags sound_ = AllFlags<S>();  ///< of a pack: false where it has to be likewise
   const std::tuple<Motions...>& motions_;
 };
 
@@ -342,7 +346,7 @@ void LaneStep<S, Motions...>::Take(const Transition<N, kNoise>& t) {
 template <class S, class... Motions>
 template <class Model, int... Roles>
 typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
-    const ArrayUpdate<Model, Roles...>& update, const S* z, const S& active) {
+    const ArrayUpdate<Model, Roles...>& update, const S* z, const Flags& active) {
   using Z = typename Model::Measurement;
   using All = detail::Blocks<Model>;
   constexpr typename All::Indices indices{};
@@ -372,7 +376,7 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
     used += detail::SpaceAt<i, Model>::kTangent;
   });
   if (!detail::CallPredict(sensor, x, nullptr, value, indices)) {
-    return {StaticOutcome::kOutOfDomain, S(0.0)};
+    return {StaticOutcome::kOutOfDomain, And(active, Less(S(0.0), S(0.0)))};
   }
   S l[m * m], h[m], r[m], pht[kTangent][m], s[m][m];
   For<m * m>([&](auto i) { l[i] = S(0.0); });
@@ -394,22 +398,53 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
       For<m>([&](auto k) { s[i][j] += l[i * m + k] * l[j * m + k]; });
     });
   });
-  return Correct<m>(pht, s, r, update.gate, active);
+  if constexpr (m == 1) {
+    return CorrectByRow(pht, s[0][0], r[0], update.gate, active);
+  } else {
+    return Correct<m>(pht, s, r, update.gate, active);
+  }
+}
+
+/// Of one row: K = P H' / S, x += K r, P -= K H P, where NIS = r^2 / S is within the gate. The
+/// quotient is what takes time: only K waits for it.
+template <class S, class... Motions>
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::CorrectByRow(
+    const S (&pht)[kTangent][1], const S& s, const S& innovation, double gate,
+    const Flags& active) {
+  const S zero(0.0);
+  const S r = Select(Mask(active), innovation, zero), squared = r * r, inverse = 1.0 / s;
+  const S doubt = s + squared * inverse;  // neither S nor NIS may be beyond what is finite
+  const auto within = LessEqual(squared, gate * s);
+  if constexpr (std::is_same_v<S, double>) {
+    if (!(s > 0.0) || !std::isfinite(doubt)) return {StaticOutcome::kNotFinite, false};
+    if (!within) return {StaticOutcome::kGated, false};
+  } else {
+    doubt_ += doubt;
+    sound_ = And(sound_, Less(zero, s));
+  }
+  const Flags accepted = And(active, within);
+  S kept[kTangent];  // of the other lanes the gain is zero
+  For<kTangent>([&](auto i) { kept[i] = Select(Mask(accepted), pht[i][0], zero); });
+  For<kTangent>([&](auto i) {
+    const S k = kept[i] * inverse;
+    s_.x[i] += k * r;
+    For<i + 1>([&](auto j) { s_.p[At(i, j)] -= k * pht[j][0]; });
+  });
+  return Corrected(accepted);
 }
 
 /// S = L L', y = L^-1 r, W = L^-1 H P: NIS = y'y, x += W'y, P -= W'W.
 template <class S, class... Motions>
 template <int kRows>
-// NOLINTNEXTLINE(readability-function-size): one algorithm, in registers from end to end
 typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Correct(
     const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
-    const S& active) {
+    const Flags& active) {
   using std::sqrt;
   const S zero(0.0);
-  S inverse[kRows];  // of the diagonal of L; where there is one row, of S
+  S inverse[kRows];  // of the diagonal of L: no number where S is not positive definite
   S nis(0.0), sum(0.0);
   For<kRows>([&](auto i) {
-    r[i] = Select(Less(zero, active), r[i], zero);
+    r[i] = Select(Mask(active), r[i], zero);
     sum += s[i][i];
     For<i>([&](auto j) {
       For<j>([&](auto k) { s[i][j] -= s[i][k] * s[j][k]; });
@@ -417,53 +452,45 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Correct(
       s[i][i] -= s[i][j] * s[i][j];
       r[i] -= s[i][j] * r[j];
     });
-    // Where S is not positive definite NIS becomes infinite or no number.
-    s[i][i] = Select(Less(zero, s[i][i]), s[i][i], zero);
-    if constexpr (kRows == 1) {
-      inverse[0] = 1.0 / s[0][0];
-      nis = r[0] * r[0] * inverse[0];
-    } else {
-      inverse[i] = 1.0 / sqrt(s[i][i]);
-      r[i] *= inverse[i];
-      nis += r[i] * r[i];
-    }
+    inverse[i] = 1.0 / sqrt(s[i][i]);
+    r[i] *= inverse[i];
+    nis += r[i] * r[i];
   });
   sum += inverse[kRows - 1];
+  const auto within = LessEqual(nis, S(gate));
   if constexpr (std::is_same_v<S, double>) {
-    if (!std::isfinite(nis) || !std::isfinite(sum)) return {StaticOutcome::kNotFinite, 0.0};
-    if (!(nis <= gate)) return {StaticOutcome::kGated, 0.0};
+    if (!std::isfinite(nis) || !std::isfinite(sum)) return {StaticOutcome::kNotFinite, false};
+    if (!within) return {StaticOutcome::kGated, false};
   } else {
     doubt_ += sum + nis;
   }
-  const S accepted = Select(LessEqual(nis, S(gate)), active, zero);
+  const Flags accepted = And(active, within);
   // Of the other lanes gain and innovation are zero.
   For<kRows>([&](auto i) {
-    r[i] *= accepted;
-    inverse[i] *= accepted;
+    r[i] = Select(Mask(accepted), r[i], zero);
+    inverse[i] = Select(Mask(accepted), inverse[i], zero);
   });
-  if constexpr (kRows == 1) {
-    For<kTangent>([&](auto i) {
-      const S k = pht[i][0] * inverse[0];
-      s_.x[i] += k * r[0];
-      For<i + 1>([&](auto j) { s_.p[At(i, j)] -= k * pht[j][0]; });
+  S w[kTangent][kRows];
+  For<kTangent>([&](auto i) {
+    For<kRows>([&](auto c) {
+      w[i][c] = pht[i][c];
+      For<c>([&](auto k) { w[i][c] -= s[c][k] * w[i][k]; });
+      w[i][c] *= inverse[c];
+      s_.x[i] += w[i][c] * r[c];
     });
-  } else {
-    S w[kTangent][kRows];
-    For<kTangent>([&](auto i) {
-      For<kRows>([&](auto c) {
-        w[i][c] = pht[i][c];
-        For<c>([&](auto k) { w[i][c] -= s[c][k] * w[i][k]; });
-        w[i][c] *= inverse[c];
-        s_.x[i] += w[i][c] * r[c];
-      });
-      For<i + 1>([&](auto j) { For<kRows>([&](auto c) { s_.p[At(i, j)] -= w[i][c] * w[j][c]; }); });
-    });
-  }
+    For<i + 1>([&](auto j) { For<kRows>([&](auto c) { s_.p[At(i, j)] -= w[i][c] * w[j][c]; }); });
+  });
+  return Corrected(accepted);
+}
+
+/// What follows a correction of the lanes that are `accepted`.
+template <class S, class... Motions>
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Corrected(const Flags& accepted) {
   For<kBlocks>([&](auto b) {
     constexpr int o = Offset(b);
     if constexpr (Space<b>::kGeometry == ALIDADE_ANGLE) s_.x[o] = Angle::Wrap(s_.x[o]);
   });
-  s_.in_interval = s_.in_interval * (1.0 - accepted);
+  s_.in_interval = Select(Mask(accepted), S(0.0), s_.in_interval);
   return {StaticOutcome::kGated, accepted};
 }
 

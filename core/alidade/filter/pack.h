@@ -5,7 +5,12 @@
 #include <concepts>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 #include <utility>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 #include "alidade/model/autodiff.h"
 
@@ -47,13 +52,65 @@ struct Parts {
   using Vectors = VectorsOf<kWidth>;
 };
 
-/// A comparison of packs, lane by lane; for Select and Any alone. What is combined of several is
-/// a number, 1 for true and 0 for false: of masks AVX-512 has another kind than the others, and
-/// the compiler would take them apart.
+/// A comparison of vectors.
+template <int kWidth>
+class Comparison {
+ public:
+  using Numbers = typename VectorsOf<kWidth>::Numbers;
+  static constexpr std::uint64_t kAll = ~std::uint64_t{0} >> (64 - 8 * kWidth);
+
+  void Less(const Numbers& a, const Numbers& b) { v_ = a < b; }
+  void LessEqual(const Numbers& a, const Numbers& b) { v_ = a <= b; }
+  void Equal(const Numbers& a, const Numbers& b) { v_ = a == b; }
+  /// Element by element a where it holds, else b.
+  void Select(const Numbers& a, const Numbers& b, Numbers& to) const { to = v_ ? a : b; }
+  /// kAll where it holds for every element, 0 where for none.
+  std::uint64_t bits() const {
+    using Byte = typename VectorsOf<kWidth>::Bytes;
+    const Byte bytes = __builtin_convertvector(v_, Byte);
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &bytes, kWidth);
+    return bits;
+  }
+
+ private:
+  typename VectorsOf<kWidth>::Truths v_;  ///< -1: true, 0: false
+};
+
+#if defined(__x86_64__)
+/// With AVX-512, of which only packs have eight side by side, a bit for each: of comparisons as the
+/// language has them the compiler makes numbers, and bits of those.
+template <>
+class Comparison<8> {
+ public:
+  using Numbers = typename VectorsOf<8>::Numbers;
+  static constexpr std::uint64_t kAll = 255;
+
+  [[gnu::target("avx512f")]] void Less(const Numbers& a, const Numbers& b) {
+    v_ = _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ);
+  }
+  [[gnu::target("avx512f")]] void LessEqual(const Numbers& a, const Numbers& b) {
+    v_ = _mm512_cmp_pd_mask(a, b, _CMP_LE_OQ);
+  }
+  [[gnu::target("avx512f")]] void Equal(const Numbers& a, const Numbers& b) {
+    v_ = _mm512_cmp_pd_mask(a, b, _CMP_EQ_OQ);
+  }
+  [[gnu::target("avx512f")]] void Select(const Numbers& a, const Numbers& b, Numbers& to) const {
+    to = _mm512_mask_blend_pd(v_, b, a);
+  }
+  void And(const Comparison& other) { v_ &= other.v_; }
+  std::uint64_t bits() const { return v_; }
+
+ private:
+  __mmask8 v_;
+};
+#endif
+
+/// A comparison of packs, lane by lane; for Select, Any and All alone, and to be kept as Flags.
 template <int kLanes>
 struct PackMask : Parts<kLanes> {
   using Base = Parts<kLanes>;
-  typename Base::Vectors::Truths v[Base::kParts];  ///< -1: true, 0: false
+  Comparison<Base::kWidth> v[Base::kParts];
 
   PackMask() = default;
   // Not trivial: else packs would go from function to function in registers, of which each
@@ -61,20 +118,24 @@ struct PackMask : Parts<kLanes> {
   PackMask(const PackMask& other) {
     For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
   }
-  /// The bytes of one part's lanes side by side.
-  std::uint64_t Bytes(int part) const {
-    using Byte = typename Base::Vectors::Bytes;
-    const Byte bytes = __builtin_convertvector(v[part], Byte);
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &bytes, Base::kWidth);
-    return bits;
+  PackMask& operator=(
+      const PackMask& other) {  // NOLINT(bugprone-unhandled-self-assignment): numbers
+    For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
+    return *this;
   }
 };
 template <int kLanes>
 bool Any(const PackMask<kLanes>& mask) {
   std::uint64_t any = 0;
-  For<Parts<kLanes>::kParts>([&](auto k) { any |= mask.Bytes(k); });
+  For<Parts<kLanes>::kParts>([&](auto k) { any |= mask.v[k].bits(); });
   return any != 0;
+}
+template <int kLanes>
+bool All(const PackMask<kLanes>& mask) {
+  constexpr std::uint64_t all = Comparison<Parts<kLanes>::kWidth>::kAll;
+  std::uint64_t every = all;
+  For<Parts<kLanes>::kParts>([&](auto k) { every &= mask.v[k].bits(); });
+  return every == all;
 }
 
 /// kLanes numbers, an element of as many filters. Arithmetic is lane by lane. A comparison is a
@@ -83,7 +144,6 @@ template <int kLanes>
 struct Pack : Parts<kLanes> {
   using Base = Parts<kLanes>;
   using Vector = typename Base::Vectors::Numbers;
-  using Truths = typename Base::Vectors::Truths;
   using Mask = PackMask<kLanes>;
   static constexpr int kCount = kLanes;
   Vector v[Base::kParts];
@@ -91,7 +151,7 @@ struct Pack : Parts<kLanes> {
   Pack() = default;
   Pack(double all) {  // NOLINT(google-explicit-constructor): as double has it
     const Vector zero = {};
-    ForParts([&](auto k) { v[k] = zero + all; });  // a sum: a mere copy is made number by number
+    ForParts([&](auto k) { v[k] = all - zero; });  // a mere copy would be made number by number
   }
   Pack(const Pack& other) {  // not trivial, for the reason of PackMask
     ForParts([&](auto k) { v[k] = other.v[k]; });
@@ -99,6 +159,13 @@ struct Pack : Parts<kLanes> {
   Pack& operator=(const Pack& other) {  // NOLINT(bugprone-unhandled-self-assignment): numbers
     ForParts([&](auto k) { v[k] = other.v[k]; });
     return *this;
+  }
+  /// kLanes numbers that lie side by side.
+  static Pack Load(const double* from) {
+    return Each([&](auto k, Vector& to) { std::memcpy(&to, from + k * Base::kWidth, sizeof to); });
+  }
+  void Store(double* to) const {
+    ForParts([&](auto k) { std::memcpy(to + k * Base::kWidth, &v[k], sizeof v[k]); });
   }
   double lane(int i) const { return v[i / Base::kWidth][i % Base::kWidth]; }
   void SetLane(int i, double value) { v[i / Base::kWidth][i % Base::kWidth] = value; }
@@ -125,16 +192,13 @@ struct Pack : Parts<kLanes> {
   Pack& operator/=(const Pack& other) { return *this = *this / other; }
 
   friend Mask Less(const Pack& a, const Pack& b) {
-    return Compare([&](auto k, Truths& to) { to = a.v[k] < b.v[k]; });
+    return Compare([&](auto k, auto& to) { to.Less(a.v[k], b.v[k]); });
   }
   friend Mask LessEqual(const Pack& a, const Pack& b) {
-    return Compare([&](auto k, Truths& to) { to = a.v[k] <= b.v[k]; });
-  }
-  friend Mask NotEqual(const Pack& a, const Pack& b) {
-    return Compare([&](auto k, Truths& to) { to = a.v[k] != b.v[k]; });
+    return Compare([&](auto k, auto& to) { to.LessEqual(a.v[k], b.v[k]); });
   }
   friend Mask Equal(const Pack& a, const Pack& b) {
-    return Compare([&](auto k, Truths& to) { to = a.v[k] == b.v[k]; });
+    return Compare([&](auto k, auto& to) { to.Equal(a.v[k], b.v[k]); });
   }
   friend bool operator<(const Pack& a, const Pack& b) { return Agreed(Less(a, b)); }
   friend bool operator>(const Pack& a, const Pack& b) { return Agreed(Less(b, a)); }
@@ -161,17 +225,17 @@ struct Pack : Parts<kLanes> {
     return result;
   }
   static bool Agreed(const Mask& mask) {
-    constexpr std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * Base::kWidth);
+    constexpr std::uint64_t all = Comparison<Base::kWidth>::kAll;
     std::uint64_t every = all, any = 0;
     ForParts([&](auto k) {
-      const std::uint64_t bytes = mask.Bytes(k);
-      every &= bytes;
-      any |= bytes;
+      const std::uint64_t bits = mask.v[k].bits();
+      every &= bits;
+      any |= bits;
     });
     if (__builtin_expect(every == all, 1)) return true;
     if (any == 0) return false;
     lanes_differ = true;
-    return (mask.Bytes(0) & 1) != 0;
+    return (mask.v[0].bits() & 1) != 0;
   }
 };
 
@@ -179,8 +243,52 @@ inline double Select(bool mask, double a, double b) { return mask ? a : b; }
 template <int kLanes>
 Pack<kLanes> Select(const PackMask<kLanes>& mask, const Pack<kLanes>& a, const Pack<kLanes>& b) {
   Pack<kLanes> result;
-  For<Parts<kLanes>::kParts>([&](auto k) { result.v[k] = mask.v[k] ? a.v[k] : b.v[k]; });
+  For<Parts<kLanes>::kParts>([&](auto k) { mask.v[k].Select(a.v[k], b.v[k], result.v[k]); });
   return result;
+}
+
+/// What holds of each lane by several comparisons together. With AVX-512 it is a mask; else numbers,
+/// 1 for true and 0 for false: truths that are combined the compiler would take apart.
+template <class S>
+struct FlagsOf {
+  using Type = bool;
+};
+template <int kLanes>
+struct FlagsOf<Pack<kLanes>> {
+  static constexpr bool kMasks = Parts<kLanes>::kWidth == 8;
+  using Type = std::conditional_t<kMasks, PackMask<kLanes>, Pack<kLanes>>;
+};
+template <class S>
+using Flags = typename FlagsOf<S>::Type;
+
+inline bool And(bool flags, bool mask) { return flags && mask; }
+inline bool Mask(bool flags) { return flags; }
+template <int kLanes>
+Pack<kLanes> And(const Pack<kLanes>& flags, const PackMask<kLanes>& mask) {
+  return Select(mask, flags, Pack<kLanes>(0.0));
+}
+template <int kLanes>
+PackMask<kLanes> Mask(const Pack<kLanes>& flags) {
+  return Less(Pack<kLanes>(0.0), flags);
+}
+template <int kLanes>
+PackMask<kLanes> And(const PackMask<kLanes>& flags, const PackMask<kLanes>& mask) {
+  PackMask<kLanes> both(flags);
+  For<Parts<kLanes>::kParts>([&](auto k) { both.v[k].And(mask.v[k]); });
+  return both;
+}
+template <int kLanes>
+const PackMask<kLanes>& Mask(const PackMask<kLanes>& flags) {
+  return flags;
+}
+/// True of every lane.
+template <class S>
+Flags<S> AllFlags() {
+  if constexpr (std::is_constructible_v<Flags<S>, double>) {
+    return Flags<S>(1.0);
+  } else {
+    return Equal(S(0.0), S(0.0));
+  }
 }
 
 /// f of each lane.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -120,10 +119,10 @@ class StaticEkfArray {
   }
 
  private:
-  static constexpr int kTile = 16;
   using Lanes = internal::LaneStep<double, Motions...>;
   template <class S>
   using State = internal::LaneState<S, Motions...>;
+  static constexpr int kTile = 16;
   static constexpr int kAmbient = Composed::kAmbient;
   static constexpr int kTriangle = State<double>::kTriangle, kHeld = State<double>::kHeld;
   /// Filters side by side. Those beyond the last are copies of it.
@@ -218,20 +217,6 @@ class StaticEkfArray {
       if (!StepPack<kLanes>(first, work)) StepOneByOne<kLanes>(first, work);
     }
   }
-  template <int kLanes>
-  static internal::Pack<kLanes> Load(const double* from) {
-    internal::Pack<kLanes> pack;
-    constexpr int kWidth = internal::Parts<kLanes>::kWidth;
-    internal::For<internal::Parts<kLanes>::kParts>(
-        [&](auto k) { std::memcpy(&pack.v[k], from + k * kWidth, sizeof pack.v[k]); });
-    return pack;
-  }
-  template <int kLanes>
-  static void Store(double* to, const internal::Pack<kLanes>& pack) {
-    constexpr int kWidth = internal::Parts<kLanes>::kWidth;
-    internal::For<internal::Parts<kLanes>::kParts>(
-        [&](auto k) { std::memcpy(to + k * kWidth, &pack.v[k], sizeof pack.v[k]); });
-  }
   /// Elements [first, first + kLanes) of `all`, the last one where it ends.
   template <int kLanes, class T>
   const T* Elements(const T* all, int first, T* padded) const {
@@ -246,16 +231,16 @@ class StaticEkfArray {
     using S = internal::Pack<kLanes>;
     Tile& tile = TileOf(first);
     const int lane = LaneOf(first);
-    State<S> state;
-    internal::For<kAmbient>([&](auto i) { state.x[i] = Load<kLanes>(tile.x[i] + lane); });
-    internal::For<kTriangle>([&](auto i) { state.p[i] = Load<kLanes>(tile.p[i] + lane); });
-    state.in_interval = Load<kLanes>(tile.in_interval + lane);
-    if (Any(Less(S(0.0), state.in_interval))) {
-      internal::For<kHeld>([&](auto i) { state.held[i] = Load<kLanes>(tile.held[i] + lane); });
-    } else {
-      internal::For<kHeld>([&](auto i) { state.held[i] = S(0.0); });
-    }
     internal::lanes_differ = false;
+    State<S> state;
+    internal::For<kAmbient>([&](auto i) { state.x[i] = S::Load(tile.x[i] + lane); });
+    internal::For<kTriangle>([&](auto i) { state.p[i] = S::Load(tile.p[i] + lane); });
+    state.in_interval = S::Load(tile.in_interval + lane);
+    if (Any(Less(S(0.0), state.in_interval))) {
+      internal::For<kHeld>([&](auto i) { state.held[i] = S::Load(tile.held[i] + lane); });
+    } else {  // not used: any numbers
+      internal::For<kHeld>([&](auto i) { state.held[i] = state.x[0]; });
+    }
     internal::LaneStep<S, Motions...> step(state, motions_);
     if (!PredictPack<kLanes>(first, work.time, step)) return false;
     const auto update_all = [&](const auto&... updates) {
@@ -263,11 +248,11 @@ class StaticEkfArray {
     };
     if (!std::apply(update_all, work.updates)) return false;
     if (internal::lanes_differ || !step.IsFinite()) return false;
-    internal::For<kAmbient>([&](auto i) { Store(tile.x[i] + lane, state.x[i]); });
-    internal::For<kTriangle>([&](auto i) { Store(tile.p[i] + lane, state.p[i]); });
-    Store(tile.in_interval + lane, state.in_interval);
+    internal::For<kAmbient>([&](auto i) { state.x[i].Store(tile.x[i] + lane); });
+    internal::For<kTriangle>([&](auto i) { state.p[i].Store(tile.p[i] + lane); });
+    state.in_interval.Store(tile.in_interval + lane);
     if (Any(Less(S(0.0), state.in_interval))) {
-      internal::For<kHeld>([&](auto i) { Store(tile.held[i] + lane, state.held[i]); });
+      internal::For<kHeld>([&](auto i) { state.held[i].Store(tile.held[i] + lane); });
     }
     return true;
   }
@@ -312,34 +297,33 @@ class StaticEkfArray {
     const double* from[m];
     for (int i = 0; i < m; ++i) {
       from[i] = Elements<kLanes>(update.z + std::ptrdiff_t{i} * count_, first, padded[i]);
-      z[i] = Load<kLanes>(from[i]);
+      z[i] = S::Load(from[i]);
     }
-    S active(1.0);
+    internal::Flags<S> active = internal::AllFlags<S>();
+    const auto require = [&](const auto& holds) {
+      double each[kLanes];
+      for (int lane = 0; lane < kLanes; ++lane) each[lane] = holds(lane) ? 1.0 : 0.0;
+      active = And(active, Less(S(0.0), S::Load(each)));
+    };
     if constexpr (detail::HasValid<Model>::value) {
       const auto valid = [&](int lane) {
         double one[m];
         for (int i = 0; i < m; ++i) one[i] = from[i][lane];
         return detail::CallValid(update.sensor, nullptr, one);
       };
-      if (!AllValid(update.sensor, z, valid)) {
-        double each[kLanes];
-        for (int lane = 0; lane < kLanes; ++lane) each[lane] = valid(lane) ? 1.0 : 0.0;
-        active = Load<kLanes>(each);
-      }
+      if (!AllValid(update.sensor, z, valid)) require(valid);
     }
     if (update.present != nullptr) {
       bool own[kLanes];
-      double there[kLanes];
       const bool* const present = Elements<kLanes>(update.present, first, own);
-      for (int lane = 0; lane < kLanes; ++lane) there[lane] = present[lane] ? 1.0 : 0.0;
-      active = active * Load<kLanes>(there);
+      require([&](int lane) { return present[lane]; });
     }
     const auto result = step.Update(update, z, active);
     if (internal::lanes_differ) return false;
     if (update.outcomes != nullptr) {
       double used[kLanes], accepted[kLanes];
-      Store(used, active);
-      Store(accepted, result.accepted);
+      Select(Mask(active), S(1.0), S(0.0)).Store(used);
+      Select(Mask(result.accepted), S(1.0), S(0.0)).Store(accepted);
       for (int lane = 0; lane < kLanes && first + lane < count_; ++lane) {
         update.outcomes[first + lane] = used[lane] == 0.0       ? StaticOutcome::kInvalid
                                         : accepted[lane] != 0.0 ? StaticOutcome::kAccepted
@@ -407,8 +391,8 @@ void StaticEkfArray<Motions...>::StepOneByOne(int first, const Work& work) {
       StaticOutcome outcome = StaticOutcome::kInvalid;
       if (active) {
         const State<double> before = state;
-        const auto result = step.Update(update, z, 1.0);
-        outcome = result.accepted != 0.0 ? StaticOutcome::kAccepted : result.outcome;
+        const auto result = step.Update(update, z, true);
+        outcome = result.accepted ? StaticOutcome::kAccepted : result.outcome;
         if (!step.IsFinite()) {
           state = before;
           outcome = StaticOutcome::kNotFinite;

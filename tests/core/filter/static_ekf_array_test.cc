@@ -230,18 +230,22 @@ TEST(StaticEkfArray, WhatGoesWrongInOneFilterIsItsOwnAffair) {
     StaticEkfArray<DoublingStep> array(11, DoublingStep());
     array.set_lanes(lanes);
     for (int i = 0; i < 11; ++i) array.Set<0>(i, i == 3 ? 0.75 * largest : i == 8 ? 150.0 : i, 1.0);
-    EXPECT_EQ(array.Step(1.0), 2);
+    const double five = 5.0;
+    const Eigen::Matrix<double, 1, 1> large(0.75 * largest);  // 4 P + 1 is beyond what is finite
+    array.Set<0>(5, &five, large);
+    EXPECT_EQ(array.Step(1.0), 3);
     for (int i = 0; i < 11; ++i) {
-      const bool stuck = i == 3 || i == 8;
-      EXPECT_EQ(array.status(i), i == 3   ? Status::kError
-                                 : i == 8 ? Status::kOutOfDomain
-                                          : Status::kOk);
-      EXPECT_EQ(array.value<0>(i), i == 3 ? 0.75 * largest : i == 8 ? 150.0 : 2.0 * i);
-      EXPECT_EQ(array.covariance(i)(0, 0), stuck ? 1.0 : 5.0);
+      const bool stuck = i == 3 || i == 5 || i == 8;
+      EXPECT_EQ(array.status(i), i == 3 || i == 5 ? Status::kError
+                                 : i == 8         ? Status::kOutOfDomain
+                                                  : Status::kOk);
+      EXPECT_EQ(array.value<0>(i), i == 3 ? 0.75 * largest : i == 8 ? 150.0 : stuck ? i : 2.0 * i);
+      EXPECT_EQ(array.covariance(i)(0, 0), i == 5 ? large(0, 0) : stuck ? 1.0 : 5.0);
     }
     // The next prediction says nothing of this one.
     array.Set<0>(3, 1.0, 1.0);
     array.Set<0>(8, 1.0, 1.0);
+    array.Set<0>(5, 1.0, 1.0);
     EXPECT_EQ(array.Step(1.0), 0);
     EXPECT_EQ(array.status(3), Status::kOk);
     EXPECT_EQ(array.status(8), Status::kOk);
@@ -261,6 +265,28 @@ TEST(StaticEkfArray, AnInnovationCovarianceThatIsNotFiniteChangesNothing) {
       EXPECT_EQ(outcomes[i], StaticOutcome::kNotFinite);
       EXPECT_EQ(array.value<0>(i), 0.3);
       EXPECT_EQ(array.covariance(i)(0, 0), 0.1 * 0.1);
+    }
+  }
+}
+
+/// A covariance that is none, as no filter arrives at: of that one filter the measurement is refused.
+TEST(StaticEkfArray, AnInnovationCovarianceThatIsNotPositiveIsRefusedOfThatFilterAlone) {
+  const Scale2d scale = Scale2d::FromSigma(0.1);
+  const std::vector<double> z(20, 1.0);
+  for (const int lanes : AllLanes()) {
+    DepthArray array(20, VelocityOfDepth(1.0), Constant<1>(1));
+    array.set_lanes(lanes);
+    for (int i = 0; i < 20; ++i) SetDepth(array, 0.3, i);
+    const Eigen::Matrix<double, 1, 1> negative(-1.0);
+    const double depth = 0.3;
+    array.Set<0>(4, &depth, negative);
+    std::vector<StaticOutcome> outcomes(20);
+    array.Update(ArrayUpdate<Scale2d, 0, 2>{scale, z.data(), 1e6, nullptr, outcomes.data()});
+    for (int i = 0; i < 20; ++i) {
+      EXPECT_EQ(outcomes[static_cast<std::size_t>(i)],
+                i == 4 ? StaticOutcome::kNotFinite : StaticOutcome::kAccepted)
+          << i;
+      EXPECT_EQ(array.value<0>(i) == 0.3, i == 4) << i;
     }
   }
 }

@@ -46,6 +46,8 @@ struct Input {
   Config Load() const;
   /// The plugins that `config` and the command line name, then the usual places.
   PluginHost Host(const Config& config) const;
+  /// Of the usual places those alone that `config`, or one of `others`, may need.
+  PluginHost HostFor(const Config& config, const std::vector<Config>& others = {}) const;
 };
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdio>
 #include <new>
+#include <set>
 
 #include "command.h"
 #include "console.h"
@@ -132,12 +133,28 @@ std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {
   return absolute;
 }
 
-PluginHost Input::Host(const Config& loaded) const {
-  ReportCrashes();
+namespace {
+
+/// What the config and the command line name.
+std::vector<fs::path> PlacesOf(const Input& input, const Config& loaded) {
   std::vector<fs::path> places;
   for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));
-  for (const fs::path& path : Absolute(plugin_paths)) places.push_back(path);
-  return PluginHost(places);
+  for (const fs::path& path : Absolute(input.plugin_paths)) places.push_back(path);
+  return places;
+}
+
+}  // namespace
+
+PluginHost Input::Host(const Config& loaded) const {
+  ReportCrashes();
+  return PluginHost(PlacesOf(*this, loaded));
+}
+
+PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& others) const {
+  ReportCrashes();
+  std::set<std::string> words = WordsOf(loaded);
+  for (const Config& other : others) words.merge(WordsOf(other));
+  return PluginHost(PlacesOf(*this, loaded), OnRefusal::kThrow, words);
 }
 
 void TellStopped(std::size_t done, std::int64_t runs) {

@@ -149,7 +149,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   const std::filesystem::path& folder = output.folder;
   if (arguments.resume)
     internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
-  const PluginHost host = arguments.input.Host(config);
+  const PluginHost host = arguments.input.HostFor(config);
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);

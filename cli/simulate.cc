@@ -44,7 +44,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
   const Output output =
       OutputFolder(arguments.folder, config, arguments.input, arguments.force, "data-");
   const std::filesystem::path& path = output.folder;
-  const PluginHost host = arguments.input.Host(config);
+  const PluginHost host = arguments.input.HostFor(config);
   const Watchdog watchdog;
   StopOnSignals();
   const SimulateResult result =

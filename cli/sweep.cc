@@ -146,10 +146,10 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const Output output =
       OutputFolder(arguments.folder, config, arguments.input, arguments.force, "sweep-");
   const std::filesystem::path& path = output.folder;
-  const PluginHost host = arguments.input.Host(config);
+  const std::vector<Config> configs = ConfigsOf(arguments, config);
+  const PluginHost host = arguments.input.HostFor(config, configs);
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
-  const std::vector<Config> configs = ConfigsOf(arguments, config);
   const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), configs,
                                         internal::HashesOf(internal::PluginsNamed(configs, host)));
   if (arguments.resume && IsFinished(path, config, inputs, arguments.force, arguments.quiet))

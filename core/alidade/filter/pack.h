@@ -118,8 +118,7 @@ struct PackMask : Parts<kLanes> {
   PackMask(const PackMask& other) {
     For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
   }
-  PackMask& operator=(
-      const PackMask& other) {  // NOLINT(bugprone-unhandled-self-assignment): numbers
+  PackMask& operator=(const PackMask& other) {  // NOLINT(bugprone-unhandled-self-assignment)
     For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
     return *this;
   }
@@ -247,8 +246,8 @@ Pack<kLanes> Select(const PackMask<kLanes>& mask, const Pack<kLanes>& a, const P
   return result;
 }
 
-/// What holds of each lane by several comparisons together. With AVX-512 it is a mask; else numbers,
-/// 1 for true and 0 for false: truths that are combined the compiler would take apart.
+/// What holds of each lane by several comparisons together. With AVX-512 a mask; else numbers, 1
+/// for true and 0 for false: truths that are combined the compiler would take apart.
 template <class S>
 struct FlagsOf {
   using Type = bool;

@@ -68,6 +68,23 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
 
 namespace internal {
 
+bool MayOffer(const fs::path& path, const std::set<std::string>& names) {
+  try {
+    const ElfFile file(path);
+    const auto section = file.FindSection(ALIDADE_NAMES_SECTION);
+    if (!section) return true;
+    const std::vector<char> text = file.Read<char>(section->sh_offset, section->sh_size, "names");
+    for (auto at = text.begin(); at != text.end();) {
+      const auto end = std::find(at, text.end(), '\0');
+      if (end == text.end() || names.contains(std::string(at, end))) return true;
+      at = end + 1;
+    }
+    return false;
+  } catch (const Error&) {  // OpenPlugin says why
+    return true;
+  }
+}
+
 const char* HostBuildId() { return ALIDADE_BUILD_ID; }
 
 void CheckBuild(const AlidadeBuildTag& build_tag, const fs::path& file) {

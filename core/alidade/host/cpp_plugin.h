@@ -92,14 +92,16 @@ inline constexpr const char* kCppEntrySymbol = "alidade_cpp_plugin";
   }
 
 /// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
-#define ALIDADE_SOURCE_PLUGIN(...)                                     \
-  static const alidade::SourceEntry alidade_sources[] = {__VA_ARGS__}; \
+#define ALIDADE_SOURCE_PLUGIN(...)                                         \
+  static constexpr alidade::SourceEntry alidade_sources[] = {__VA_ARGS__}; \
+  ALIDADE_ENTRY_NAMES(alidade_sources)                                     \
   ALIDADE_CPP_PLUGIN_(alidade_sources, std::size(alidade_sources), nullptr, 0)
 
 /// Exports the estimators of this plugin:
 /// ALIDADE_ESTIMATOR_PLUGIN({"name", "doc", "citation", &Create}, ...)
-#define ALIDADE_ESTIMATOR_PLUGIN(...)                                        \
-  static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
+#define ALIDADE_ESTIMATOR_PLUGIN(...)                                            \
+  static constexpr alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
+  ALIDADE_ENTRY_NAMES(alidade_estimators)                                        \
   ALIDADE_CPP_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
 
 /// Exports the image writer of this plugin: ALIDADE_IMAGE_PLUGIN(&Create)

@@ -42,6 +42,10 @@ std::filesystem::path FolderOfProgram();
 /// C++ plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
+/// Whether a plugin may offer an entry of one of these names: unless its file lists the names of
+/// its entries, and none of these is there.
+bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
+
 /// Examines the plugins as OpenPlugin does, and tries those that pass in one child process, one
 /// after the other. They are the result; none where any has a fault there, so that each has to be
 /// tried by itself.

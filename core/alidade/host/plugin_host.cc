@@ -61,7 +61,9 @@ fs::path internal::FolderOfProgram() {
   return error ? fs::path() : library.parent_path() / "alidade";
 }
 
-PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal) {
+PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal,
+                       const std::optional<std::set<std::string>>& only)
+    : given_(files_and_folders), only_(only) {
   const bool required = on_refusal == OnRefusal::kThrow;
   for (const fs::path& place : files_and_folders) LoadPlace(place, "given", required);
   for (const fs::path& folder : internal::PluginFoldersOfEnvironment()) {
@@ -73,6 +75,8 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
 }
 
 PluginHost::~PluginHost() = default;
+
+PluginHost PluginHost::Complete() const { return PluginHost(given_, OnRefusal::kList); }
 
 void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, bool required) {
   const std::size_t entries = entries_.size(), refusals = refusals_.size();
@@ -101,7 +105,8 @@ void PluginHost::LoadFolder(const fs::path& folder, bool required) {
   std::set<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    if (at->path().extension() == ".so") files.insert(at->path());
+    if (at->path().extension() != ".so") continue;
+    if (required || !only_ || internal::MayOffer(at->path(), *only_)) files.insert(at->path());
   }
   if (error) {
     if (required) Refuse(folder, error.message());
@@ -182,6 +187,7 @@ const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& n
                                     const Node& entry) const {
   const auto matches = [&](const PluginEntry& e) { return e.kind == kind && e.name == name; };
   const auto found = std::find_if(entries_.begin(), entries_.end(), matches);
+  if (found == entries_.end() && only_) Complete().FailMissing(kind, name, entry);
   if (found == entries_.end()) FailMissing(kind, name, entry);
   const auto other = std::find_if(found + 1, entries_.end(), matches);
   if (other != entries_.end()) {

@@ -6,6 +6,8 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -76,8 +78,11 @@ class PluginHost {
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
   /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
   /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
+  /// `only`, if set, has every name that will be asked for: plugins elsewhere that offer none of
+  /// them stay closed, which saves the time of trying and opening them.
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
-                      OnRefusal on_refusal = OnRefusal::kThrow);
+                      OnRefusal on_refusal = OnRefusal::kThrow,
+                      const std::optional<std::set<std::string>>& only = {});
   ~PluginHost();
 
   /// A model from its config entry: reads its parameters there, leaving unread keys to
@@ -95,6 +100,9 @@ class PluginHost {
                                        bool any_order = false) const;
   /// The maker of an estimator whose options are in `entry`; its errors are the same.
   EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
+
+  /// The same with all plugins opened, whatever they offer: for errors, which tell what there is.
+  PluginHost Complete() const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
   /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
@@ -122,6 +130,8 @@ class PluginHost {
   const SourceEntry& SourceOf(const PluginEntry& entry) const;
   const EstimatorEntry& EstimatorOf(const PluginEntry& entry) const;
 
+  const std::vector<std::filesystem::path> given_;
+  const std::optional<std::set<std::string>> only_;
   std::vector<std::unique_ptr<Loaded>> loaded_;
   std::vector<PluginEntry> entries_;
   std::vector<std::string> searched_;

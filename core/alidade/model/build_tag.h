@@ -138,6 +138,31 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
   return f;
 }
 
+/// The names of a plugin's entries, each with the zero that ends it.
+template <std::size_t kSize>
+struct EntryNames {
+  char text[kSize] = {};
+};
+template <class Entry, std::size_t N>
+constexpr std::size_t SizeOfNames(const Entry (&entries)[N]) {
+  std::size_t size = 0;
+  for (const Entry& entry : entries) {
+    for (const char* at = entry.name; *at != '\0'; ++at) ++size;
+    ++size;
+  }
+  return size;
+}
+template <std::size_t kSize, class Entry, std::size_t N>
+constexpr EntryNames<kSize> NamesOf(const Entry (&entries)[N]) {
+  EntryNames<kSize> names;
+  std::size_t size = 0;
+  for (const Entry& entry : entries) {
+    for (const char* at = entry.name; *at != '\0'; ++at) names.text[size++] = *at;
+    ++size;
+  }
+  return names;
+}
+
 template <std::size_t N>
 constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuildTag* build_tag) {
   AlidadeTable table{};
@@ -161,3 +186,8 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
                  visibility("default"))) extern const AlidadeBuildTag alidade_build_tag = \
       alidade::detail::MakeBuildTag(kind, build);                                         \
   }
+
+/// Lays the names of `entries`, a constexpr array of them, into their section.
+#define ALIDADE_ENTRY_NAMES(entries)                                                          \
+  __attribute__((section(ALIDADE_NAMES_SECTION), used)) static constexpr auto alidade_names = \
+      alidade::detail::NamesOf<alidade::detail::SizeOfNames(entries)>(entries);

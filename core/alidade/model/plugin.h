@@ -135,10 +135,11 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
   (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
 
 /// Exports the models as this plugin's table. Once for each plugin.
-#define ALIDADE_PLUGIN(...)                                                                    \
-  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                  \
-  extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(void) { \
-    static const AlidadeEntry entries[] = {__VA_ARGS__};                                       \
-    static const AlidadeTable table = alidade::detail::Table(entries, &alidade_build_tag);     \
-    return &table;                                                                             \
+#define ALIDADE_PLUGIN(...)                                                                        \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                      \
+  static constexpr AlidadeEntry alidade_entries[] = {__VA_ARGS__};                                 \
+  ALIDADE_ENTRY_NAMES(alidade_entries)                                                             \
+  extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(void) {     \
+    static const AlidadeTable table = alidade::detail::Table(alidade_entries, &alidade_build_tag); \
+    return &table;                                                                                 \
   }

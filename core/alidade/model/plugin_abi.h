@@ -48,6 +48,9 @@ extern "C" {
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
 #define ALIDADE_BUILD_TAG_SECTION ".alidade"
+/* The section, if there is one, that holds the names of all entries, each with the zero that ends
+ * it, and nothing else. A host need not open a plugin for names that are not among them. */
+#define ALIDADE_NAMES_SECTION ".alidade_names"
 
 /* Upper half of every word of flags. */
 #define ALIDADE_MUST_UNDERSTAND 0xffff0000u

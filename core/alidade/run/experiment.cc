@@ -229,6 +229,18 @@ std::vector<double> ReadTruthSigmas(const Node& root, const std::vector<StreamIn
   return sigmas;
 }
 
+void AddWords(const Node& node, std::set<std::string>& words) {
+  if (node.kind() == Node::Kind::kScalar) words.insert(node.Text());
+  if (node.kind() == Node::Kind::kList) {
+    for (const Node& item : node.Items()) AddWords(item, words);
+  }
+  if (!node.is_map()) return;
+  for (const auto& [key, value] : node.Entries()) {
+    words.insert(key);
+    AddWords(value, words);
+  }
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> PluginPaths(const Config& config) {
@@ -241,6 +253,13 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
     }
   }
   return paths;
+}
+
+std::set<std::string> WordsOf(const Config& config) {
+  const Config copy = config.Copy();  // nothing of the original counts as read
+  std::set<std::string> words;
+  AddWords(copy.root(), words);
+  return words;
 }
 
 Experiment BuildExperiment(const Config& config, const PluginHost& host) {

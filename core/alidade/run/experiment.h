@@ -84,6 +84,9 @@ struct Experiment {
 /// The files and folders that a config's `plugins:` names, relative ones taken from its folder.
 std::vector<std::filesystem::path> PluginPaths(const Config& config);
 
+/// Every key and every scalar of a config: with these alone a PluginHost has what it names.
+std::set<std::string> WordsOf(const Config& config);
+
 /// Makes everything a config names. Errors: kBadConfig, kPlugin, kInputMissing, ...
 Experiment BuildExperiment(const Config& config, const PluginHost& host);
 

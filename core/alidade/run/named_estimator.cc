@@ -86,14 +86,11 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
-/// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
-const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
+[[noreturn]] void FailOffered(const std::string& type, const PluginHost& host, const Node& node) {
   std::vector<std::string> of_core, of_plugins;
   for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind != PluginEntry::Kind::kEstimator) continue;
-    if (entry.name == type) return entry;
-    of_plugins.push_back(entry.name);
+    if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
   }
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
@@ -107,6 +104,14 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
                         "no estimator '" + type + "' is built in, and no plugin offers it",
                         expected, Nearest(type, names)) +
                   (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
+}
+
+/// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
+const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator && entry.name == type) return entry;
+  }
+  FailOffered(type, host.Complete(), node);
 }
 
 std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }

@@ -18,6 +18,7 @@ HOLDS(ALIDADE_MAGIC == 0x4144494cu);
 HOLDS(ALIDADE_MUST_UNDERSTAND == 0xffff0000u);
 HOLDS(sizeof(ALIDADE_ENTRY_SYMBOL) == sizeof("alidade_plugin"));
 HOLDS(sizeof(ALIDADE_BUILD_TAG_SECTION) == sizeof(".alidade"));
+HOLDS(sizeof(ALIDADE_NAMES_SECTION) == sizeof(".alidade_names"));
 HOLDS(sizeof(void*) == 8 && sizeof(double) == 8 && sizeof(int) == 4);
 
 SIZE(AlidadeBuildTag, 288);

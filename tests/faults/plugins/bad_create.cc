@@ -127,7 +127,7 @@ constexpr AlidadeParam kDefaultBeyond =
 
 /// A model that reads `kParam` without the help of alidade::Params, which always gives a whole one.
 template <const AlidadeParam& kParam>
-AlidadeEntry Reading(const char* name) {
+constexpr AlidadeEntry Reading(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");
   entry.create = [](const AlidadeHost* host, AlidadeInstance* instance) -> std::int32_t {
     double values[2] = {};

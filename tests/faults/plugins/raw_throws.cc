@@ -97,7 +97,7 @@ void ThrowInSqrtQ(AlidadeMotion& calls) {
 
 /// An entry whose `create` is not guarded.
 template <int kWhat>
-AlidadeEntry ThrowingCreate(const char* name) {
+constexpr AlidadeEntry ThrowingCreate(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");
   entry.create = [](const AlidadeHost*, AlidadeInstance*) -> std::int32_t {
     if (kWhat == 1) throw 42;

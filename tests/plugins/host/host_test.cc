@@ -83,6 +83,29 @@ TEST_F(HostTest, FindsPluginsOfTheEnvironmentAndTheUser) {
   EXPECT_EQ(host.searched()[1], (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 found");
 }
 
+TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
+  for (const char* const name : {"good", "range_rate", "later"}) {
+    Copy(name, "path/" + std::string(name) + ".so");
+  }
+  setenv("ALIDADE_PLUGIN_PATH", (folder_ / "path").c_str(), 1);
+  const std::set<std::string> only = {"probe", "prob", "rate"};
+  const auto offers = [](const PluginHost& host, const std::string& name) {
+    return std::ranges::count(host.entries(), name, &PluginEntry::name) == 1;
+  };
+  const PluginHost host({}, OnRefusal::kThrow, only);
+  EXPECT_TRUE(offers(host, "probe"));
+  EXPECT_TRUE(offers(host, "later_sensor"));  // its file lists no names
+  EXPECT_FALSE(offers(host, "range_rate"));
+  EXPECT_FALSE(offers(host, "constant"));
+  EXPECT_TRUE(offers(host.Complete(), "range_rate"));
+  EXPECT_TRUE(offers(host.Complete(), "constant"));
+  // What is given is opened whole, and an error tells of all that there is.
+  EXPECT_TRUE(offers(PluginHost({folder_ / "path"}, OnRefusal::kThrow, only), "range_rate"));
+  const Config config = Parse("model: rate");
+  ExpectError(ExitCode::kPlugin, {"no plugin offers the sensor 'rate'", "range_rate"},
+              [&] { host.CreateSensor("range_rat", config.root()); });
+}
+
 // ---- 50: missing --------------------------------------------------------------------------------
 
 TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {

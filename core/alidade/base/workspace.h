@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "alidade/base/eigen_alignment.h"
@@ -46,12 +47,12 @@ class Workspace {
  private:
   double* Memory(Eigen::Index size) {
     if (used_ == pieces_.size()) pieces_.emplace_back();
-    std::vector<double>& piece = pieces_[used_++];
-    if (std::ssize(piece) < size) piece.resize(static_cast<std::size_t>(size));
+    Eigen::VectorXd& piece = pieces_[used_++];
+    if (piece.size() < size) piece.resize(std::max(size, piece.size() + piece.size() / 2));
     return piece.data();
   }
 
-  std::vector<std::vector<double>> pieces_;  ///< the first used_ are taken
+  std::vector<Eigen::VectorXd> pieces_;  ///< the first used_ are taken
   std::size_t used_ = 0;
 };
 

@@ -127,15 +127,15 @@ class LaneStep {
   Result Update(const ArrayUpdate<Model, Roles...>& update, const S* z, const Flags& active);
 
   /// Whether all is finite: x, P, and of a pack every S, which besides was positive. Of a pack no
-  /// too where their sum is not. Of P the diagonal tells, as no other element is larger.
+  /// too where their sum is not.
   bool IsFinite() const {
     S sum = doubt_, other(0.0);
     if constexpr (std::is_same_v<S, double>) {  // 0 times what is not finite is not a number
       for (const double one : s_.x) sum += 0.0 * one;
-      For<kTangent>([&](auto i) { sum += 0.0 * s_.p[At(i, i)]; });
+      for (const double one : s_.p) sum += 0.0 * one;
     } else {
       For<kAmbient>([&](auto i) { sum += s_.x[i]; });
-      For<kTangent>([&](auto i) { (i % 2 == 0 ? other : sum) += s_.p[At(i, i)]; });
+      For<State::kTriangle>([&](auto i) { (i % 2 == 0 ? other : sum) += s_.p[i]; });
     }
     return All(Mask(And(sound_, Equal(S(0.0 * (sum + other)), S(0.0)))));
   }
@@ -194,16 +194,18 @@ class LaneStep {
   void Hold(const S& goes_on, Transition<N, kNoise>& t);
   template <std::size_t M, int N, int kNoise>
   void Take(const Transition<N, kNoise>& t);
-  Result CorrectByRow(const S (&pht)[kTangent][1], const S& s, const S& innovation, double gate,
-                      const Flags& active);
+  Result CorrectScalar(const S (&pht)[kTangent][1], const S& s, const S& innovation, double gate,
+                       const Flags& active);
   template <int kRows>
   Result Correct(const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
                  const Flags& active);
-  Result Corrected(const Flags& accepted);
+  Result FinishCorrection(const Flags& accepted);
 
   State& s_;
-  S doubt_{0.0};                 ///< of a pack: not finite where it has to be done lane by lane
-  Flags sound_ = AllFlags<S>();  ///< of a pack: false where it has to be likewise
+  // Of a pack: where doubt_ is not finite or sound_ false it has to be done lane by lane. What is
+  // infinite or no number shows in a sum, an S below zero does not.
+  S doubt_{0.0};
+  Flags sound_ = AllFlags<S>();
   const std::tuple<Motions...>& motions_;
 };
 
@@ -399,16 +401,16 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
     });
   });
   if constexpr (m == 1) {
-    return CorrectByRow(pht, s[0][0], r[0], update.gate, active);
+    return CorrectScalar(pht, s[0][0], r[0], update.gate, active);
   } else {
     return Correct<m>(pht, s, r, update.gate, active);
   }
 }
 
-/// Of one row: K = P H' / S, x += K r, P -= K H P, where NIS = r^2 / S is within the gate. The
+/// Of one number: K = P H' / S, x += K r, P -= K H P, where NIS = r^2 / S is within the gate. The
 /// quotient is what takes time: only K waits for it.
 template <class S, class... Motions>
-typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::CorrectByRow(
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::CorrectScalar(
     const S (&pht)[kTangent][1], const S& s, const S& innovation, double gate,
     const Flags& active) {
   const S zero(0.0);
@@ -430,7 +432,7 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::CorrectByRow(
     s_.x[i] += k * r;
     For<i + 1>([&](auto j) { s_.p[At(i, j)] -= k * pht[j][0]; });
   });
-  return Corrected(accepted);
+  return FinishCorrection(accepted);
 }
 
 /// S = L L', y = L^-1 r, W = L^-1 H P: NIS = y'y, x += W'y, P -= W'W.
@@ -480,12 +482,13 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Correct(
     });
     For<i + 1>([&](auto j) { For<kRows>([&](auto c) { s_.p[At(i, j)] -= w[i][c] * w[j][c]; }); });
   });
-  return Corrected(accepted);
+  return FinishCorrection(accepted);
 }
 
 /// What follows a correction of the lanes that are `accepted`.
 template <class S, class... Motions>
-typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Corrected(const Flags& accepted) {
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::FinishCorrection(
+    const Flags& accepted) {
   For<kBlocks>([&](auto b) {
     constexpr int o = Offset(b);
     if constexpr (Space<b>::kGeometry == ALIDADE_ANGLE) s_.x[o] = Angle::Wrap(s_.x[o]);

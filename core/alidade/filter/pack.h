@@ -58,6 +58,7 @@ class Comparison {
  public:
   using Numbers = typename VectorsOf<kWidth>::Numbers;
   static constexpr std::uint64_t kAll = ~std::uint64_t{0} >> (64 - 8 * kWidth);
+  static constexpr bool kIsMask = false;
 
   void Less(const Numbers& a, const Numbers& b) { v_ = a < b; }
   void LessEqual(const Numbers& a, const Numbers& b) { v_ = a <= b; }
@@ -78,13 +79,14 @@ class Comparison {
 };
 
 #if defined(__x86_64__)
-/// With AVX-512, of which only packs have eight side by side, a bit for each: of comparisons as the
-/// language has them the compiler makes numbers, and bits of those.
+/// Vectors of eight are for AVX-512 alone, which compares into a mask, a bit for each: of
+/// comparisons as the language has them the compiler makes numbers, and bits of those.
 template <>
 class Comparison<8> {
  public:
   using Numbers = typename VectorsOf<8>::Numbers;
   static constexpr std::uint64_t kAll = 255;
+  static constexpr bool kIsMask = true;
 
   [[gnu::target("avx512f")]] void Less(const Numbers& a, const Numbers& b) {
     v_ = _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ);
@@ -150,7 +152,7 @@ struct Pack : Parts<kLanes> {
   Pack() = default;
   Pack(double all) {  // NOLINT(google-explicit-constructor): as double has it
     const Vector zero = {};
-    ForParts([&](auto k) { v[k] = all - zero; });  // a mere copy would be made number by number
+    ForParts([&](auto k) { v[k] = all - zero; });  // GCC 12 makes a copy number by number
   }
   Pack(const Pack& other) {  // not trivial, for the reason of PackMask
     ForParts([&](auto k) { v[k] = other.v[k]; });
@@ -254,8 +256,8 @@ struct FlagsOf {
 };
 template <int kLanes>
 struct FlagsOf<Pack<kLanes>> {
-  static constexpr bool kMasks = Parts<kLanes>::kWidth == 8;
-  using Type = std::conditional_t<kMasks, PackMask<kLanes>, Pack<kLanes>>;
+  static constexpr bool kIsMask = Comparison<Parts<kLanes>::kWidth>::kIsMask;
+  using Type = std::conditional_t<kIsMask, PackMask<kLanes>, Pack<kLanes>>;
 };
 template <class S>
 using Flags = typename FlagsOf<S>::Type;

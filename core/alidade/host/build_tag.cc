@@ -68,18 +68,27 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
 
 namespace internal {
 
+std::optional<std::set<std::string>> ListedNames(const fs::path& path) {
+  constexpr std::uint64_t kMost = 1 << 20;  // of a file that may not be trusted
+  const ElfFile file(path);
+  const auto section = file.FindSection(ALIDADE_NAMES_SECTION);
+  if (!section || section->sh_size > kMost) return std::nullopt;
+  const std::vector<char> text = file.Read<char>(section->sh_offset, section->sh_size, "names");
+  if (!text.empty() && text.back() != '\0') return std::nullopt;
+  std::set<std::string> names;
+  for (auto at = text.begin(); at != text.end();) {
+    const auto end = std::find(at, text.end(), '\0');
+    names.emplace(at, end);
+    at = end + 1;
+  }
+  return names;
+}
+
 bool MayOffer(const fs::path& path, const std::set<std::string>& names) {
   try {
-    const ElfFile file(path);
-    const auto section = file.FindSection(ALIDADE_NAMES_SECTION);
-    if (!section) return true;
-    const std::vector<char> text = file.Read<char>(section->sh_offset, section->sh_size, "names");
-    for (auto at = text.begin(); at != text.end();) {
-      const auto end = std::find(at, text.end(), '\0');
-      if (end == text.end() || names.contains(std::string(at, end))) return true;
-      at = end + 1;
-    }
-    return false;
+    const auto listed = ListedNames(path);
+    return !listed || std::ranges::any_of(
+                          names, [&](const std::string& name) { return listed->contains(name); });
   } catch (const Error&) {  // OpenPlugin says why
     return true;
   }

@@ -4,6 +4,7 @@
 #include <link.h>
 
 #define BOOST_DLL_USE_STD_FS
+#include <algorithm>
 #include <bit>
 #include <boost/dll/shared_library.hpp>
 #include <csetjmp>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "alidade/base/child_process.h"
+#include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/host/elf_file.h"
 #include "alidade/host/foreign_call.h"
@@ -122,6 +124,25 @@ AlidadeBuildTag Examine(const std::filesystem::path& file, const std::filesystem
   return build_tag;
 }
 
+/// A name that the plugin offers and its list lacks, or "".
+std::string UnlistedName(const OpenedPlugin& plugin) {
+  const auto listed = ListedNames(plugin.file);
+  if (!listed) return {};
+  std::vector<std::string> offered;
+  if (const CppPluginTable* const cpp = plugin.cpp_table) {
+    for (int i = 0; i < cpp->source_count; ++i) offered.emplace_back(cpp->sources[i].name);
+    for (int i = 0; i < cpp->estimator_count; ++i) offered.emplace_back(cpp->estimators[i].name);
+  } else {
+    const AlidadeTable table = ReadPrefix(plugin.table);
+    for (std::uint32_t i = 0; i < table.entry_count; ++i) {
+      offered.emplace_back(ReadEntry(table.entries, table.entry_stride, i).name);
+    }
+  }
+  const auto is_unlisted = [&](const std::string& name) { return !listed->contains(name); };
+  const auto found = std::ranges::find_if(offered, is_unlisted);
+  return found == offered.end() ? "" : *found;
+}
+
 /// Opens the library for the rest of the process.
 const boost::dll::shared_library& OpenForGood(const std::filesystem::path& file) {
   using boost::dll::load_mode::rtld_local;
@@ -183,6 +204,9 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
   });
   if (!thrown.empty()) Refuse(file, "cannot be loaded: " + thrown);
   if (!defect.empty()) Refuse(file, defect);
+  if (const std::string name = UnlistedName(plugin); !name.empty()) {
+    Refuse(file, "offers '" + name + "', which its list of names lacks");
+  }
   return plugin;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -42,8 +43,10 @@ std::filesystem::path FolderOfProgram();
 /// C++ plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
-/// Whether a plugin may offer an entry of one of these names: unless its file lists the names of
-/// its entries, and none of these is there.
+/// The names of its entries that a file lists; none where it has no list, or not one that ends.
+std::optional<std::set<std::string>> ListedNames(const std::filesystem::path& file);
+
+/// Whether a plugin may offer an entry of one of these names: one that lists none of them does not.
 bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
 
 /// Examines the plugins as OpenPlugin does, and tries those that pass in one child process, one

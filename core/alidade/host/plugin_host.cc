@@ -35,6 +35,9 @@ std::optional<fs::path> UserFolder() {
   return std::nullopt;
 }
 
+/// The origin of places that are given.
+constexpr const char* kGiven = "given";
+
 PluginEntry::Kind ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? PluginEntry::Kind::kSensor : PluginEntry::Kind::kMotion;
 }
@@ -65,7 +68,7 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
                        const std::optional<std::set<std::string>>& only)
     : given_(files_and_folders), only_(only) {
   const bool required = on_refusal == OnRefusal::kThrow;
-  for (const fs::path& place : files_and_folders) LoadPlace(place, "given", required);
+  for (const fs::path& place : files_and_folders) LoadPlace(place, kGiven, required);
   for (const fs::path& folder : internal::PluginFoldersOfEnvironment()) {
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }
@@ -87,7 +90,7 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
     Refuse(place, "no such file or folder");
   }
   if (fs::is_directory(place, error)) {
-    LoadFolder(place, required);
+    LoadFolder(place, required, origin == kGiven);
   } else if (there) {
     LoadFile(place, required, false);
   }
@@ -101,12 +104,13 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   searched_.push_back(place.string() + " (" + origin + "): " + found);
 }
 
-void PluginHost::LoadFolder(const fs::path& folder, bool required) {
+/// `whole`: whatever its plugins offer.
+void PluginHost::LoadFolder(const fs::path& folder, bool required, bool whole) {
   std::set<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     if (at->path().extension() != ".so") continue;
-    if (required || !only_ || internal::MayOffer(at->path(), *only_)) files.insert(at->path());
+    if (whole || !only_ || internal::MayOffer(at->path(), *only_)) files.insert(at->path());
   }
   if (error) {
     if (required) Refuse(folder, error.message());
@@ -187,7 +191,6 @@ const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& n
                                     const Node& entry) const {
   const auto matches = [&](const PluginEntry& e) { return e.kind == kind && e.name == name; };
   const auto found = std::find_if(entries_.begin(), entries_.end(), matches);
-  if (found == entries_.end() && only_) Complete().FailMissing(kind, name, entry);
   if (found == entries_.end()) FailMissing(kind, name, entry);
   const auto other = std::find_if(found + 1, entries_.end(), matches);
   if (other != entries_.end()) {
@@ -202,12 +205,22 @@ const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& n
 
 void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
                              const Node& entry) const {
+  if (!complete()) Complete().FailMissing(kind, name, entry);
   const bool model = kind != PluginEntry::Kind::kSource && kind != PluginEntry::Kind::kEstimator;
   const char* const key = model ? "model" : "type";
   const Node at = entry.is_map() ? entry.Find(key).value_or(entry) : entry;
   std::string what = std::string("no plugin offers the ") + KindName(kind) + " '" + name + "'";
   std::vector<std::string> names;
   for (const PluginEntry& other : entries_) {
+    if (other.kind == kind && other.name == name) {
+      throw Error(ExitCode::kPlugin,
+                  ErrorLine(at.place(), at.path(),
+                            std::string("the ") + KindName(kind) + " '" + name + "' of " +
+                                other.plugin.string() +
+                                " is asked for, but not named in the config, so that the plugin "
+                                "was not opened",
+                            "its name in the config, or the plugin in `plugins:`"));
+    }
     if (other.kind == kind) names.push_back(other.name);
     if (other.name == name)
       what += "; there is " + WithArticle(KindName(other.kind)) + " of that name";

@@ -78,8 +78,9 @@ class PluginHost {
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
   /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
   /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
-  /// `only`, if set, has every name that will be asked for: plugins elsewhere that offer none of
-  /// them stay closed, which saves the time of trying and opening them.
+  /// `only`, if set, has every name that will be asked for: plugins elsewhere that list none of
+  /// them stay closed, which saves the time of trying and opening them. Then an error about a name
+  /// that is not found opens all, which is for one thread.
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
                       OnRefusal on_refusal = OnRefusal::kThrow,
                       const std::optional<std::set<std::string>>& only = {});
@@ -101,7 +102,9 @@ class PluginHost {
   /// The maker of an estimator whose options are in `entry`; its errors are the same.
   EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
 
-  /// The same with all plugins opened, whatever they offer: for errors, which tell what there is.
+  /// Whether no plugin was left closed for its names.
+  bool complete() const { return !only_; }
+  /// One that has opened all: for errors, which tell what there is.
   PluginHost Complete() const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
@@ -110,14 +113,14 @@ class PluginHost {
   /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
   /// each, for `plugins info`.
   std::vector<std::string> Describe(const PluginEntry& entry) const;
-  /// Every place looked at, in order, with what was found there.
+  /// Every place looked at, in order, with what was found there in the plugins that were opened.
   const std::vector<std::string>& searched() const { return searched_; }
   const std::vector<Refusal>& refusals() const { return refusals_; }
 
  private:
   struct Loaded;
   void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
-  void LoadFolder(const std::filesystem::path& folder, bool required);
+  void LoadFolder(const std::filesystem::path& folder, bool required, bool whole);
   void LoadFile(const std::filesystem::path& file, bool required, bool tried);
   void Load(const std::filesystem::path& file, bool tried);
   void AddEntries(const Loaded& plugin);

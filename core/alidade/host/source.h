@@ -127,8 +127,8 @@ struct SourceArguments {
   std::uint64_t seed;
   std::filesystem::path folder;  ///< relative paths are taken from here
   bool any_order = false;        ///< times may go back or repeat: the run deals with it
-  /// All of the config and the plugins that make its models, for a source that draws from them;
-  /// null where only the keys are asked for.
+  /// All of the config and the plugins that make its models, for a source that draws from them:
+  /// those alone that the config names. Null where only the keys are asked for.
   const Config* config = nullptr;
   const PluginHost* host = nullptr;
 };

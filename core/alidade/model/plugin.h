@@ -134,7 +134,7 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 #define ALIDADE_MOTION_BY(make, name, doc, citation) \
   (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
 
-/// Exports the models as this plugin's table. Once for each plugin.
+/// Exports the models, constant expressions, as this plugin's table. Once for each plugin.
 #define ALIDADE_PLUGIN(...)                                                                        \
   ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                      \
   static constexpr AlidadeEntry alidade_entries[] = {__VA_ARGS__};                                 \

@@ -6,7 +6,8 @@
  * follows is normative; docs/plugin_abi.md has the same with its reasons.
  *
  * A plugin exports one function, `alidade_plugin`, that returns its table, and one build tag in the
- * ELF section `.alidade`, which the host reads before it opens the file.
+ * ELF section `.alidade`, which the host reads before it opens the file; and its names in the
+ * section `.alidade_names`, if it likes, by which the host may leave it closed.
  *
  * Structs. Every struct begins with its own size. Who reads one that the other side made reads no
  * further than that size, and takes what lies beyond as zero. Tables are walked by the stride that

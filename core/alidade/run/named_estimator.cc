@@ -111,7 +111,8 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == PluginEntry::Kind::kEstimator && entry.name == type) return entry;
   }
-  FailOffered(type, host.Complete(), node);
+  if (!host.complete()) FailOffered(type, host.Complete(), node);
+  FailOffered(type, host, node);
 }
 
 std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }

@@ -10,25 +10,35 @@
 namespace alidade {
 namespace {
 
-/// The M rows of s += H P H' from `first` on; returns M. Each entry of P is taken once for all.
+/// What the M rows of H from `first` on add to s += H P H'; returns M. Of two entries of P that are
+/// one by symmetry it takes the lower one, for both, and half of each on the diagonal.
 template <int M>
 int AddRows(const Eigen::MatrixXd& p, const JacobianRows& h, int first, double* s) {
   const auto row = [&](int i) { return h.data + std::ptrdiff_t{i} * h.stride; };
   for (const JacobianPart& right : h.parts) {
     for (int c = 0; c < right.size; ++c) {
       const int b = right.offset + c;
-      double hp[M] = {};  // column b of H P
+      double hp[M] = {};  // H times column b of the lower triangle of P
+      const auto add = [&](int column, double value) {
+        for (int i = 0; i < M; ++i) hp[i] += row(first + i)[column] * value;
+      };
+      add(right.column + c, 0.5 * p(b, b));
+      for (int d = c + 1; d < right.size; ++d) add(right.column + d, p(right.offset + d, b));
       for (const JacobianPart& left : h.parts) {
-        const auto add = [&](int d, double value) {
-          for (int i = 0; i < M; ++i) hp[i] += row(first + i)[left.column + d] * value;
-        };
-        const int above = std::clamp(b - left.offset, 0, left.size);
-        for (int d = 0; d < above; ++d) add(d, p(b, left.offset + d));
-        for (int d = above; d < left.size; ++d) add(d, p(left.offset + d, b));
+        if (left.offset > right.offset) {
+          for (int d = 0; d < left.size; ++d) add(left.column + d, p(left.offset + d, b));
+        } else if (left.offset == right.offset && &left > &right) {  // two roles of one block
+          for (int d = 0; d < left.size; ++d) {
+            add(left.column + d, p(left.offset + std::max(c, d), left.offset + std::min(c, d)));
+          }
+        }
       }
       for (int i = 0; i < M; ++i) {
-        double* const to = s + std::ptrdiff_t{first + i} * h.rows;
-        for (int k = 0; k < h.rows; ++k) to[k] += hp[i] * row(k)[right.column + c];
+        for (int k = 0; k < h.rows; ++k) {
+          const double both = hp[i] * row(k)[right.column + c];
+          s[(first + i) * h.rows + k] += both;
+          s[k * h.rows + first + i] += both;
+        }
       }
     }
   }

@@ -269,7 +269,7 @@ TEST(StaticEkfArray, AnInnovationCovarianceThatIsNotFiniteChangesNothing) {
   }
 }
 
-/// A covariance that is none, as no filter arrives at: of that one filter the measurement is refused.
+/// A covariance that is none, as no filter arrives at.
 TEST(StaticEkfArray, AnInnovationCovarianceThatIsNotPositiveIsRefusedOfThatFilterAlone) {
   const Scale2d scale = Scale2d::FromSigma(0.1);
   const std::vector<double> z(20, 1.0);

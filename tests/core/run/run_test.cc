@@ -616,5 +616,13 @@ TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
             alidade::Run(second, {}).estimators[0].metrics);
 }
 
+TEST(Experiment, WordsOfAConfigAreItsKeysAndScalars) {
+  const Config config =
+      Config::FromText("a: {model: b, list: [c, {d: 1.5}]}\ne: 'f g'", "test.yaml");
+  EXPECT_EQ(WordsOf(config),
+            (std::set<std::string>{"a", "model", "b", "list", "c", "d", "1.5", "e", "f g"}));
+  EXPECT_THROW(config.root().RejectUnread(), Error);  // nothing counts as read
+}
+
 }  // namespace
 }  // namespace alidade

@@ -98,6 +98,16 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
       }
       at += count;
     }
+    const Eigen::MatrixXd whole = dense * p.Dense() * dense.transpose();
+    at = 0;
+    for (const JacobianRows& one : all) {  // S alone, without P H'
+      Eigen::MatrixXd s = Eigen::MatrixXd::Ones(one.rows, one.rows);
+      p.AddProjection(one, s.data());
+      EXPECT_EQ(s, s.transpose());
+      s.array() -= 1.0;
+      EXPECT_LT((s - whole.block(at, at, one.rows, one.rows)).norm(), kRounding * whole.norm());
+      at += one.rows;
+    }
     Workspace work;
     const Panels panels = TakePanels(work, p.size(), 9);
     p.Project(all, panels);
@@ -105,6 +115,19 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
     Copy(panels, pht);
     EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kRounding * pht.norm());
   }
+}
+
+TEST(Covariance, AddProjectionOfManyRowsEqualsTheDenseProduct) {
+  Random random(6);
+  const Covariance p = Make({3, 4, 30}, random);
+  const RowMajor h = RandomMatrix(5, 37, random);
+  const std::vector<JacobianPart> parts = {{3, 4, 0}, {7, 30, 4}, {0, 3, 34}};
+  Eigen::MatrixXd dense(5, 37);
+  dense << h.rightCols(3), h.leftCols(34);
+  Eigen::MatrixXd s = Eigen::MatrixXd::Zero(5, 5);
+  p.AddProjection({h.data(), 5, 37, parts}, s.data());
+  const Eigen::MatrixXd expected = dense * p.Dense() * dense.transpose();
+  EXPECT_LT((s - expected).norm(), kRounding * expected.norm());
 }
 
 TEST(Covariance, ProjectOfFewStatesEqualsTheDenseProduct) {

@@ -102,8 +102,66 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
   // What is given is opened whole, and an error tells of all that there is.
   EXPECT_TRUE(offers(PluginHost({folder_ / "path"}, OnRefusal::kThrow, only), "range_rate"));
   const Config config = Parse("model: rate");
-  ExpectError(ExitCode::kPlugin, {"no plugin offers the sensor 'rate'", "range_rate"},
+  ExpectError(ExitCode::kPlugin, {"no plugin offers the sensor 'range_rat'", "'range_rate'?"},
               [&] { host.CreateSensor("range_rat", config.root()); });
+  ExpectError(
+      ExitCode::kPlugin,
+      {"the sensor 'range_rate' of " + fs::canonical(folder_ / "path/range_rate.so").string(),
+       "is asked for, but not named in the config"},
+      [&] { host.CreateSensor("range_rate", config.root()); });
+  Copy("good", "path/good_too.so");
+  const PluginHost twice({}, OnRefusal::kThrow, only);
+  ExpectError(ExitCode::kPlugin, {"two plugins offer the sensor 'probe'"},
+              [&] { twice.CreateSensor("probe", config.root()); });
+}
+
+TEST_F(HostTest, EveryShippedPluginListsItsNames) {
+  EXPECT_GT(PluginHost().entries().size(), 10u);
+  const std::set<std::string> none = {"of no plugin"};
+  for (const PluginEntry& entry : PluginHost({}, OnRefusal::kThrow, none).entries()) {
+    ADD_FAILURE() << entry.plugin << " was opened";
+  }
+}
+
+/// Changes the list of names in a plugin.
+template <class Change>
+void ChangeNames(const fs::path& file, const Change& change) {
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  const auto read = [&](std::uint64_t offset, void* to, std::size_t size) {
+    stream.seekg(static_cast<std::streamoff>(offset));
+    stream.read(static_cast<char*>(to), static_cast<std::streamsize>(size));
+  };
+  Elf64_Ehdr header;
+  read(0, &header, sizeof(header));
+  std::vector<Elf64_Shdr> sections(header.e_shnum);
+  read(header.e_shoff, sections.data(), sections.size() * sizeof(Elf64_Shdr));
+  std::string titles(sections[header.e_shstrndx].sh_size, '\0');
+  read(sections[header.e_shstrndx].sh_offset, titles.data(), titles.size());
+  for (const Elf64_Shdr& section : sections) {
+    if (titles.c_str() + section.sh_name != std::string(ALIDADE_NAMES_SECTION)) continue;
+    std::string text(section.sh_size, '\0');
+    read(section.sh_offset, text.data(), text.size());
+    change(text);
+    stream.seekp(static_cast<std::streamoff>(section.sh_offset));
+    stream.write(text.data(), static_cast<std::streamsize>(section.sh_size));
+    return;
+  }
+  ADD_FAILURE() << "no names";
+}
+
+TEST_F(HostTest, APluginThatOffersWhatItsListLacksIsRefused) {
+  const fs::path file = Copy("good", "copy.so");
+  ChangeNames(file, [](std::string& text) { text[0] = 'x'; });
+  ExpectRefused(file, {"offers 'probe', which its list of names lacks"});
+}
+
+TEST_F(HostTest, AListOfNamesWithoutAnEndCountsForNothing) {
+  const fs::path file = Copy("good", "path/good.so");
+  ChangeNames(file, [](std::string& text) { text.back() = 'x'; });
+  setenv("ALIDADE_PLUGIN_PATH", (folder_ / "path").c_str(), 1);
+  const PluginHost host({}, OnRefusal::kThrow, std::set<std::string>{"of no plugin"});
+  ASSERT_EQ(host.entries().size(), 1u);
+  EXPECT_EQ(host.entries().front().name, "probe");
 }
 
 // ---- 50: missing --------------------------------------------------------------------------------

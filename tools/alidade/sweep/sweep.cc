@@ -141,8 +141,8 @@ class Queue {
   std::exception_ptr thrown_;
 };
 
-/// Whether every model on offer may work in several instances at once. Asked of all, used or not:
-/// which ones a config uses is known only to those who build it.
+/// Whether every model on offer may work in several instances at once. Asked of all that the host
+/// has opened: which ones a config uses is known only to those who build it.
 bool MayRunInParallel(const PluginHost& host) {
   return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
     return entry.kind == PluginEntry::Kind::kSource ||

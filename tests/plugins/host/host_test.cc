@@ -117,8 +117,8 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
 
 TEST_F(HostTest, EveryShippedPluginListsItsNames) {
   EXPECT_GT(PluginHost().entries().size(), 10u);
-  const std::set<std::string> none = {"of no plugin"};
-  for (const PluginEntry& entry : PluginHost({}, OnRefusal::kThrow, none).entries()) {
+  const PluginHost none({}, OnRefusal::kThrow, std::set<std::string>{"of no plugin"});
+  for (const PluginEntry& entry : none.entries()) {
     ADD_FAILURE() << entry.plugin << " was opened";
   }
 }

@@ -291,6 +291,53 @@ TEST(StaticEkfArray, AnInnovationCovarianceThatIsNotPositiveIsRefusedOfThatFilte
   }
 }
 
+TEST(StaticEkfArray, ACovarianceOfSeveralNumbersThatIsNotPositiveIsRefusedLikewise) {
+  const Gyrocompass sensor;
+  const std::vector<double> z(3 * 20, 0.1);
+  for (const int lanes : AllLanes()) {
+    StaticEkfArray<HeadingStep> array(20, HeadingStep());
+    array.set_lanes(lanes);
+    for (int i = 0; i < 20; ++i) {
+      array.Set<0>(i, 0.1, 0.3);
+      array.Set<1>(i, 0.2, 0.2);
+    }
+    const double heading = 0.1;
+    const Eigen::Matrix<double, 1, 1> negative(-1.0);
+    array.Set<0>(13, &heading, negative);
+    StaticOutcome outcomes[20];
+    array.Update(ArrayUpdate<Gyrocompass, 0, 1>{sensor, z.data(), 1e6, nullptr, outcomes});
+    for (int i = 0; i < 20; ++i) {
+      EXPECT_EQ(outcomes[i], i == 13 ? StaticOutcome::kNotFinite : StaticOutcome::kAccepted) << i;
+      EXPECT_EQ(array.covariance(i)(0, 0) == -1.0, i == 13) << i;
+    }
+  }
+}
+
+TEST(StaticEkfArray, NoGateLetsAllThroughAndOneOfZeroNone) {
+  const Scale2d scale = Scale2d::FromSigma(0.1);
+  std::vector<double> z(20, 1.2);
+  z[7] = std::numeric_limits<double>::quiet_NaN();  // where there is none
+  bool present[20];
+  std::fill_n(present, 20, true);
+  present[7] = false;
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const int lanes : AllLanes()) {
+    for (const double gate : {infinity, 0.0}) {
+      DepthArray array(20, VelocityOfDepth(1.0), Constant<1>(1));
+      array.set_lanes(lanes);
+      for (int i = 0; i < 20; ++i) SetDepth(array, 0.3, i);
+      StaticOutcome outcomes[20];
+      array.Update(ArrayUpdate<Scale2d, 0, 2>{scale, z.data(), gate, present, outcomes});
+      for (int i = 0; i < 20; ++i) {
+        EXPECT_EQ(outcomes[i], i == 7        ? StaticOutcome::kInvalid
+                               : gate == 0.0 ? StaticOutcome::kGated
+                                             : StaticOutcome::kAccepted);
+        EXPECT_EQ(array.value<0>(i) == 0.3, i == 7 || gate == 0.0);
+      }
+    }
+  }
+}
+
 TEST(StaticEkfArray, RefusesLanesThatTheProcessorHasNot) {
   DepthArray array(3, VelocityOfDepth(1.0), Constant<1>(1));
   EXPECT_ANY_THROW(array.set_lanes(3));

@@ -120,10 +120,7 @@ struct PackMask : Parts<kLanes> {
   PackMask(const PackMask& other) {
     For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
   }
-  PackMask& operator=(const PackMask& other) {  // NOLINT(bugprone-unhandled-self-assignment)
-    For<Base::kParts>([&](auto k) { v[k] = other.v[k]; });
-    return *this;
-  }
+  PackMask& operator=(const PackMask& other) = default;
 };
 template <int kLanes>
 bool Any(const PackMask<kLanes>& mask) {

@@ -273,7 +273,7 @@ void MakeInstance(Bytes& bytes, Arena& arena) {
     Require(instance->spaces().size() == instance->tangents().size(), "a space without a tangent");
     if (c.kind == ALIDADE_KIND_SENSOR) {
       const SensorModel sensor(instance);
-      Require(sensor.initialised_role() < std::ssize(sensor.roles()), "initialises no role");
+      Require(sensor.inverse().role < std::ssize(sensor.roles()), "initialises no role");
       static_cast<void>(sensor.has_landmark());
     } else {
       const MotionModel motion(instance);

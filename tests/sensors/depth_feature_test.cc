@@ -62,7 +62,7 @@ TEST(DepthFeature, HasTrueJacobians) {
 TEST(DepthFeature, InitialisesWithoutAPrior) {
   ForEachRepresentation([](auto representation) {
     const SensorModel sensor = DepthSensor<decltype(representation)>(Lens());
-    EXPECT_EQ(sensor.prior_size(), 0);
+    EXPECT_EQ(sensor.inverse().prior_size, 0);
     ExpectTrueInverse(sensor, Blocks{kPose[0], kPose[1], {411, 87.5, 3.2}});
   });
 }

@@ -124,12 +124,12 @@ TEST(InverseDepthFeature, IsValidOnTheImage) {
 TEST(InverseDepthFeature, DescribesItsLandmark) {
   const SensorModel anchored = InverseDepthSensor<Anchored>(Pinhole());
   EXPECT_TRUE(anchored.has_landmark());
-  EXPECT_EQ(anchored.initialised_role(), 2);
-  EXPECT_EQ(anchored.initialised_count(), 3);
-  EXPECT_EQ(anchored.prior_size(), 1);
+  EXPECT_EQ(anchored.inverse().role, 2);
+  EXPECT_EQ(anchored.inverse().count, 3);
+  EXPECT_EQ(anchored.inverse().prior_size, 1);
   EXPECT_NE(anchored.roles()[2].flags & ALIDADE_ROLE_SHARED, 0u);
   const SensorModel angles = InverseDepthSensor<InverseDepth>(Pinhole());
-  EXPECT_EQ(angles.initialised_count(), 1);
+  EXPECT_EQ(angles.inverse().count, 1);
   EXPECT_FALSE(angles.roles()[1].landmark());
   EXPECT_EQ(angles.roles()[2].elements.back(), "rho");
 }

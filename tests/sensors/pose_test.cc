@@ -47,7 +47,7 @@ TEST(Pose, HasNoiseByAxisOfBoth) {
 
 TEST(Pose, TellsThePosition) {
   const SensorModel pose = MakePose();
-  ASSERT_EQ(pose.initialised_role(), 0);
+  ASSERT_EQ(pose.inverse().role, 0);
   const std::vector<double> z{4, 5, 6, 1, 0, 0, 0};
   std::vector<double> y(3, kPoison), jz(18, kPoison);
   std::vector<double*> jx(2, nullptr);

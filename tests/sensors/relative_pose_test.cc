@@ -36,7 +36,7 @@ TEST(RelativePose, IsThatOfTheLandmarkInTheBody) {
 
 TEST(RelativePose, PlacesTheLandmarkWhereItWasMeasured) {
   const SensorModel sensor = MakeRelativePose();
-  ASSERT_EQ(sensor.initialised_role(), 2);
+  ASSERT_EQ(sensor.inverse().role, 2);
   std::vector<double> z(7), y(7, kPoison), j_z(36, kPoison), j_r(18, kPoison), j_q(18, kPoison);
   ASSERT_EQ(sensor.Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
   std::vector<double*> j{j_r.data(), j_q.data(), nullptr, nullptr};

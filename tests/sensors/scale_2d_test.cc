@@ -58,7 +58,7 @@ TEST(Scale2d, IsDefinedForPositiveDepthAndInverseDepth) {
 
 TEST(Scale2d, InitialisesTheInverseDistance) {
   const SensorModel scale = MakeSensor<Scale2d>(kScale);
-  ASSERT_EQ(scale.initialised_role(), 1);
+  ASSERT_EQ(scale.inverse().role, 1);
   const double depth_m = 0.5, s = 1.5;
   const double* roles[] = {&depth_m, nullptr};
   double y = kPoison, j_depth = kPoison, untouched = kPoison, j_s = kPoison;

@@ -70,7 +70,7 @@ TEST(StereoDisparity, IsInvalidNearerThanTheLimit) {
 
 TEST(StereoDisparity, InitialisesTheDepth) {
   const SensorModel stereo = MakeSensor<StereoDisparity>(kStereo);
-  ASSERT_EQ(stereo.initialised_role(), 0);
+  ASSERT_EQ(stereo.inverse().role, 0);
   const double disparity_px = 52.0, negative_px = -1.0;
   const double* roles[] = {nullptr};
   double* jx[] = {nullptr};

@@ -78,7 +78,7 @@ TEST(StereoFeature, SeesNoDisparityAtInfinity) {
 TEST(StereoFeature, InitialisesWithoutAPrior) {
   ForEachRepresentation([](auto representation) {
     const SensorModel sensor = MadeStereo<decltype(representation)>();
-    EXPECT_EQ(sensor.prior_size(), 0);
+    EXPECT_EQ(sensor.inverse().prior_size, 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
     // d = 0 px

@@ -87,7 +87,7 @@ inline void ExpectTrueJacobians(const SensorModel& sensor, const Blocks& roles) 
 inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
   std::vector<Space> spaces{sensor.roles()[0], sensor.roles()[1], sensor.measurement()};
   spaces.resize(from.size());
-  if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor.prior_size());
+  if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor.inverse().prior_size);
   const std::vector<Space> representations(sensor.roles().begin() + 2, sensor.roles().end());
   const int n = TangentSize(representations), m = spaces[2].geometry.tangent;
   std::vector<double> jr(3 * n), jq(3 * n), jz(m * n), jp(n);

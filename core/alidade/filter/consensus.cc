@@ -8,6 +8,7 @@
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
 #include "alidade/filter/stacked.h"
+#include "alidade/state/projection.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 
@@ -77,7 +78,7 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
   s = Eigen::Map<const RowMajor>(one.R.data(), m, m);
-  f.state.covariance().Project(one.jacobian(), pht.data(), s.data());
+  Project(f.state.covariance(), one.jacobian(), pht.data(), s.data());
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
   ForEachConsidered(f, itself, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
     pht.block(offset, at, size, k).setZero();

@@ -169,8 +169,8 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
                  const Measurement& measurement, const double* prior,
                  std::vector<const double*>& roles, Inverse& inverse) {
   const SensorModel& model = sensor.model;
-  const auto first = static_cast<std::size_t>(model.initialised_role());
-  const auto count = static_cast<std::size_t>(model.initialised_count());
+  const auto first = static_cast<std::size_t>(model.inverse().role);
+  const auto count = static_cast<std::size_t>(model.inverse().count);
   const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
   int rows = 0, size = 0, columns = 0, most = 0;
   for (const Space& target : targets) {
@@ -178,7 +178,7 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
     size += target.geometry.ambient;
   }
   for (const Space& role : model.roles()) most += role.geometry.tangent;
-  std::fill_n(roles.begin() + model.initialised_role(), count, nullptr);
+  std::fill_n(roles.begin() + model.inverse().role, count, nullptr);
   inverse.from.clear();
   inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most),
                          kNotWritten);
@@ -191,7 +191,7 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   }
   inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
   inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
-  inverse.by_prior.setConstant(rows, model.prior_size(), kNotWritten);
+  inverse.by_prior.setConstant(rows, model.inverse().prior_size, kNotWritten);
   const Status status = model.Initialise(
       roles.data(), measurement.values.data(), prior, inverse.y.data(), inverse.of_role.data(),
       inverse.by_z.data(), inverse.by_prior.data(), measurement.known.data());

@@ -54,7 +54,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
   for (const SensorBinding& sensor : system.sensors) {
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model.measurement().geometry;
-    const double defect = geometry.Defect(one.values.data());
+    const double defect = Defect(geometry, one.values.data());
     if (defect > kUnitTolerance) {
       throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
                                           "' are not of unit length: it is off by " +

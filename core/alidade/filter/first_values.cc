@@ -13,7 +13,7 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
 /// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
 bool IsAwaited(const FilterState& f, const Row& row) {
   const SensorBinding& sensor = *row.binding;
-  const int index = sensor.model.initialised_role();
+  const int index = sensor.model.inverse().role;
   if (row.report->outcome != Outcome::kAccepted || index < 0) return false;
   const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
   const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
@@ -73,7 +73,7 @@ void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
 
 void Initialise(FilterState& f, const Row& row, const Inverse& inverse) {
   const SensorBinding& sensor = *row.binding;
-  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.initialised_role())].block;
+  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.inverse().role)].block;
   f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
   f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();

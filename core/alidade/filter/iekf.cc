@@ -200,7 +200,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       if (geometry.kind == GeometryKind::kVector) continue;
       const Workspace::Use use(f.work);
       Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
-      geometry.PlusJacobian(at[i], dx + offset, j.data());
+      PlusJacobian(geometry, at[i], dx + offset, j.data());
       ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
     }
     Linear::TakeS(f, *row);

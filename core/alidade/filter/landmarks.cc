@@ -9,6 +9,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/filter/first_values.h"
+#include "alidade/state/projection.h"
 #include "alidade/system/landmark_representation.h"
 
 namespace alidade::internal {
@@ -74,7 +75,7 @@ Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
   }
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   const std::span present(parts.data(), used);
-  state.covariance().AddProjection({point.jacobian.data(), 3, column, present}, covariance.data());
+  AddProjection(state.covariance(), {point.jacobian.data(), 3, column, present}, covariance.data());
   return covariance;
 }
 
@@ -139,10 +140,10 @@ Landmarks::Landmarks(const Binding& binding) : options_(*binding.system.landmark
       if (family.first < 0) family.first = static_cast<int>(i);
       family.roles.push_back(roles[i]);
     }
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() == 0 ||
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model.inverse().prior_size == 0 ||
                     (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
                      options_.prior->sigma >= 0.0));
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model.inverse().prior_size <= 1);
     ALIDADE_EXPECTS(family.first < 0 || family.representation == XyzRepresentation() ||
                     sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
@@ -156,7 +157,7 @@ BlockId Landmarks::Declare(FilterState& f, std::int64_t id, const Space& role, B
   name_ += role.name;
   name_ += '#';
   name_ += std::to_string(names_++);
-  return f.state.Declare(name_, "landmarks", role, status);
+  return f.state.layout().Declare(name_, "landmarks", role, status);
 }
 
 void Landmarks::AddKnown(FilterState& f) {
@@ -404,10 +405,11 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
 /// The landmark that the row may initialise, or the end.
 Landmarks::ById::iterator Landmarks::FindWaiting(const FilterState& f, const Row& row) {
   if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
-      row.binding->model.initialised_role() != FamilyOf(row).first) {
+      row.binding->model.inverse().role != FamilyOf(row).first) {
     return landmarks_.end();
   }
-  const bool takes_prior = row.binding->model.prior_size() > 0 && prior_.min_observations > 0;
+  const bool takes_prior =
+      row.binding->model.inverse().prior_size > 0 && prior_.min_observations > 0;
   const int least = takes_prior ? prior_.min_observations : options_.min_observations;
   const auto found = landmarks_.find(row.measurement->landmark);
   const bool waits =

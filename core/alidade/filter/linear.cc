@@ -7,6 +7,7 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/filter/ekf.h"
 #include "alidade/filter/stacked.h"
+#include "alidade/state/projection.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 
@@ -56,7 +57,7 @@ Outcome Linear::Linearise(FilterState& f, Row& row) {
     NoteRefusal(f, row, outcome);
     return outcome;
   }
-  row.model->measurement().geometry.WrapAngles(entry.h.data());
+  WrapAngles(row.model->measurement().geometry, entry.h.data());
   TakeInnovation(row);
   return outcome;
 }
@@ -115,7 +116,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
 
 void Linear::TakeS(const FilterState& f, Row& row) {
   row.report->s.assign(row.R.begin(), row.R.end());
-  f.state.covariance().AddProjection(row.jacobian(), row.report->s.data());
+  AddProjection(f.state.covariance(), row.jacobian(), row.report->s.data());
 }
 
 Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx) {
@@ -144,7 +145,7 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     const auto k = static_cast<std::size_t>(entry.dof);
     std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
     std::fill_n(hpht.begin(), k * k, 0.0);  // not wanted: the report has S
-    f.state.covariance().Project(h, pht.data() + at * n, hpht.data());
+    Project(f.state.covariance(), h, pht.data() + at * n, hpht.data());
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
       for (std::size_t j = 0; j < at; ++j) {  // H of this row times P H' of those before
@@ -257,7 +258,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     DivideByTransposed(l, outside);
     Workspace::Matrix columns = f.work.Take(n, m);
     Copy(w, columns);
-    f.state.CorrectPostponed(outside, columns, y);
+    f.state.postponed()->Correct(p, outside, columns, y);
   }
   f.state.MoveTo(f.moved);
   if (recorded) RecordGain(f, rows, gain.data());

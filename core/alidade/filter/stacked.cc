@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "alidade/state/projection.h"
 #include "alidade/state/tiles.h"
 #include "alidade/state/vector_kernels.h"
 
@@ -61,7 +62,7 @@ Panels ProjectionOf(FilterState& f, std::span<Row* const> rows) {
   const Panels pht = TakePanels(f.work, f.size(), CountOf(rows));
   f.jacobians.clear();
   for (const Row* const row : rows) f.jacobians.push_back(row->jacobian());
-  f.state.covariance().Project(f.jacobians, pht);
+  Project(f.state.covariance(), f.jacobians, pht);
   return pht;
 }
 
@@ -70,11 +71,11 @@ void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s)
 }
 
 Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
-  const Covariance& p = f.state.covariance();
-  Workspace::Matrix outside = f.work.Take(p.outside(), CountOf(rows));
-  if (p.outside() == 0) return outside;
+  const OutsideCorrelation& correlation = std::as_const(f.state).covariance().outside();
+  Workspace::Matrix outside = f.work.Take(correlation.columns(), CountOf(rows));
+  if (correlation.columns() == 0) return outside;
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    p.ProjectOutside(row.jacobian(), outside.data() + at * outside.rows());
+    correlation.Project(row.jacobian(), outside.data() + at * outside.rows());
   });
   return outside;
 }

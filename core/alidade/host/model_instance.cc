@@ -351,7 +351,7 @@ void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std:
                       internal::AllFinite(known.sqrt_density) &&
                       std::isfinite(known.time_constant_s);
   if (!finite) Refuse(what + "are not finite");
-  if (role.geometry.Defect(known.mean.data()) > kUnitTolerance) {
+  if (Defect(role.geometry, known.mean.data()) > kUnitTolerance) {
     Refuse(what + "have a mean that is not of unit length");
   }
   role.geometry.Normalise(known.mean.data());
@@ -408,14 +408,14 @@ SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
   if (!known().name.empty()) known_size_ = known().geometry.ambient;
   if ((instance_->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
     const AlidadeDescription& description = *instance_->c().description;
-    initialised_role_ = description.initialise_role;
-    prior_size_ = description.prior_count;
+    inverse_.role = description.initialise_role;
+    inverse_.prior_size = description.prior_count;
     const auto is_landmark = [&](int i) {
       return i < std::ssize(roles()) && roles()[static_cast<std::size_t>(i)].landmark();
     };
-    initialised_count_ = 1;
-    while (is_landmark(initialised_role_) && is_landmark(initialised_role_ + initialised_count_))
-      ++initialised_count_;
+    inverse_.count = 1;
+    while (is_landmark(inverse_.role) && is_landmark(inverse_.role + inverse_.count))
+      ++inverse_.count;
   }
 }
 
@@ -435,11 +435,11 @@ Status SensorModel::LineariseKnowing(const double* const* roles, double* z,
 Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
                                double* y, double* const* jx, double* jz, double* jp,
                                const double* known) const {
-  ALIDADE_EXPECTS(initialised_role_ >= 0);
+  ALIDADE_EXPECTS(inverse_.role >= 0);
   const AlidadeObservation seen = detail::Seen(z, known);
   return detail::CallModel<true>(&sensor_->initialise, [&] {
     return sensor_->initialise(self_, &seen, roles, prior, y, jx, instance_->tangents().data(), jz,
-                               measurement().geometry.tangent, jp, prior_size_);
+                               measurement().geometry.tangent, jp, inverse_.prior_size);
   });
 }
 

@@ -130,6 +130,13 @@ class ModelInstance {
   unsigned capabilities_ = 0;
 };
 
+/// What Initialise of a sensor computes.
+struct InverseModel {
+  int role = -1;       ///< the first role, of a landmark the first of it; -1: a sensor has none
+  int count = 0;       ///< of roles from there on: those of a landmark together, else one
+  int prior_size = 0;  ///< numbers that it needs besides the measurement
+};
+
 /// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h.
 /// `known` is what came with the measurement, of a sensor that takes known numbers; null of others.
 class SensorModel {
@@ -140,12 +147,7 @@ class SensorModel {
   const ModelInstance& instance() const { return *instance_; }
   const std::vector<Space>& roles() const { return instance_->spaces(); }
   const Space& measurement() const { return instance_->space(); }
-  /// Index of the role that Initialise computes, of a landmark the first; -1 where there is none.
-  int initialised_role() const { return initialised_role_; }
-  /// How many roles from there on Initialise computes: those of a landmark together, else one.
-  int initialised_count() const { return initialised_count_; }
-  /// Numbers that Initialise needs besides the measurement.
-  int prior_size() const { return prior_size_; }
+  const InverseModel& inverse() const { return inverse_; }
   /// Whether its roles are filled by the landmark that a measurement names.
   bool has_landmark() const;
   /// The known numbers of a measurement, and how many.
@@ -207,9 +209,7 @@ class SensorModel {
   const AlidadeSensor* sensor_;
   const void* self_;
   int known_size_ = 0;
-  int initialised_role_ = -1;
-  int initialised_count_ = 0;
-  int prior_size_ = 0;
+  InverseModel inverse_;
 };
 
 /// A motion model x' = f(x, u, w, dt) behind the plugin ABI. Cheap to copy.

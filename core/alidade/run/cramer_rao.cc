@@ -39,7 +39,7 @@ std::string WhyNotAtTruth(const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model.roles());
   const std::string name = '\'' + sensor.name + '\'';
   if (!representation) return name + " has landmarks of a representation of its own";
-  if (IsXyz(*representation) && sensor.model.prior_size() > 0) {
+  if (IsXyz(*representation) && sensor.model.inverse().prior_size > 0) {
     return name + " places landmarks as xyz by a prior, by whose mean the Jacobians are";
   }
   return "";

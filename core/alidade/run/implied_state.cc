@@ -11,7 +11,7 @@ namespace {
 
 /// Whether the block is a scalar that the sensor tells from a measurement alone.
 bool IsInvertible(const System& system, const SensorBinding& binding) {
-  const int role = binding.model.initialised_role();
+  const int role = binding.model.inverse().role;
   const int roles = static_cast<int>(binding.roles.size());
   if (role < 0 || role >= roles) return false;
   for (int r = 0; r < roles; ++r) {
@@ -77,7 +77,7 @@ std::optional<ImpliedState> ImpliedState::Of(const System& system, const SensorB
                                              const std::vector<StreamInfo>& truths) {
   if (binding.model.known_size() > 0) return {};  // they would be needed, too
   if (IsInvertible(system, binding)) {
-    const auto role = static_cast<std::size_t>(binding.model.initialised_role());
+    const auto role = static_cast<std::size_t>(binding.model.inverse().role);
     return ImpliedState(binding.model, binding.roles[role].block);
   }
   std::vector<int> of_roles = TruthsOfRoles(system, binding, truths);

@@ -62,7 +62,7 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
   Estimator& estimator = *one.named.estimator;
   Frame rest;
   const bool all = one.failed_sensors.empty();
-  if (!all) rest = one.WithoutFailed(visible, source.streams());
+  if (!all) rest = WithoutFailed(one, visible, source.streams());
   const auto started = Clock::now();
   const auto process = [&]() -> const UpdateReport& {
     const internal::BusyWhile works(options.busy);

@@ -11,14 +11,16 @@
 
 namespace alidade::internal {
 
-Frame Running::WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams) const {
+Frame WithoutFailed(const Running& one, const Frame& frame,
+                    const std::vector<StreamInfo>& streams) {
+  const System& system = one.named.system;
   const auto goes_on = [&](const Measurement& m) {
     const std::string& stream = streams[static_cast<std::size_t>(m.stream)].name;
     bool read = false, works = false;
-    for (std::size_t s = 0; s < named.system.sensors.size(); ++s) {
-      if (named.system.sensors[s].stream != stream) continue;
+    for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+      if (system.sensors[s].stream != stream) continue;
       read = true;
-      works = works || failed_sensors[s] == 0;
+      works = works || one.failed_sensors[s] == 0;
     }
     return works || !read;  // a control input, say
   };

@@ -43,8 +43,6 @@ struct Running {
   std::int64_t stale_inputs = 0;          ///< events `input_stale`, those that are kept too
   std::vector<char> failed_sensors = {};  ///< under OnPluginFailure::kDisable; empty: none
 
-  /// The frame without the streams that its failed sensors alone read.
-  Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams) const;
   /// Looks for calls that failed in a report of a frame. Why the run has to end; "" where it goes
   /// on.
   std::string TakeFailures(const UpdateReport& report);
@@ -56,6 +54,9 @@ struct Running {
   /// that was.
   void Note(const std::vector<Event>& events);
 };
+
+/// The frame without the streams that failed sensors of `one` alone read.
+Frame WithoutFailed(const Running& one, const Frame& frame, const std::vector<StreamInfo>& streams);
 
 /// What is known of the estimator before its first frame.
 EstimatorResult Begin(const NamedEstimator& named);

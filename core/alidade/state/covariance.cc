@@ -2,57 +2,18 @@
 #include "alidade/state/covariance.h"
 
 #include <algorithm>
-#include <array>
 
+#include "alidade/state/projection.h"
 #include "alidade/state/small_kernels.h"
-#include "alidade/state/vector_kernels.h"
 
 namespace alidade {
-namespace {
-
-/// What the M rows of H from `first` on add to s += H P H'; returns M. Of two entries of P that are
-/// one by symmetry it takes the lower one, for both, and half of each on the diagonal.
-template <int M>
-int AddRows(const Eigen::MatrixXd& p, const JacobianRows& h, int first, double* s) {
-  const auto row = [&](int i) { return h.data + std::ptrdiff_t{i} * h.stride; };
-  for (const JacobianPart& right : h.parts) {
-    for (int c = 0; c < right.size; ++c) {
-      const int b = right.offset + c;
-      double hp[M] = {};  // H times column b of the lower triangle of P
-      const auto add = [&](int column, double value) {
-        for (int i = 0; i < M; ++i) hp[i] += row(first + i)[column] * value;
-      };
-      add(right.column + c, 0.5 * p(b, b));
-      for (int d = c + 1; d < right.size; ++d) add(right.column + d, p(right.offset + d, b));
-      for (const JacobianPart& left : h.parts) {
-        if (left.offset > right.offset) {
-          for (int d = 0; d < left.size; ++d) add(left.column + d, p(left.offset + d, b));
-        } else if (left.offset == right.offset && &left > &right) {  // two roles of one block
-          for (int d = 0; d < left.size; ++d) {
-            add(left.column + d, p(left.offset + std::max(c, d), left.offset + std::min(c, d)));
-          }
-        }
-      }
-      for (int i = 0; i < M; ++i) {
-        for (int k = 0; k < h.rows; ++k) {
-          const double both = hp[i] * row(k)[right.column + c];
-          s[(first + i) * h.rows + k] += both;
-          s[k * h.rows + first + i] += both;
-        }
-      }
-    }
-  }
-  return M;
-}
-
-}  // namespace
 
 int Covariance::Add(int rows) {
   if (const int gap = TakeGap(rows); gap >= 0) return gap;
   const int offset = size_;
   Reserve(rows);
   size_ += rows;
-  if (outside_ > 0) GrowOutside(0);
+  outside_.Resize(size_);
   return offset;
 }
 
@@ -67,23 +28,9 @@ void Covariance::Reserve(int rows) {
 
 void Covariance::Clear() {
   p_.topLeftCorner(size_, size_).setZero();
-  phi_.setZero();
-  still_.clear();
-  size_ = outside_ = 0;
+  outside_.Clear();
+  size_ = 0;
   gaps_.clear();
-}
-
-void Covariance::GrowOutside(int columns) {
-  outside_ += columns;
-  if (std::ssize(still_) < size_) still_.resize(static_cast<std::size_t>(size_), char{0});
-  if (outside_ <= phi_.rows() && size_ <= phi_.cols()) return;
-  const auto room = [](Eigen::Index has, Eigen::Index needs) {
-    return needs <= has ? has : std::max(2 * has, needs);
-  };
-  Eigen::MatrixXd larger =
-      Eigen::MatrixXd::Zero(room(phi_.rows(), outside_), room(phi_.cols(), size_));
-  larger.topLeftCorner(phi_.rows(), phi_.cols()) = phi_;
-  phi_.swap(larger);
 }
 
 /// Takes `rows` rows from the smallest gap that has them, and returns their offset; -1: none has.
@@ -103,9 +50,7 @@ int Covariance::TakeGap(int rows) {
 void Covariance::Clear(int offset, int rows) {
   p_.block(offset, 0, rows, offset).setZero();
   p_.block(offset, offset, size_ - offset, rows).setZero();
-  if (outside_ == 0) return;
-  phi_.middleCols(offset, rows).setZero();
-  std::fill_n(still_.begin() + offset, rows, char{0});
+  outside_.Zero(offset, rows);
 }
 
 void Covariance::Release(int offset, int rows) {
@@ -123,6 +68,7 @@ void Covariance::Release(int offset, int rows) {
   }
   if (offset + rows == size_) {
     size_ = offset;
+    outside_.Resize(size_);
   } else {
     gaps_.emplace_back(offset, rows);
   }
@@ -136,10 +82,7 @@ int Covariance::MoveToGap(int from, int rows) {
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
   SetRows(to, cross.middleRows(from, rows), cross);
-  if (outside_ > 0) {
-    phi_.middleCols(to, rows) = phi_.middleCols(from, rows);
-    std::copy_n(still_.begin() + from, rows, still_.begin() + to);
-  }
+  outside_.Copy(from, to, rows);
   Release(from, rows);
   return to;
 }
@@ -195,7 +138,7 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   int k = 0;
   for (const JacobianPart& part : parts) k += part.size;
   const Workspace::Use use(memory_);
-  if (outside_ > 0) PropagateOutside(parts, f);
+  outside_.Propagate({f, k, k, parts}, memory_);
   if (q == nullptr) {
     Workspace::Matrix zero = memory_.Take(k, k);
     zero.setZero();
@@ -207,78 +150,9 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   }
   Workspace::Matrix cross = memory_.Take(size_, k), own = memory_.Take(k, k);
   own.setZero();
-  Project({f, k, k, parts}, cross.data(), own.data());
+  Project(*this, {f, k, k, parts}, cross.data(), own.data());
   own += Eigen::Map<const RowMajor>(q, k, k);
   SetParts(parts, own, cross);
-}
-
-void Covariance::PropagateOutside(std::span<const JacobianPart> parts, const double* f) {
-  int k = 0;
-  for (const JacobianPart& part : parts) k += part.size;
-  Workspace::Matrix moved = memory_.Take(outside_, k);
-  ProjectOutside({f, k, k, parts}, moved.data());
-  SetOutside(parts, moved);
-}
-
-void Covariance::SetOutside(std::span<const JacobianPart> parts, const ConstMatrix& phi) {
-  for (const JacobianPart& part : parts) {
-    if (outside_ == 0) return;
-    phi_.block(0, part.offset, outside_, part.size) = phi.middleCols(part.column, part.size);
-    std::fill_n(still_.begin() + part.offset, part.size, char{0});
-  }
-}
-
-void Covariance::ProjectOutside(const JacobianRows& h, double* hphi) const {
-  const long k = outside_;
-  std::fill_n(hphi, k * h.rows, 0.0);
-  for (const JacobianPart& part : h.parts) {
-    internal::BestVectorKernels().combine(k, part.size, h.rows,
-                                          phi_.data() + part.offset * phi_.rows(), phi_.rows(),
-                                          h.data + part.column, h.stride, hphi, k);
-  }
-}
-
-void Covariance::AddProjection(const JacobianRows& h, double* s) const {
-  if (internal::IsSmall(*this) && h.whole && h.rows <= internal::kSmall) {
-    std::array<double, internal::kSmall * internal::kSmall> pht;
-    return Project(h, pht.data(), s);
-  }
-  for (int first = 0; first < h.rows;) {
-    switch (h.rows - first) {
-      case 1:
-        first += AddRows<1>(p_, h, first, s);
-        break;
-      case 2:
-        first += AddRows<2>(p_, h, first, s);
-        break;
-      default:
-        first += AddRows<3>(p_, h, first, s);
-    }
-  }
-}
-
-void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
-  if (internal::IsSmall(*this) && h.whole) {
-    const int ld = static_cast<int>(p_.rows());
-    return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
-  }
-  const long n = size_;
-  internal::BestVectorKernels().project(p_.data(), p_.rows(), n, {&h, 1}, pht, 1, n);
-  for (int i = 0; i < h.rows; ++i) {
-    for (int k = 0; k < h.rows; ++k) {
-      double sum = 0.0;
-      for (const JacobianPart& part : h.parts) {
-        const double* const j = h.data + static_cast<std::ptrdiff_t>(i) * h.stride + part.column;
-        for (int c = 0; c < part.size; ++c) sum += j[c] * pht[k * n + part.offset + c];
-      }
-      s[i * h.rows + k] += sum;
-    }
-  }
-}
-
-void Covariance::Project(std::span<const JacobianRows> rows, const internal::Panels& pht) const {
-  internal::BestVectorKernels().project(p_.data(), p_.rows(), size_, rows, pht.data, pht.columns,
-                                        pht.height);
 }
 
 Eigen::MatrixXd Covariance::Dense() const {

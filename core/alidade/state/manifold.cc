@@ -169,25 +169,26 @@ void Geometry::Transport(const double* from, const double* to, double* j) const 
   });
 }
 
-void Geometry::PlusJacobian(const double* x, const double* d, double* j) const {
-  if (kind == GeometryKind::kUnitQuaternion) return RightJacobian(d, j);
-  if (kind == GeometryKind::kUnitVector) return UnitVectorPlusJacobian(x, d, j);
-  ByParts(*this, j, [&](const Geometry& part, int a, int t, double* own) {
-    part.PlusJacobian(x + a, d + t, own);
+void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j) {
+  if (geometry.kind == GeometryKind::kUnitQuaternion) return RightJacobian(d, j);
+  if (geometry.kind == GeometryKind::kUnitVector) return UnitVectorPlusJacobian(x, d, j);
+  ByParts(geometry, j, [&](const Geometry& part, int a, int t, double* own) {
+    PlusJacobian(part, x + a, d + t, own);
   });
 }
 
-double Geometry::Defect(const double* x) const {
-  if (kind == GeometryKind::kProduct) {
+double Defect(const Geometry& geometry, const double* x) {
+  if (geometry.kind == GeometryKind::kProduct) {
     double worst = 0.0;
-    ForEachPart([&](const Geometry& part, int a, int) {
-      const double defect = part.Defect(x + a);
+    geometry.ForEachPart([&](const Geometry& part, int a, int) {
+      const double defect = Defect(part, x + a);
       if (!(defect <= worst)) worst = defect;
     });
     return worst;
   }
-  const bool unit = kind == GeometryKind::kUnitQuaternion || kind == GeometryKind::kUnitVector;
-  return unit ? std::abs(Norm(x, ambient) - 1.0) : 0.0;
+  const bool unit =
+      geometry.kind == GeometryKind::kUnitQuaternion || geometry.kind == GeometryKind::kUnitVector;
+  return unit ? std::abs(Norm(x, geometry.ambient) - 1.0) : 0.0;
 }
 
 void Geometry::Normalise(double* x) const {
@@ -195,7 +196,7 @@ void Geometry::Normalise(double* x) const {
     return ForEachPart([&](const Geometry& part, int a, int) { part.Normalise(x + a); });
   }
   if (kind == GeometryKind::kAngle) x[0] = alidade::Angle::Wrap(x[0]);
-  if (Defect(x) == 0.0) return;
+  if (Defect(*this, x) == 0.0) return;
   const double norm = Norm(x, ambient);
   if (norm == 0.0) {
     Identity(x);
@@ -204,8 +205,8 @@ void Geometry::Normalise(double* x) const {
   }
 }
 
-void Geometry::WrapAngles(double* x) const {
-  ForEachPart([&](const Geometry& part, int a, int) {
+void WrapAngles(const Geometry& geometry, double* x) {
+  geometry.ForEachPart([&](const Geometry& part, int a, int) {
     if (part.kind == GeometryKind::kAngle) x[a] = alidade::Angle::Wrap(x[a]);
   });
 }

@@ -56,21 +56,22 @@ struct Geometry {
   /// j (tangent x tangent, row-major): carries a tangent vector at `from` to the tangent space of
   /// `to` along the geodesic. The identity but for unit vectors, whose basis turns with the point.
   void Transport(const double* from, const double* to, double* j) const;
-  /// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
-  /// identity for vectors and angles, and where d = 0.
-  void PlusJacobian(const double* x, const double* d, double* j) const;
-  /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
-  /// that of the farthest part for products.
-  double Defect(const double* x) const;
   /// The nearest point of the manifold; an angle is wrapped.
   void Normalise(double* x) const;
-  /// Wraps what is an angle, and leaves the rest.
-  void WrapAngles(double* x) const;
   /// The neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
   void Identity(double* x) const;
 
   friend bool operator==(const Geometry&, const Geometry&) = default;
 };
+
+/// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
+/// identity for vectors and angles, and where d = 0.
+void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
+/// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
+/// that of the farthest part for products.
+double Defect(const Geometry& geometry, const double* x);
+/// Wraps what is an angle, and leaves the rest.
+void WrapAngles(const Geometry& geometry, double* x);
 
 /// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`, `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);

@@ -35,8 +35,8 @@ void Postponed::Begin(std::span<const int> rows, Covariance& active) {
   basis_.assign(rows.begin(), rows.end());
   active.Clear();
   if (k > 0) active.Add(k);
-  active.GrowOutside(k);
-  active.SetStill(0, k);
+  active.outside().Grow(k);
+  active.outside().SetStill(0, k);
   const Covariance::ConstLower whole = std::as_const(p).lower();
   Covariance::Lower own = active.lower();
   for (int j = 0; j < k; ++j) {
@@ -53,8 +53,9 @@ void Postponed::Begin(std::span<const int> rows, Covariance& active) {
   auto root = s_.topLeftCorner(k, k);
   root = own.triangularView<Eigen::Lower>();
   TakeRoot(root, own.diagonal());
-  for (int j = 0; j < k; ++j) active.phi().row(j).tail(k - j) = s_.col(j).segment(j, k - j);
-  active.phi().triangularView<Eigen::StrictlyLower>().setZero();
+  for (int j = 0; j < k; ++j)
+    active.outside().phi().row(j).tail(k - j) = s_.col(j).segment(j, k - j);
+  active.outside().phi().triangularView<Eigen::StrictlyLower>().setZero();
 }
 
 void Postponed::Correct(Covariance& active, const Workspace::Matrix& g, const Workspace::Matrix& w,
@@ -62,7 +63,7 @@ void Postponed::Correct(Covariance& active, const Workspace::Matrix& g, const Wo
   const Eigen::Index k = basis();
   internal::AddOuterProduct(psi_.topLeftCorner(k, k), g, 1.0);
   theta_.noalias() += g * y;
-  internal::AddProductWithTransposed(active.phi(), g, w, -1.0);
+  internal::AddProductWithTransposed(active.outside().phi(), g, w, -1.0);
 }
 
 void Postponed::Recall(int row, int size, int at, Covariance& active, double* dx) {
@@ -91,11 +92,11 @@ void Postponed::Recall(int row, int size, int at, Covariance& active, double* dx
   Eigen::Map<Eigen::VectorXd>(dx, size) = z.transpose() * theta_.head(k);
   own.noalias() -= z.transpose() * v;
   const JacobianPart part{at, size, 0};
-  active.SetParts({&part, 1}, own, active.phi().transpose() * z);
-  active.GrowOutside(size);
-  active.phi().block(0, at, k, size) = z - v;
-  active.phi().block(k, at, size, size) = root.triangularView<Eigen::Lower>().transpose();
-  active.SetStill(at, size);
+  active.SetParts({&part, 1}, own, active.outside().phi().transpose() * z);
+  active.outside().Grow(size);
+  active.outside().phi().block(0, at, k, size) = z - v;
+  active.outside().phi().block(k, at, size, size) = root.triangularView<Eigen::Lower>().transpose();
+  active.outside().SetStill(at, size);
 }
 
 void Postponed::CatchUp(Covariance& active, std::span<const int> homes_of_rows,
@@ -117,9 +118,10 @@ void Postponed::CatchUp(Covariance& active, std::span<const int> homes_of_rows,
   // Rows of a that are not still: Cov(b, a) = Z' Phi'.
   std::vector<int> rows;
   for (int j = 0; j < active.size(); ++j) {
-    if (homes_of_rows[static_cast<std::size_t>(j)] >= 0 && !active.still(j)) rows.push_back(j);
+    if (homes_of_rows[static_cast<std::size_t>(j)] >= 0 && !active.outside().still(j))
+      rows.push_back(j);
   }
-  const Eigen::MatrixXd phi = active.phi()(Eigen::all, rows);
+  const Eigen::MatrixXd phi = active.outside().phi()(Eigen::all, rows);
   v.setZero(n, std::ssize(rows));
   internal::AddProduct(v, z, phi);
   Covariance::Lower now = p.lower();

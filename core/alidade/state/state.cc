@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "alidade/base/error.h"
+#include "alidade/state/projection.h"
 
 namespace alidade {
 namespace {
@@ -63,11 +64,6 @@ double State::sigma(BlockId id, int i) const {
   return std::sqrt(covariance_.Variance(block.tangent_offset + i));
 }
 
-BlockId State::Declare(std::string_view name, std::string_view owner, const Space& space,
-                       BlockStatus status) {
-  return layout_.Declare(name, owner, space, status);
-}
-
 void State::Reserve(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   if (block.value_offset >= 0) return;
@@ -84,7 +80,7 @@ void State::PlaceValue(BlockId id, const double* value) {
   std::copy_n(value, block.geometry().ambient, values_.data() + block.value_offset);
 }
 
-void State::Add(BlockId id, const double* value, const Covariance::ConstMatrix& covariance) {
+void State::Add(BlockId id, const double* value, const ConstMatrix& covariance) {
   PlaceValue(id, value);
   const Block& block = layout_[id];
   if (block.status == BlockStatus::kConstant) return;
@@ -94,7 +90,7 @@ void State::Add(BlockId id, const double* value, const Covariance::ConstMatrix& 
 
 void State::Initialise(std::span<const BlockId> ids, const double* values,
                        std::span<const BlockId> from, const Eigen::Ref<const RowMajor>& jacobian,
-                       const Covariance::ConstMatrix& own) {
+                       const ConstMatrix& own) {
   for (const BlockId id : ids) {
     PlaceValue(id, values);
     values += layout_[id].geometry().ambient;
@@ -104,17 +100,18 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
   const Eigen::Index rows = jacobian.rows();
   Workspace::Matrix cross = memory_.Take(covariance_.size(), rows), p = memory_.Take(rows, rows);
   p.setZero();
-  covariance_.Project(
+  Project(
+      covariance_,
       {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
       cross.data(), p.data());
   p += own;
-  Workspace::Matrix phi = memory_.Take(covariance_.outside(), rows);
-  covariance_.ProjectOutside(
+  Workspace::Matrix phi = memory_.Take(covariance_.outside().columns(), rows);
+  covariance_.outside().Project(
       {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
       phi.data());
   FindParts(ids);
   covariance_.SetParts(parts_, p, cross);
-  covariance_.SetOutside(parts_, phi);
+  covariance_.outside().SetParts(parts_, phi);
 }
 
 /// Puts the rows of the blocks in P into parts_, and returns the size of their tangents.

@@ -67,6 +67,8 @@ class State {
   explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
 
   const StateLayout& layout() const { return layout_; }
+  /// For who declares a block of a dynamic state (a landmark, a clone).
+  StateLayout& layout() { return layout_; }
   const Covariance& covariance() const { return covariance_; }
   Covariance& covariance() { return covariance_; }
 
@@ -77,20 +79,17 @@ class State {
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }
 
-  /// Declares a block and its place for a dynamic state (a landmark, a clone).
-  BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
-                  BlockStatus status = BlockStatus::kEstimated);
   /// Gives a declared block the place that its value will have, and rows of zeros.
   void Reserve(BlockId id);
   /// Gives a declared block a value and a covariance (tangent, row-major; ignored where constant),
   /// uncorrelated with the rest.
-  void Add(BlockId id, const double* value, const Covariance::ConstMatrix& covariance);
+  void Add(BlockId id, const double* value, const ConstMatrix& covariance);
   /// Gives declared blocks the values y = g(x, n), one after the other, with dy = J dx + J_n dn:
   /// their covariance is J P_xx J' + own, their correlation with the rest J P_x. `from` names the
   /// blocks of x, none of them among `ids`; J has the columns of their tangents side by side,
   /// row-major; `own` = J_n Cov(n) J_n'.
   void Initialise(std::span<const BlockId> ids, const double* values, std::span<const BlockId> from,
-                  const Eigen::Ref<const RowMajor>& jacobian, const Covariance::ConstMatrix& own);
+                  const Eigen::Ref<const RowMajor>& jacobian, const ConstMatrix& own);
   /// Drops the block, with its id: a block declared later may have it. The rest keeps its value and
   /// covariance.
   void Drop(BlockId id);
@@ -106,12 +105,8 @@ class State {
   void RecallAll();
   /// Null where nothing is postponed.
   const Postponed* postponed() const { return postponed_ ? &*postponed_ : nullptr; }
-  /// What an update means for what is postponed, before P moves on to new values: see
-  /// Postponed::Correct.
-  void CorrectPostponed(const Workspace::Matrix& g, const Workspace::Matrix& w,
-                        const Workspace::Vector& y) {
-    postponed_->Correct(covariance_, g, w, y);
-  }
+  /// For an update, which it has to hear of before P moves on to new values (Postponed::Correct).
+  Postponed* postponed() { return postponed_ ? &*postponed_ : nullptr; }
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
   /// indexed like the covariance. Changes nothing: see MoveTo.
   void Retract(const double* dx, std::vector<double>& moved) const;

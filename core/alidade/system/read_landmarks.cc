@@ -29,9 +29,9 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
     model.Fail("model '" + sensor.model.name() + "' has roles behind those of its landmark",
                "a model whose landmark comes last");
   }
-  if (sensor.model.prior_size() > 1) {
+  if (sensor.model.inverse().prior_size > 1) {
     model.Fail("model '" + sensor.model.name() + "' needs a prior of " +
-                   std::to_string(sensor.model.prior_size()) + " numbers",
+                   std::to_string(sensor.model.inverse().prior_size) + " numbers",
                "a model that needs one, the inverse distance, or none");
   }
   const auto same = [](const Space& a, const Space& b) {
@@ -59,13 +59,13 @@ void CheckPosition(const Node& key, const SensorBinding& sensor) {
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model.roles());
   const std::string model = "model '" + sensor.model.name() + "' of sensor '" + sensor.name + "'";
-  if (sensor.model.prior_size() > 0 && !options.prior) {
+  if (sensor.model.inverse().prior_size > 0 && !options.prior) {
     node.Fail("no prior: " + model + " does not determine the distance of a landmark",
               "prior: {inverse_distance: ..., sigma: ...}");
   }
   if (options.prior) {
     const Node prior = node.At("prior");
-    if (representation == internal::XyzRepresentation() && sensor.model.prior_size() > 0 &&
+    if (representation == internal::XyzRepresentation() && sensor.model.inverse().prior_size > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance").Fail("a landmark at infinity cannot be xyz", "above 0, 1/m");
     }
@@ -120,7 +120,7 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
     const Node model = root.At("sensors").At(sensor.name).At("model");
     CheckRoles(model, sensor, *first);
     CheckOptions(node, options, sensor);
-    const int role = sensor.model.initialised_role();
+    const int role = sensor.model.inverse().role;
     can_begin =
         can_begin || (role >= 0 && sensor.model.roles()[static_cast<std::size_t>(role)].landmark());
   }

@@ -28,7 +28,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   } else {
     mean = node.Numbers(geometry.ambient);
   }
-  if (geometry.Defect(mean.data()) > kUnitTolerance) {
+  if (Defect(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
   geometry.Normalise(mean.data());
@@ -347,7 +347,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     }
     if (const auto at = node.Find("jacobian_at")) {
       binding.jacobian_at = static_cast<JacobianAt>(at->Choice({"prediction", "measurement"}));
-      const int initialised = model.initialised_role();
+      const int initialised = model.inverse().role;
       if (binding.jacobian_at == JacobianAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
@@ -444,7 +444,7 @@ void CheckInitialisation(const Node& root, const System& system) {
                 Nearest(prior.from, NamesOf(system.sensors)));
     }
     const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
-    const int role = binding.model.initialised_role();
+    const int role = binding.model.inverse().role;
     if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
       place(prior.block)
           .Fail("sensor '" + prior.from + "' does not determine this block",

@@ -109,7 +109,7 @@ class OffsetSensor {
     calls_.eval = Eval;
     calls_.sqrt_noise = SqrtNoise;
     if (sensor_.instance().c().sensor->valid != nullptr) calls_.valid = Valid;
-    const int role = sensor_.initialised_role();
+    const int role = sensor_.inverse().role;
     if (role >= 0 && !IsMoved(place_[static_cast<std::size_t>(role)])) {
       description_.initialise_role = place_[static_cast<std::size_t>(role)];
       calls_.initialise = Initialise;
@@ -322,8 +322,8 @@ class OffsetSensor {
     const Status status = of.Shift(roles, derivatives, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     int rows = 0;
-    const auto first = of.sensor_.roles().begin() + of.sensor_.initialised_role();
-    for (auto role = first; role != first + of.sensor_.initialised_count(); ++role) {
+    const auto first = of.sensor_.roles().begin() + of.sensor_.inverse().role;
+    for (auto role = first; role != first + of.sensor_.inverse().count; ++role) {
       rows += role->geometry.tangent;
     }
     if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);

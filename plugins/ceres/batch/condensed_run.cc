@@ -281,7 +281,7 @@ void CondensedRun::AddFirstValues(Epoch& epoch) {
       if (epoch.factors[i].outcome != Outcome::kInitialised || ObservesLandmarks(sensor)) {
         continue;
       }
-      const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
+      const auto target = static_cast<std::size_t>(sensor.model.inverse().role);
       const BlockId block = sensor.roles[target].block;
       if (Present(block) || std::ranges::count_if(sensor.roles, missing) > 1) continue;
       present_[static_cast<std::size_t>(block)] = progress = true;
@@ -306,8 +306,8 @@ bool CondensedRun::Begin(const double* e, int columns, Point& point) const {
     const int at = block.tangent_offset, t = block.geometry().tangent;
     if (!block.has_covariance()) continue;
     RowMajor j(t, t);
-    block.geometry().PlusJacobian(initial_.value(static_cast<BlockId>(id)), d.data() + at,
-                                  j.data());
+    PlusJacobian(block.geometry(), initial_.value(static_cast<BlockId>(id)), d.data() + at,
+                 j.data());
     point.s.block(at, 0, t, n0) = j * l0_.middleRows(at, t);
   }
   return true;
@@ -511,7 +511,7 @@ void CondensedRun::Report(std::size_t k, const std::vector<double>& values,
       entry.h.clear();
       continue;
     }
-    geometry.WrapAngles(entry.h.data());
+    WrapAngles(geometry, entry.h.data());
     entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   }

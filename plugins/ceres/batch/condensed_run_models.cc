@@ -100,7 +100,7 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
   Measurement measurement = factor.measurement;
   double* const z = measurement.values.data();
   RowMajor j_plus(measured.tangent, measured.tangent);
-  measured.PlusJacobian(z, d.data(), j_plus.data());
+  PlusJacobian(measured, z, d.data(), j_plus.data());
   measured.Plus(z, d.data(), z);
   std::vector<const double*> roles;
   internal::RolesAt(sensor, place, point.x, point.x, roles);

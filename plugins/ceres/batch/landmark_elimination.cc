@@ -105,12 +105,12 @@ void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimato
   landmark.sensor = factor.sensor;
   landmark.first = {epochs_.size(), index};
   if (before != current_.end()) landmark.generation = before->second.generation + 1;
-  if (sensor.model.prior_size() > 0) {
+  if (sensor.model.inverse().prior_size > 0) {
     landmark.prior = PriorOf(id, sensor, *binding_.system.landmarks->prior, filter);
     landmark.sigma = binding_.system.landmarks->prior->sigma;
   }
   landmark.from = Eigen::VectorXd::Zero(sensor.model.measurement().geometry.tangent +
-                                        sensor.model.prior_size());
+                                        sensor.model.inverse().prior_size);
   current_[id] = {static_cast<int>(landmarks_.size()), landmark.generation};
   landmarks_.push_back(std::move(landmark));
 }

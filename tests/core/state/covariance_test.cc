@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include "alidade/base/random.h"
+#include "alidade/state/projection.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -61,11 +62,11 @@ TEST(Covariance, ProjectEqualsTheDenseProduct) {
   dense_h.middleCols(5, 1) = h.leftCols(1);
   dense_h.middleCols(2, 3) = h.rightCols(3);
   Eigen::MatrixXd pht(8, 2), s = Eigen::MatrixXd::Zero(2, 2);
-  p.Project({h.data(), 2, 4, parts}, pht.data(), s.data());
+  Project(p, {h.data(), 2, 4, parts}, pht.data(), s.data());
   EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kRounding * pht.norm());
   EXPECT_LT((s - dense_h * pht).norm(), kRounding * pht.norm());
   Eigen::MatrixXd added = Eigen::MatrixXd::Identity(2, 2);
-  p.AddProjection({h.data(), 2, 4, parts}, added.data());
+  AddProjection(p, {h.data(), 2, 4, parts}, added.data());
   EXPECT_LT((added - Eigen::MatrixXd::Identity(2, 2) - s).norm(), kRounding * pht.norm());
 }
 
@@ -102,7 +103,7 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
     at = 0;
     for (const JacobianRows& one : all) {  // S alone, without P H'
       Eigen::MatrixXd s = Eigen::MatrixXd::Ones(one.rows, one.rows);
-      p.AddProjection(one, s.data());
+      AddProjection(p, one, s.data());
       EXPECT_EQ(s, s.transpose());
       s.array() -= 1.0;
       EXPECT_LT((s - whole.block(at, at, one.rows, one.rows)).norm(), kRounding * whole.norm());
@@ -110,7 +111,7 @@ TEST(Covariance, ProjectOfSeveralRowsEqualsTheDenseProduct) {
     }
     Workspace work;
     const Panels panels = TakePanels(work, p.size(), 9);
-    p.Project(all, panels);
+    Project(p, all, panels);
     Eigen::MatrixXd pht(p.size(), 9);
     Copy(panels, pht);
     EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kRounding * pht.norm());
@@ -125,7 +126,7 @@ TEST(Covariance, AddProjectionOfManyRowsEqualsTheDenseProduct) {
   Eigen::MatrixXd dense(5, 37);
   dense << h.rightCols(3), h.leftCols(34);
   Eigen::MatrixXd s = Eigen::MatrixXd::Zero(5, 5);
-  p.AddProjection({h.data(), 5, 37, parts}, s.data());
+  AddProjection(p, {h.data(), 5, 37, parts}, s.data());
   const Eigen::MatrixXd expected = dense * p.Dense() * dense.transpose();
   EXPECT_LT((s - expected).norm(), kRounding * expected.norm());
 }
@@ -137,10 +138,10 @@ TEST(Covariance, ProjectOfFewStatesEqualsTheDenseProduct) {
   const std::vector<JacobianPart> parts = {{0, 2, 0}, {2, 3, 2}};
   const JacobianRows rows{h.data(), 3, 5, parts, true};
   Eigen::MatrixXd pht(5, 3), s = Eigen::MatrixXd::Zero(3, 3), added = s;
-  p.Project(rows, pht.data(), s.data());
+  Project(p, rows, pht.data(), s.data());
   EXPECT_LT((pht - p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
   EXPECT_LT((s - h * pht).norm(), kRounding * pht.norm());
-  p.AddProjection(rows, added.data());
+  AddProjection(p, rows, added.data());
   EXPECT_LT((added - h * p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
 }
 

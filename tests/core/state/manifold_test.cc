@@ -97,7 +97,7 @@ TEST_P(GeometryLaws, PlusStaysOnTheManifoldAndMayWriteOverItsArgument) {
     const Values d = Step(0.1);
     geometry_.Plus(x.data(), d.data(), x.data());
   }
-  EXPECT_LE(geometry_.Defect(x.data()), 1e-15);
+  EXPECT_LE(Defect(geometry_, x.data()), 1e-15);
 }
 
 TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
@@ -107,7 +107,7 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
     const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
     const Values y = Plus(x, d);
     std::vector<double> j(n * n);
-    geometry_.PlusJacobian(x.data(), d.data(), j.data());
+    PlusJacobian(geometry_, x.data(), d.data(), j.data());
     for (std::size_t c = 0; c < n; ++c) {
       Values above = d, below = d;
       above[c] += kStep;
@@ -156,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Product, WrapsItsAnglesAndNothingElse) {
   const Geometry polar = Geometry::Product({Geometry::Vector(1), Geometry::Angle()});
   std::vector<double> z{7.0, 7.0};
-  polar.WrapAngles(z.data());
+  WrapAngles(polar, z.data());
   EXPECT_EQ(z[0], 7.0);
   EXPECT_DOUBLE_EQ(z[1], 7.0 - 2.0 * M_PI);
 }
@@ -175,8 +175,8 @@ TEST(Product, IsItsPartsOneAfterTheOther) {
   EXPECT_EQ(y, (std::vector<double>{1.1, 2.2, 3.3, q[0], q[1], q[2], q[3]}));
   pose.Minus(y.data(), x.data(), back.data());
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(back[i], d[i], 1e-15);
-  pose.PlusJacobian(x.data(), d.data(), j.data());
-  Geometry::UnitQuaternion().PlusJacobian(&x[3], &d[3], part.data());
+  PlusJacobian(pose, x.data(), d.data(), j.data());
+  PlusJacobian(Geometry::UnitQuaternion(), &x[3], &d[3], part.data());
   for (std::size_t r = 0; r < 6; ++r) {
     for (std::size_t c = 0; c < 6; ++c) {
       const bool rotation = r >= 3 && c >= 3;
@@ -184,7 +184,7 @@ TEST(Product, IsItsPartsOneAfterTheOther) {
     }
   }
   std::vector<double> off{1, 2, 3, 1.2, 0, 1.6, 0};
-  EXPECT_NEAR(pose.Defect(off.data()), 1.0, 1e-15);
+  EXPECT_NEAR(Defect(pose, off.data()), 1.0, 1e-15);
   pose.Normalise(off.data());
   EXPECT_EQ(off, x);
 }
@@ -335,7 +335,7 @@ TEST(UnitVector, TransportToTheAntipodeIsFiniteAndOrthogonal) {
 
 TEST(Geometry, NormaliseGivesTheNearestPoint) {
   double q[4] = {0.0, 3.0, 0.0, 4.0};
-  EXPECT_DOUBLE_EQ(Geometry::UnitQuaternion().Defect(q), 4.0);
+  EXPECT_DOUBLE_EQ(Defect(Geometry::UnitQuaternion(), q), 4.0);
   Geometry::UnitQuaternion().Normalise(q);
   EXPECT_DOUBLE_EQ(q[1], 0.6);
   EXPECT_DOUBLE_EQ(q[3], 0.8);

@@ -35,11 +35,12 @@ void Update(State& state, const std::vector<BlockId>& blocks, const RowMajor& h,
   const int n = state.covariance().size(), m = static_cast<int>(h.rows());
   const JacobianRows rows{h.data(), m, column, parts};
   Workspace memory;
-  Workspace::Matrix w = memory.Take(n, m), g = memory.Take(state.covariance().outside(), m);
+  Workspace::Matrix w = memory.Take(n, m),
+                    g = memory.Take(state.covariance().outside().columns(), m);
   Workspace::Vector y = memory.Take(m);
   RowMajor s = r * RowMajor::Identity(m, m);
-  state.covariance().Project(rows, w.data(), s.data());
-  state.covariance().ProjectOutside(rows, g.data());
+  Project(state.covariance(), rows, w.data(), s.data());
+  state.covariance().outside().Project(rows, g.data());
   const Eigen::LLT<MatrixXd> llt{MatrixXd(s)};
   const MatrixXd l = llt.matrixL();
   l.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(w);
@@ -49,7 +50,7 @@ void Update(State& state, const std::vector<BlockId>& blocks, const RowMajor& h,
   std::vector<double> moved;
   state.Retract(dx.data(), moved);
   state.covariance().lower().triangularView<Eigen::Lower>() -= w * w.transpose();
-  if (state.postponed() != nullptr) state.CorrectPostponed(g, w, y);
+  if (Postponed* const rest = state.postponed()) rest->Correct(state.covariance(), g, w, y);
   state.MoveTo(moved);
 }
 
@@ -73,7 +74,7 @@ class PostponedState : public ::testing::Test {
  protected:
   PostponedState() {
     for (State* const state : {&whole_, &postponed_}) {
-      const BlockId camera = state->Declare("camera", "", Numbers("camera", 3));
+      const BlockId camera = state->layout().Declare("camera", "", Numbers("camera", 3));
       state->Add(camera, std::vector{0.1, 0.2, 0.3}.data(), 0.1 * MatrixXd::Identity(3, 3));
     }
   }
@@ -96,7 +97,7 @@ class PostponedState : public ::testing::Test {
     const VectorXd value = Draw(size, 1);
     BlockId id = -1;
     for (State* const state : {&whole_, &postponed_}) {
-      id = state->Declare("point " + std::to_string(names_), "", Numbers("point", size));
+      id = state->layout().Declare("point " + std::to_string(names_), "", Numbers("point", size));
       const BlockId camera = 0;
       state->Initialise({&id, 1}, value.data(), {&camera, 1}, j, MatrixXd::Identity(size, size));
     }
@@ -117,7 +118,7 @@ class PostponedState : public ::testing::Test {
     if (postponed_.layout()[from].postponed) postponed_.Recall(from);
     BlockId to = -1;
     for (State* const state : {&whole_, &postponed_}) {
-      to = state->Declare("point " + std::to_string(names_), "", Numbers("point", 2));
+      to = state->layout().Declare("point " + std::to_string(names_), "", Numbers("point", 2));
       state->Initialise({&to, 1}, value.data(), {&from, 1}, j, 0.1 * MatrixXd::Identity(2, 2));
       state->Drop(from);
     }

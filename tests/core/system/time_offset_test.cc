@@ -49,7 +49,7 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   EXPECT_EQ(NamesOf(sensor.model), (std::vector<std::string>{"x", "p.v", "time_offset"}));
   EXPECT_EQ(sensor.roles[1].block, system.layout.Find("p.v"));
   EXPECT_EQ(sensor.roles[2].block, offset);
-  EXPECT_EQ(sensor.model.initialised_role(), -1) << "x is no longer where z says";
+  EXPECT_EQ(sensor.model.inverse().role, -1) << "x is no longer where z says";
   for (const double delta : {0.0, 0.25, -0.5}) {
     const Blocks roles{{3.0}, {-4.0}, {delta}};
     double z = kPoison, l = kPoison;
@@ -81,13 +81,13 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
                  : InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature"),
         {{system.layout.Find("cam.position")}, {system.layout.Find("cam.orientation")}}};
     sensor.roles.resize(sensor.model.roles().size());
-    const int inverse = sensor.model.initialised_role();
+    const int inverse = sensor.model.inverse().role;
     if (anchored) sensor.xyz = InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature");
     ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
     const std::vector<std::string> names = NamesOf(sensor.model);
     EXPECT_EQ(names[4], "time_offset");
     EXPECT_EQ(names.size(), anchored ? 8u : 6u);
-    EXPECT_EQ(sensor.model.initialised_role(), inverse + 3) << "of the landmark";
+    EXPECT_EQ(sensor.model.inverse().role, inverse + 3) << "of the landmark";
     EXPECT_EQ(sensor.xyz.has_value(), anchored);
     if (anchored) {
       EXPECT_EQ(sensor.xyz->roles().size(), 6u);

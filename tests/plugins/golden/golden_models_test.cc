@@ -43,8 +43,8 @@ TEST_P(GoldenModels, LineIsItsClosedForm) {
 
 TEST_P(GoldenModels, LineInverts) {
   const SensorModel line = Sensor("golden_line", kLine);
-  ASSERT_EQ(line.initialised_role(), 0);
-  ASSERT_EQ(line.prior_size(), 0);
+  ASSERT_EQ(line.inverse().role, 0);
+  ASSERT_EQ(line.inverse().prior_size, 0);
   const double b = 0.75, k = 4.0, z = 7.5;
   const double* roles[] = {nullptr, &b};
   double x = 0.0, by_b = 0.0, by_z = 0.0;

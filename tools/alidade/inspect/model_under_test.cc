@@ -280,8 +280,8 @@ ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
 
 std::vector<int> ModelUnderTest::Initialised() const {
   const SensorModel sensor(instance);
-  std::vector<int> roles(static_cast<std::size_t>(sensor.initialised_count()));
-  std::iota(roles.begin(), roles.end(), sensor.initialised_role());
+  std::vector<int> roles(static_cast<std::size_t>(sensor.inverse().count));
+  std::iota(roles.begin(), roles.end(), sensor.inverse().role);
   return roles;
 }
 

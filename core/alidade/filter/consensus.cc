@@ -7,7 +7,6 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
-#include "alidade/filter/stacked.h"
 #include "alidade/state/projection.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
@@ -94,7 +93,7 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
     const MeasurementReport& entry = *row.report;
     h_.resize(entry.z.size());
     r_.resize(static_cast<std::size_t>(entry.dof));
-    if (PredictAt(row, f.moved, f.state.values(), h_.data()) != Outcome::kAccepted) continue;
+    if (PredictAt(f, row, f.moved, h_.data()) != Outcome::kAccepted) continue;
     row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
     work_.resize(r_.size() * (r_.size() + 1));
     const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, work_.data());

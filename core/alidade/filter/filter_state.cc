@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "alidade/base/number_text.h"
+#include "alidade/filter/rows.h"
 
 namespace alidade::internal {
 namespace {

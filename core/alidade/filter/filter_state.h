@@ -10,10 +10,11 @@
 #include "alidade/filter/binding.h"
 #include "alidade/filter/estimator.h"
 #include "alidade/filter/motions.h"
-#include "alidade/filter/rows.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {
+
+struct Row;  // in alidade/filter/rows.h
 
 /// What a filter has said of itself, so that it says it once.
 struct Said {

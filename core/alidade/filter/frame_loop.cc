@@ -67,7 +67,10 @@ void FrameLoop::Run(const Frame& frame) {
   Fuse(all);
   recovery_.RepairCovariance(f, all);
   if (f.said.ended) return;
-  recovery_.RecoverRejected(f, gate_, all);
+  for (Row& row : all) {
+    if (landmarks && row.binding->model.has_landmark()) continue;  // its rejections do not count
+    if (gate_.Count(f, *row.report)) recovery_.Recover(f, row);
+  }
   Spent(FramePart::kUpdate);
   if (!landmarks) return;
   landmarks->Maintain(f, all);
@@ -197,7 +200,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
   Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);
   if (landmarks) landmarks->Attach(f, {&row, 1});
   if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
-      PredictAt(row, f.state.values(), f.state.values(), one.values.data()) != Outcome::kAccepted) {
+      PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "alidade/filter/filter.h"
-#include "alidade/filter/filter_state.h"
+#include "alidade/filter/rows.h"
 
 namespace alidade::internal {
 

@@ -7,9 +7,8 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/method.h"
-#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -171,8 +170,7 @@ bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
   for (Row* row : rows) {
     MeasurementReport& entry = *row->report;
     const SensorModel& model = *row->model;
-    if (PredictAt(*row, iterate_, f.state.values(), entry.h.data()) != Outcome::kAccepted)
-      return false;
+    if (PredictAt(f, *row, iterate_, entry.h.data()) != Outcome::kAccepted) return false;
     model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
     at += entry.dof;
   }
@@ -184,14 +182,14 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
   for (Row* row : rows) {
     const SensorModel& model = *row->model;
     const SensorPlace& place = *row->place;
-    const double* const* const roles = RolesAt(*row, iterate_, f.state.values());
+    const double* const* const roles = RolesAt(f, *row, iterate_);
     if (LineariseAt(*row, roles) != Outcome::kAccepted ||
         NoiseAt(*row, roles) != Outcome::kAccepted) {
       return false;
     }
     for (double& r : row->R) r /= row->weight;
     TakeInnovation(*row);
-    const double* const* const at = RolesAt(*row, f.state.values(), f.state.values());
+    const double* const* const at = RolesAt(f, *row, f.state.values());
     std::size_t part = 0;
     for (std::size_t i = 0; i < place.values.size(); ++i) {
       if (place.columns[i] < 0) continue;

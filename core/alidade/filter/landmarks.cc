@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "alidade/base/error.h"
-#include "alidade/filter/first_values.h"
 #include "alidade/state/projection.h"
 #include "alidade/system/landmark_representation.h"
 

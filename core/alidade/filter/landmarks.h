@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/evaluate_models.h"
-#include "alidade/filter/filter_state.h"
+#include "alidade/filter/first_values.h"
 #include "alidade/system/landmarks.h"
 
 namespace alidade::internal {

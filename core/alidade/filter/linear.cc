@@ -6,7 +6,6 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/filter/ekf.h"
-#include "alidade/filter/stacked.h"
 #include "alidade/state/projection.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
@@ -48,7 +47,7 @@ Outcome Linear::Predict(FilterState& f, Row& row) {
 
 Outcome Linear::Linearise(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
-  RolesAt(row, f.state.values(), f.state.values());
+  RolesAt(f, row, f.state.values());
   Outcome outcome =
       FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
@@ -89,7 +88,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
   entry.h.resize(static_cast<std::size_t>(model.measurement().geometry.ambient));
-  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), entry.h.data());
+  Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
     const Status status = model.Initialise(row.roles.data(), entry.z.data(), implied_.data(),
@@ -98,9 +97,8 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  predicted_.assign(entry.h.begin(), entry.h.end());
-  outcome = LineariseAt(row, at_.data());
-  entry.h.assign(predicted_.begin(), predicted_.end());
+  outcome = EvaluateAt(model, *row.place, *row.measurement, at_.data(), row.memory.columns,
+                       h_there_, &row.H);
   for (std::size_t i = 0; i < at_.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
     if (row.place->columns[i] < 0 || at_[i] == row.roles[i] ||

@@ -2,12 +2,81 @@
 #include "alidade/filter/motions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
+namespace {
+
+bool AreFinite(const double* values, Eigen::Index size) {
+  return AllFinite({values, static_cast<std::size_t>(size)});
+}
+
+/// The values of the model's blocks in x.
+std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
+  std::array<const double*, kMaxRoles> blocks;
+  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
+  return blocks;
+}
+
+}  // namespace
+
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
+  const MotionModel& model = motion.model;
+  const Eigen::Index n = model.tangent_size();
+  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
+                     of_g = g == nullptr ? 0 : n * model.noise_size();
+  std::array<double*, kMaxRoles> to;
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    to[k] = next + place.values[k];
+    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
+  }
+  std::fill_n(f, of_f, kNotWritten);
+  std::fill_n(g, of_g, kNotWritten);
+  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
+  if (status != Status::kOk) return OutcomeOf(status);
+  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
+  }
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l) {
+  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
+  std::fill_n(l, size, kNotWritten);
+  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
+  if (status != Status::kOk) return OutcomeOf(status);
+  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
+  if (outcome == Outcome::kAccepted) return {};
+  const std::string who = "motion model of '" + motion.name + "' ";
+  if (outcome == Outcome::kNotFinite) {
+    return {"not_finite", who + "steps to a state that is not finite"};
+  }
+  const bool failed = outcome == Outcome::kFailed;
+  return {failed ? "plugin_failed" : "diverged",
+          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
+}
+
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x) {
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    if (block.status == BlockStatus::kConstant) continue;
+    const Geometry& geometry = block.geometry();
+    double* const value = x + block.value_offset;
+    std::copy_n(next + block.value_offset, geometry.ambient, value);
+    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
+  }
+}
 
 Motions::Motions(const Binding& binding)
     : binding_(&binding),

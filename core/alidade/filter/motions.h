@@ -1,12 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "alidade/base/workspace.h"
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/binding.h"
+#include "alidade/filter/estimator.h"
 
 namespace alidade::internal {
+
+// A motion model at any values x of the whole state: that of a filter, a sigma point, a point of a
+// batch. What it does not write is not a number. n_w: noise inputs.
+
+/// Why a step cannot be done; empty where it can.
+struct Trouble {
+  const char* kind = nullptr;  ///< of the event
+  std::string text;
+  explicit operator bool() const { return kind != nullptr; }
+};
+
+/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state, at the places of its
+/// blocks in `next`, and unless null its F (n x n) and G (n x n_w), row-major. w may be null: zero.
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g);
+/// L of its Qw = L L' there, n_w x n_w, row-major.
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l);
+/// What one of these that is not kAccepted means.
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
+/// x <- x' of its blocks that are not constant, brought back to their manifolds.
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x);
 
 /// What the motion models of a system make of the state over one step: x', F and G Lq.
 /// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,

@@ -84,16 +84,6 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
            std::to_string(options_.max_covariance_repairs) + ")");
 }
 
-void Recovery::RecoverRejected(FilterState& f, Gate& gate, std::span<Row> rows) {
-  for (Row& row : rows) {
-    if (f.binding->system.landmarks && row.binding->model.has_landmark()) continue;
-    if (gate.Count(f, *row.report)) Recover(f, row);
-  }
-}
-
-/// Resets what the sensor determines from its measurement, with the blocks that move with it at
-/// their prior uncertainty, or theirs where that is larger; where that cannot be, inflates the
-/// blocks that it corrects, once until it is accepted again.
 void Recovery::Recover(FilterState& f, Row& row) {
   const SensorBinding& sensor = *row.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +

@@ -4,8 +4,7 @@
 #include <span>
 
 #include "alidade/filter/filter.h"
-#include "alidade/filter/filter_state.h"
-#include "alidade/filter/gate.h"
+#include "alidade/filter/rows.h"
 
 namespace alidade::internal {
 
@@ -19,13 +18,13 @@ class Recovery {
   /// After an update that left S not positive definite: where that is P's fault, negative pivots of
   /// its L D L' count as zero (event `repaired`). Ends the filter where it needed that too often.
   void RepairCovariance(FilterState& f, std::span<Row> rows);
-  /// Recovers a sensor that by the count of the gate was rejected too often in a row (event
-  /// `rejection_recovery`). Rejected landmarks do not count.
-  void RecoverRejected(FilterState& f, Gate& gate, std::span<Row> rows);
-
- private:
+  /// The sensor of a row was rejected too often in a row (event `rejection_recovery`): resets what it
+  /// determines from its measurement, with the blocks that move with it at their prior uncertainty,
+  /// or theirs where that is larger; where that cannot be, inflates the blocks that it corrects, once
+  /// until it is accepted again.
   void Recover(FilterState& f, Row& row);
 
+ private:
   EkfOptions options_;
   int repairs_ = 0;  ///< of P, so far
 };

@@ -6,7 +6,6 @@
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/stacked.h"
 
 namespace alidade {
 namespace internal {
@@ -77,7 +76,7 @@ Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
   const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H
   Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
   a.diagonal().array() += 1.0;
-  const Workspace::Matrix back = TransportTo(f, before);
+  const Workspace::Matrix back = TransportTo(f.state, before, f.work);
   frame_.b += frame_.a.transpose() * (weighted.transpose() * all.innovation);
   frame_.information += frame_.a.transpose() * (all.h.transpose() * weighted) * frame_.a;
   frame_.a = back.transpose() * a * frame_.a;

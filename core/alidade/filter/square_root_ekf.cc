@@ -7,9 +7,7 @@
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
-#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -157,7 +155,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   dx.noalias() = gain * all.innovation;
   f.state.Retract(dx.data(), f.moved);
   if (!AllFinite(f.moved)) return Outcome::kNotFinite;
-  const Workspace::Matrix transport = TransportTo(f, f.moved);
+  const Workspace::Matrix transport = TransportTo(f.state, f.moved, f.work);
   f.state.MoveTo(f.moved);
   root_.setZero();
   AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));

@@ -9,9 +9,8 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/method.h"
+#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/square_root.h"
-#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -306,7 +305,7 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
     f.state.Retract(dx.data(), f.moved);
-    const Outcome outcome = PredictAt(row, f.moved, f.state.values(), points.col(i).data());
+    const Outcome outcome = PredictAt(f, row, f.moved, points.col(i).data());
     if (outcome != Outcome::kAccepted) return outcome;
   }
   Predicted& predicted = PredictedOf(f, row);
@@ -326,7 +325,7 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
 Outcome Unscented::Predict(FilterState& f, Row& row) {
   Predicted& predicted = PredictedOf(f, row);
   predicted.centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
-  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), predicted.centre.data());
+  Outcome outcome = PredictAt(f, row, f.state.values(), predicted.centre.data());
   bool too_wide = false;
   if (outcome == Outcome::kAccepted) {  // at the estimate itself
     int halvings = 0;
@@ -337,7 +336,7 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
     }
   }
   if (outcome == Outcome::kAccepted) {
-    outcome = NoiseAt(row, RolesAt(row, f.state.values(), f.state.values()));
+    outcome = NoiseAt(row, RolesAt(f, row, f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
     Project(f, row, predicted);

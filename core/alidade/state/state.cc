@@ -318,4 +318,19 @@ void State::RecallAll() {
   postponed_.reset();
 }
 
+Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
+                              Workspace& work) {
+  const int n = state.covariance().size();
+  Workspace::Matrix transport = work.Take(n, n);
+  transport.setIdentity();
+  for (const Block& block : state.layout().blocks()) {
+    if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
+    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> j;
+    block.geometry().Transport(state.values().data() + block.value_offset,
+                               values.data() + block.value_offset, j.data());
+    transport.block<2, 2>(block.tangent_offset, block.tangent_offset) = j;
+  }
+  return transport;
+}
+
 }  // namespace alidade

@@ -133,4 +133,8 @@ class State {
   Scratch<std::vector<JacobianPart>> parts_;
 };
 
+/// J (n x n, in `work`) of state.MoveTo(values): dx there = J dx here.
+Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
+                              Workspace& work);
+
 }  // namespace alidade

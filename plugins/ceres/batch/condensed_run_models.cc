@@ -4,7 +4,7 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/first_values.h"
 #include "alidade/filter/square_root.h"
 #include "alidade/model/geometry.h"
 #include "condensed_run.h"

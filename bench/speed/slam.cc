@@ -226,7 +226,7 @@ class Exchange {
  public:
   explicit Exchange(int landmarks) : landmarks_(static_cast<std::size_t>(landmarks)) {
     const Space camera{"camera", "", "", {}, Geometry::Vector(kCamera)};
-    camera_ = state_.layout().Declare("cam.camera", "cam", camera);
+    camera_ = state_.Declare("cam.camera", "cam", camera);
     const std::vector<double> x(kCamera);
     state_.Add(camera_, x.data(), Eigen::MatrixXd::Identity(kCamera, kCamera));
     for (BlockId& landmark : landmarks_) landmark = Initialise();
@@ -240,8 +240,7 @@ class Exchange {
  private:
   static constexpr int kCamera = 12, kLandmark = 6;
   BlockId Initialise() {
-    const BlockId id =
-        state_.layout().Declare("landmarks." + std::to_string(names_++), "landmarks", space_);
+    const BlockId id = state_.Declare("landmarks." + std::to_string(names_++), "landmarks", space_);
     state_.Initialise({&id, 1}, value_.data(), {&camera_, 1}, jacobian_, own_);
     return id;
   }

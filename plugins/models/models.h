@@ -164,7 +164,7 @@ class Models : public Source {
       if (const auto value = owner ? owner->Find(name) : std::nullopt) {
         constexpr double kUnitLength = 1e-3;
         x = value->Numbers(block.geometry().ambient);
-        if (Defect(block.geometry(), x.data()) > kUnitLength) {
+        if (DistanceFrom(block.geometry(), x.data()) > kUnitLength) {
           value->Fail("not of unit length", "a unit vector or quaternion [w, x, y, z] to 1e-3");
         }
         block.geometry().Normalise(x.data());

@@ -83,7 +83,7 @@ void Compression::Apply(FilterState& f, const Landmarks& landmarks, std::span<co
   if (!IsDue(f.state) && !shrinks) return;
   const double cost = since_.cost + CatchUpCost(f.state);
   if (chooses && (whole < kEnd * frame_.needed || cost > since_.rows * Squared(whole))) {
-    f.state.RecallAll();
+    f.state.Recall();
     pause_ = kPause;
     return;
   }

@@ -54,7 +54,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
   for (const SensorBinding& sensor : system.sensors) {
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model.measurement().geometry;
-    const double defect = Defect(geometry, one.values.data());
+    const double defect = DistanceFrom(geometry, one.values.data());
     if (defect > kUnitTolerance) {
       throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
                                           "' are not of unit length: it is off by " +
@@ -119,7 +119,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
   later.Process({timestamp, {}});
-  later.f.state.RecallAll();
+  later.f.state.Recall();
   return std::move(later.f.state);
 }
 

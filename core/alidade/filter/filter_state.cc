@@ -2,6 +2,8 @@
 #include "alidade/filter/filter_state.h"
 
 #include <numeric>
+#include <span>
+#include <utility>
 
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"

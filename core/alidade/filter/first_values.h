@@ -9,8 +9,8 @@
 /// Blocks that take their value from a measurement, by the inverse measurement model.
 namespace alidade::internal {
 
-/// What a measurement tells of the roles that its sensor initialises: y = g(other roles, z, prior),
-/// t: its tangent. One that is used again for the same sensor keeps its memory.
+/// What a measurement tells of the roles that its sensor initialises: y = g(other roles, z, prior).
+/// One that is used again for the same sensor keeps its memory.
 struct Inverse {
   std::vector<double> y;      ///< values, one role after the other
   std::vector<BlockId> from;  ///< the blocks that it took

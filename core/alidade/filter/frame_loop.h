@@ -46,13 +46,13 @@ class Method {
 ///
 ///   plain frames of few states      FastPath::Process, all of it; any other:
 ///   step         StepTo             Timeline::First, Method::Step
-///                                   Rows::Collect: one row for each measurement and sensor
-///   initialise   InitialiseWaiting, Landmarks::Attach
+///   collect                         Rows::Collect: one row for each measurement and sensor
+///   initialise                      InitialiseWaiting, Landmarks::Attach
 ///   predict      Pass               Method::Predict of each row
 ///   gate         Pass               Gate::Pass of each row; Consensus::Split
 ///   correct      Correct            Gate::Weigh, Method::Correct
-///   recover      Recovery::RepairCovariance, Recover
-///   landmarks    Landmarks::Maintain, Compression::Apply
+///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
+///   landmarks                       Landmarks::Maintain, Compression::Apply
 ///
 /// Parts point to the binding, which copies share, and not into one another; only the fast path
 /// does, and a copy makes its own. So a copy is a filter by itself.

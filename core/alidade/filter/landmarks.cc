@@ -156,7 +156,7 @@ BlockId Landmarks::Declare(FilterState& f, std::int64_t id, const Space& role, B
   name_ += role.name;
   name_ += '#';
   name_ += std::to_string(names_++);
-  return f.state.layout().Declare(name_, "landmarks", role, status);
+  return f.state.Declare(name_, "landmarks", role, status);
 }
 
 void Landmarks::AddKnown(FilterState& f) {
@@ -521,7 +521,7 @@ Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, Landmar
 std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
   if (state.postponed() != nullptr) {
     State whole = state;
-    whole.RecallAll();
+    whole.Recall();
     return Estimates(whole);
   }
   std::vector<LandmarkEstimate> estimates;

@@ -83,7 +83,7 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
   return elsewhere;
 }
 
-/// h at x, in row.roles, and H at at_.
+/// h at row.roles, H at at_.
 Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
@@ -99,6 +99,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   }
   outcome = EvaluateAt(model, *row.place, *row.measurement, at_.data(), row.memory.columns,
                        h_there_, &row.H);
+  if (outcome != Outcome::kAccepted) return outcome;
   for (std::size_t i = 0; i < at_.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
     if (row.place->columns[i] < 0 || at_[i] == row.roles[i] ||

@@ -41,8 +41,8 @@ class Linear : public Method {
 
   // Memory that is kept from row to row.
   Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken
-  std::vector<double> implied_;             ///< of the role that is linearised at what z implies
-  std::vector<double> h_there_;             ///< h where H is taken
+  Scratch<std::vector<double>> implied_;    ///< of the role that is linearised at what z implies
+  Scratch<std::vector<double>> h_there_;    ///< h where H is taken
   Scratch<std::vector<int>> lost_;          ///< rows of P whose gain is not the optimal one
 };
 

@@ -18,10 +18,10 @@ class Recovery {
   /// After an update that left S not positive definite: where that is P's fault, negative pivots of
   /// its L D L' count as zero (event `repaired`). Ends the filter where it needed that too often.
   void RepairCovariance(FilterState& f, std::span<Row> rows);
-  /// For a row whose sensor was rejected too often on end (event `rejection_recovery`): resets what
-  /// it determines from its measurement, with the blocks that move with it at their prior
-  /// uncertainty, or theirs where that is larger; where that cannot be, inflates the blocks that it
-  /// corrects, once until it is accepted again.
+  /// Once the sensor of a row was rejected too often, one frame after the other (event
+  /// `rejection_recovery`): resets what it determines from its measurement, with the blocks that
+  /// move with it at their prior uncertainty, or theirs where that is larger; where that cannot be,
+  /// inflates the blocks that it corrects, once until it is accepted again.
   void Recover(FilterState& f, Row& row);
 
  private:

@@ -2,7 +2,6 @@
 #include "alidade/filter/rows.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
@@ -240,7 +239,7 @@ void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s)
 }
 
 Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
-  const OutsideCorrelation& correlation = std::as_const(f.state).covariance().outside();
+  const OutsideCorrelation& correlation = f.state.covariance().outside();
   Workspace::Matrix outside = f.work.Take(correlation.columns(), CountOf(rows));
   if (correlation.columns() == 0) return outside;
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {

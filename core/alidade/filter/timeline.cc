@@ -23,7 +23,7 @@ Timestamp TimeoutOf(double timeout_s) {
 /// Why an input cannot be used; empty: it can.
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
   if (!AllFinite(value)) return "not finite";
-  if (Defect(geometry, value.data()) > kUnitTolerance) return "not of unit length";
+  if (DistanceFrom(geometry, value.data()) > kUnitTolerance) return "not of unit length";
   return {};
 }
 

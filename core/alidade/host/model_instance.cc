@@ -351,7 +351,7 @@ void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std:
                       internal::AllFinite(known.sqrt_density) &&
                       std::isfinite(known.time_constant_s);
   if (!finite) Refuse(what + "are not finite");
-  if (Defect(role.geometry, known.mean.data()) > kUnitTolerance) {
+  if (DistanceFrom(role.geometry, known.mean.data()) > kUnitTolerance) {
     Refuse(what + "have a mean that is not of unit length");
   }
   role.geometry.Normalise(known.mean.data());

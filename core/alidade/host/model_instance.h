@@ -132,7 +132,7 @@ class ModelInstance {
 
 /// What Initialise of a sensor computes.
 struct InverseModel {
-  int role = -1;       ///< the first role, of a landmark the first of it; -1: a sensor has none
+  int role = -1;       ///< the first role, of a landmark the first of it; -1: it has none
   int count = 0;       ///< of roles from there on: those of a landmark together, else one
   int prior_size = 0;  ///< numbers that it needs besides the measurement
 };

@@ -98,7 +98,7 @@ void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
     const bool is_rotation = part.kind == GeometryKind::kUnitQuaternion;
     if (!is_rotation && part.kind != GeometryKind::kUnitVector) return;
     double* const x = value.data() + a;
-    const double defect = Defect(part, x);
+    const double defect = DistanceFrom(part, x);
     if (!(defect <= kUnitTolerance)) {
       throw Error(ExitCode::kBadData,
                   ErrorLine(source_.place(), kind.info.name,

@@ -9,7 +9,7 @@
 #include "alidade/base/eigen_alignment.h"
 #include "alidade/base/workspace.h"
 #include "alidade/state/jacobian_rows.h"
-#include "alidade/state/outside.h"
+#include "alidade/state/outside_correlation.h"
 
 namespace alidade {
 

@@ -10,6 +10,8 @@ namespace alidade {
 
 /// Matrices as they cross the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// A matrix that is read, a block of another one too.
 using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
 
 /// The columns of a Jacobian that belong to one block of the state: at `column` of its rows.

@@ -177,11 +177,11 @@ void PlusJacobian(const Geometry& geometry, const double* x, const double* d, do
   });
 }
 
-double Defect(const Geometry& geometry, const double* x) {
+double DistanceFrom(const Geometry& geometry, const double* x) {
   if (geometry.kind == GeometryKind::kProduct) {
     double worst = 0.0;
     geometry.ForEachPart([&](const Geometry& part, int a, int) {
-      const double defect = Defect(part, x + a);
+      const double defect = DistanceFrom(part, x + a);
       if (!(defect <= worst)) worst = defect;
     });
     return worst;
@@ -196,7 +196,7 @@ void Geometry::Normalise(double* x) const {
     return ForEachPart([&](const Geometry& part, int a, int) { part.Normalise(x + a); });
   }
   if (kind == GeometryKind::kAngle) x[0] = alidade::Angle::Wrap(x[0]);
-  if (Defect(*this, x) == 0.0) return;
+  if (DistanceFrom(*this, x) == 0.0) return;
   const double norm = Norm(x, ambient);
   if (norm == 0.0) {
     Identity(x);

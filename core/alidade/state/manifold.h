@@ -69,7 +69,7 @@ struct Geometry {
 void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
 /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
 /// that of the farthest part for products.
-double Defect(const Geometry& geometry, const double* x);
+double DistanceFrom(const Geometry& geometry, const double* x);
 /// Wraps what is an angle, and leaves the rest.
 void WrapAngles(const Geometry& geometry, double* x);
 

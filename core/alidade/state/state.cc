@@ -100,15 +100,12 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
   const Eigen::Index rows = jacobian.rows();
   Workspace::Matrix cross = memory_.Take(covariance_.size(), rows), p = memory_.Take(rows, rows);
   p.setZero();
-  Project(
-      covariance_,
-      {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
-      cross.data(), p.data());
+  const JacobianRows j{jacobian.data(), static_cast<int>(rows),
+                       static_cast<int>(jacobian.outerStride()), parts_};
+  Project(covariance_, j, cross.data(), p.data());
   p += own;
   Workspace::Matrix phi = memory_.Take(covariance_.outside().columns(), rows);
-  covariance_.outside().Project(
-      {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
-      phi.data());
+  covariance_.outside().Project(j, phi.data());
   FindParts(ids);
   covariance_.SetParts(parts_, p, cross);
   covariance_.outside().SetParts(parts_, phi);
@@ -299,7 +296,7 @@ void State::Recall(BlockId id) {
   block.postponed = false;
 }
 
-void State::RecallAll() {
+void State::Recall() {
   if (!postponed_) return;
   CatchUp();
   placed_.clear();

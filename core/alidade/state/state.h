@@ -67,8 +67,6 @@ class State {
   explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
 
   const StateLayout& layout() const { return layout_; }
-  /// For who declares a block of a dynamic state (a landmark, a clone).
-  StateLayout& layout() { return layout_; }
   const Covariance& covariance() const { return covariance_; }
   Covariance& covariance() { return covariance_; }
 
@@ -79,6 +77,11 @@ class State {
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }
 
+  /// Declares a block of a dynamic state (a landmark, a clone).
+  BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
+                  BlockStatus status = BlockStatus::kEstimated) {
+    return layout_.Declare(name, owner, space, status);
+  }
   /// Gives a declared block the place that its value will have, and rows of zeros.
   void Reserve(BlockId id);
   /// Gives a declared block a value and a covariance (tangent, row-major; ignored where constant),
@@ -102,7 +105,7 @@ class State {
   /// Brings a postponed block back into x and P. O(k (k + n)), n the active ones.
   void Recall(BlockId id);
   /// Brings all of them back.
-  void RecallAll();
+  void Recall();
   /// Null where nothing is postponed.
   const Postponed* postponed() const { return postponed_ ? &*postponed_ : nullptr; }
   /// For an update, which it has to hear of before P moves on to new values (Postponed::Correct).

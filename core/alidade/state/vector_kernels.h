@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "alidade/state/covariance.h"
+#include "alidade/state/jacobian_rows.h"
 #include "alidade/state/panels.h"
 
 /// The inner loops of large products and factors, once for each instruction set: this build asks

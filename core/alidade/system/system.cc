@@ -28,7 +28,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   } else {
     mean = node.Numbers(geometry.ambient);
   }
-  if (Defect(geometry, mean.data()) > kUnitTolerance) {
+  if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
   geometry.Normalise(mean.data());

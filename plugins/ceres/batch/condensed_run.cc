@@ -138,7 +138,7 @@ internal::SensorPlace CondensedRun::PlaceBehind(std::size_t sensor,
   std::vector<BlockId> landmark;
   for (const Space& role : model.roles()) {
     if (!role.landmark()) continue;
-    landmark.push_back(behind.layout().Declare("landmarks.#" + role.name, "landmarks", role));
+    landmark.push_back(behind.Declare("landmarks.#" + role.name, "landmarks", role));
     behind.Reserve(landmark.back());
   }
   place.PutLandmark(model.roles().size() - landmark.size(), behind.layout(), landmark);

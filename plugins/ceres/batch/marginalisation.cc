@@ -210,7 +210,7 @@ void CondensedRun::AddBlocks(MapLandmark& landmark, State& state) const {
     const std::string name = "landmarks." + std::to_string(landmark.id) + '.' +
                              std::to_string(landmark.generation) + '.' + role.name;
     const int t = role.geometry.tangent;
-    landmark.blocks.push_back(state.layout().Declare(name, "landmarks", role));
+    landmark.blocks.push_back(state.Declare(name, "landmarks", role));
     state.Add(landmark.blocks.back(), next, Eigen::MatrixXd::Zero(t, t));
     next += role.geometry.ambient;
   }

@@ -116,8 +116,8 @@ TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
     for (int i = 0; i < 3; ++i)
       ASSERT_NEAR(filter.value<1>()[i], engine.state().value(1)[i], 1e-12);
     ASSERT_LT((filter.covariance() - engine.state().covariance().Dense()).norm(), 1e-12) << k;
-    ASSERT_LT(Defect(Geometry::UnitQuaternion(), filter.value<0>()), 1e-15);
-    ASSERT_LT(Defect(Geometry::UnitVector(), filter.value<1>()), 1e-15);
+    ASSERT_LT(DistanceFrom(Geometry::UnitQuaternion(), filter.value<0>()), 1e-15);
+    ASSERT_LT(DistanceFrom(Geometry::UnitVector(), filter.value<1>()), 1e-15);
     above = above || filter.value<1>()[2] > 0.0;
     below = below || filter.value<1>()[2] < 0.0;  // the basis has its seam at z = 0
   }
@@ -138,8 +138,8 @@ TEST(StaticEkf, ManyStepsLeaveNoManifold) {
   StaticEkf<Wander, Spin> filter{Wander(), Spin()};
   const double q[] = {1.0, 0.0, 0.0, 0.0}, u[] = {0.6, 0.0, 0.8};
   const auto expect_on_manifold = [&] {
-    EXPECT_LT(Defect(Geometry::UnitQuaternion(), filter.value<0>()), 1e-15);
-    EXPECT_LT(Defect(Geometry::UnitVector(), filter.value<1>()), 1e-15);
+    EXPECT_LT(DistanceFrom(Geometry::UnitQuaternion(), filter.value<0>()), 1e-15);
+    EXPECT_LT(DistanceFrom(Geometry::UnitVector(), filter.value<1>()), 1e-15);
     EXPECT_LE(std::abs(*filter.value<2>()), 3.1415926535897933);
   };
   filter.Set<0>(q, Eigen::Matrix3d::Identity());

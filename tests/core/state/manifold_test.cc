@@ -97,7 +97,7 @@ TEST_P(GeometryLaws, PlusStaysOnTheManifoldAndMayWriteOverItsArgument) {
     const Values d = Step(0.1);
     geometry_.Plus(x.data(), d.data(), x.data());
   }
-  EXPECT_LE(Defect(geometry_, x.data()), 1e-15);
+  EXPECT_LE(DistanceFrom(geometry_, x.data()), 1e-15);
 }
 
 TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
@@ -184,7 +184,7 @@ TEST(Product, IsItsPartsOneAfterTheOther) {
     }
   }
   std::vector<double> off{1, 2, 3, 1.2, 0, 1.6, 0};
-  EXPECT_NEAR(Defect(pose, off.data()), 1.0, 1e-15);
+  EXPECT_NEAR(DistanceFrom(pose, off.data()), 1.0, 1e-15);
   pose.Normalise(off.data());
   EXPECT_EQ(off, x);
 }
@@ -335,7 +335,7 @@ TEST(UnitVector, TransportToTheAntipodeIsFiniteAndOrthogonal) {
 
 TEST(Geometry, NormaliseGivesTheNearestPoint) {
   double q[4] = {0.0, 3.0, 0.0, 4.0};
-  EXPECT_DOUBLE_EQ(Defect(Geometry::UnitQuaternion(), q), 4.0);
+  EXPECT_DOUBLE_EQ(DistanceFrom(Geometry::UnitQuaternion(), q), 4.0);
   Geometry::UnitQuaternion().Normalise(q);
   EXPECT_DOUBLE_EQ(q[1], 0.6);
   EXPECT_DOUBLE_EQ(q[3], 0.8);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "alidade/base/random.h"
+#include "alidade/state/projection.h"
 #include "alidade/state/state.h"
 
 namespace alidade {
@@ -56,7 +57,7 @@ void Update(State& state, const std::vector<BlockId>& blocks, const RowMajor& h,
 
 /// The values and covariances of all blocks that are there, by id.
 std::pair<VectorXd, MatrixXd> WholeOf(State state) {
-  state.RecallAll();
+  state.Recall();
   std::vector<double> x;
   std::vector<int> rows;
   for (std::size_t i = 0; i < state.layout().blocks().size(); ++i) {
@@ -74,7 +75,7 @@ class PostponedState : public ::testing::Test {
  protected:
   PostponedState() {
     for (State* const state : {&whole_, &postponed_}) {
-      const BlockId camera = state->layout().Declare("camera", "", Numbers("camera", 3));
+      const BlockId camera = state->Declare("camera", "", Numbers("camera", 3));
       state->Add(camera, std::vector{0.1, 0.2, 0.3}.data(), 0.1 * MatrixXd::Identity(3, 3));
     }
   }
@@ -97,7 +98,7 @@ class PostponedState : public ::testing::Test {
     const VectorXd value = Draw(size, 1);
     BlockId id = -1;
     for (State* const state : {&whole_, &postponed_}) {
-      id = state->layout().Declare("point " + std::to_string(names_), "", Numbers("point", size));
+      id = state->Declare("point " + std::to_string(names_), "", Numbers("point", size));
       const BlockId camera = 0;
       state->Initialise({&id, 1}, value.data(), {&camera, 1}, j, MatrixXd::Identity(size, size));
     }
@@ -118,7 +119,7 @@ class PostponedState : public ::testing::Test {
     if (postponed_.layout()[from].postponed) postponed_.Recall(from);
     BlockId to = -1;
     for (State* const state : {&whole_, &postponed_}) {
-      to = state->layout().Declare("point " + std::to_string(names_), "", Numbers("point", 2));
+      to = state->Declare("point " + std::to_string(names_), "", Numbers("point", 2));
       state->Initialise({&to, 1}, value.data(), {&from, 1}, j, 0.1 * MatrixXd::Identity(2, 2));
       state->Drop(from);
     }
@@ -187,12 +188,12 @@ TEST_F(PostponedState, IsThatWhichWasAlwaysWhole) {
       Reset();
     }
     if (frame % 7 == 3) Postpone();
-    if (frame % 50 == 49) postponed_.RecallAll();
+    if (frame % 50 == 49) postponed_.Recall();
     ASSERT_NO_FATAL_FAILURE(ExpectTheSame()) << "frame " << frame;
     most = std::max(most, whole_.covariance().size());
   }
   // Rows of what has left are used again.
-  postponed_.RecallAll();
+  postponed_.Recall();
   EXPECT_LE(postponed_.covariance().size(), 2 * most);
 }
 
@@ -214,6 +215,21 @@ TEST_F(PostponedState, HasTheActivePartAlone) {
   EXPECT_EQ(postponed_.postponed()->basis(), postponed_.covariance().size());
 }
 
+TEST_F(PostponedState, MayLeaveNothingActive) {
+  for (int i = 0; i < 3; ++i) Enter();
+  Measure();
+  std::vector<BlockId> all = points_;
+  all.push_back(0);
+  postponed_.Postpone(all);
+  EXPECT_EQ(postponed_.covariance().size(), 0);
+  const double value = 4.0;
+  for (State* const state : {&whole_, &postponed_}) {
+    const BlockId id = state->Declare("late", "", Numbers("late", 1));
+    state->Add(id, &value, MatrixXd::Identity(1, 1));
+  }
+  ExpectTheSame();
+}
+
 TEST_F(PostponedState, GoesOnFromACopy) {
   for (int i = 0; i < 8; ++i) Enter();
   Measure();
@@ -223,7 +239,7 @@ TEST_F(PostponedState, GoesOnFromACopy) {
   Measure();  // changes nothing of the copy
   std::swap(copy, postponed_);
   State whole = postponed_;
-  whole.RecallAll();
+  whole.Recall();
   std::swap(whole, whole_);
   Measure();
   ExpectTheSame();

@@ -24,9 +24,9 @@ Space Named(const Geometry& geometry) { return {"value", "m", "", {""}, geometry
 State Abc() {
   State state;
   const double zero[2] = {1.0, 2.0};
-  const BlockId a = state.layout().Declare("s.a", "s", Named(Geometry::Vector(2)));
-  const BlockId b = state.layout().Declare("s.b", "s", Named(Geometry::Vector(1)));
-  const BlockId c = state.layout().Declare("s.c", "s", Named(Geometry::Vector(2)));
+  const BlockId a = state.Declare("s.a", "s", Named(Geometry::Vector(2)));
+  const BlockId b = state.Declare("s.b", "s", Named(Geometry::Vector(1)));
+  const BlockId c = state.Declare("s.c", "s", Named(Geometry::Vector(2)));
   for (const BlockId id : {a, b, c}) {
     const int n = state.layout()[id].geometry().tangent;
     state.Add(id, zero, Eigen::MatrixXd::Identity(n, n));
@@ -47,7 +47,7 @@ Eigen::MatrixXd Cross(const State& state, const char* a, const char* b) {
 TEST(State, InitialiseCarriesTheCorrelationsOfWhatItCameFrom) {
   State state = Abc();
   const BlockId a = state.layout().Find("s.a"), b = state.layout().Find("s.b");
-  const BlockId y = state.layout().Declare("s.y", "s", Named(Geometry::Vector(1)));
+  const BlockId y = state.Declare("s.y", "s", Named(Geometry::Vector(1)));
   // y = (1, -2) a + 3 b + n,  n ~ N(0, 0.25)
   const Eigen::RowVector3d j(1.0, -2.0, 3.0);
   const double value = 7.0;
@@ -68,7 +68,7 @@ TEST(State, ABlockThatHasAValueTakesAnotherInItsPlace) {
   const Eigen::MatrixXd own = Eigen::MatrixXd::Constant(1, 1, 0.25);
   const double value = 7.0;
   moved.Drop(b);
-  ASSERT_EQ(moved.layout().Declare("s.b", "s", Named(Geometry::Vector(1))), b);
+  ASSERT_EQ(moved.Declare("s.b", "s", Named(Geometry::Vector(1))), b);
   for (State* one : {&state, &moved})
     one->Initialise(std::array{b}, &value, std::array{a}, ja, own);
   for (const char* x : {"s.a", "s.b", "s.c"}) {
@@ -85,9 +85,9 @@ TEST(State, ABlockThatHasAValueTakesAnotherInItsPlace) {
 TEST(State, AReservedPlaceIsTakenByItsBlockAlone) {
   State state;
   const double value = 3.0;
-  const BlockId first = state.layout().Declare("s.first", "s", Named(Geometry::Vector(1)));
-  const BlockId second = state.layout().Declare("s.second", "s", Named(Geometry::Vector(1)));
-  const BlockId third = state.layout().Declare("s.third", "s", Named(Geometry::Vector(1)));
+  const BlockId first = state.Declare("s.first", "s", Named(Geometry::Vector(1)));
+  const BlockId second = state.Declare("s.second", "s", Named(Geometry::Vector(1)));
+  const BlockId third = state.Declare("s.third", "s", Named(Geometry::Vector(1)));
   state.Reserve(first);
   for (const BlockId id : {second, third}) {
     state.Add(id, &value, Eigen::MatrixXd::Constant(1, 1, 4.0));
@@ -118,8 +118,7 @@ TEST(State, DropMovesAtMostOneBlock) {
   std::vector<BlockId> ids;
   for (int i = 0; i < 20; ++i) {
     const double value = i;
-    ids.push_back(
-        state.layout().Declare("s.b" + std::to_string(i), "s", Named(Geometry::Vector(1))));
+    ids.push_back(state.Declare("s.b" + std::to_string(i), "s", Named(Geometry::Vector(1))));
     state.Add(ids.back(), &value, Eigen::MatrixXd::Constant(1, 1, 1.0 + i));
   }
   state.Drop(ids[4]);
@@ -137,9 +136,9 @@ TEST(State, DropMovesAtMostOneBlock) {
 TEST(State, ASmallerBlockAtTheEndMovesIntoAGap) {
   State state;
   const double value[3] = {1, 2, 3};
-  const BlockId large = state.layout().Declare("s.large", "s", Named(Geometry::Vector(3)));
-  const BlockId a = state.layout().Declare("s.a", "s", Named(Geometry::Vector(1)));
-  const BlockId b = state.layout().Declare("s.b", "s", Named(Geometry::Vector(1)));
+  const BlockId large = state.Declare("s.large", "s", Named(Geometry::Vector(3)));
+  const BlockId a = state.Declare("s.a", "s", Named(Geometry::Vector(1)));
+  const BlockId b = state.Declare("s.b", "s", Named(Geometry::Vector(1)));
   state.Add(large, value, Eigen::Matrix3d::Identity());
   state.Add(a, value, Eigen::MatrixXd::Constant(1, 1, 4.0));
   state.Add(b, value, Eigen::MatrixXd::Constant(1, 1, 9.0));
@@ -159,7 +158,7 @@ TEST(State, ADroppedBlockGivesItsIdAndNameBack) {
   state.Drop(a);
   EXPECT_EQ(state.layout().Find("s.a"), -1);
   EXPECT_FALSE(state.layout()[a].present);
-  EXPECT_EQ(state.layout().Declare("s.a", "s", Named(Geometry::Vector(4))), a);
+  EXPECT_EQ(state.Declare("s.a", "s", Named(Geometry::Vector(4))), a);
   EXPECT_EQ(state.layout().blocks().size(), blocks);
   EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
 }
@@ -171,8 +170,8 @@ TEST(State, BlocksInitialisedTogetherAreCorrelatedThroughTheirNoise) {
   Eigen::MatrixXd j(3, 2), own(3, 3);
   j << 1, 2, 0, 1, -1, 1;
   own << 2, 0.5, 0.3, 0.5, 3, 0.7, 0.3, 0.7, 4;
-  const BlockId d = state.layout().Declare("s.d", "s", Named(Geometry::Vector(1)));
-  const BlockId e = state.layout().Declare("s.e", "s", Named(Geometry::Vector(2)));
+  const BlockId d = state.Declare("s.d", "s", Named(Geometry::Vector(1)));
+  const BlockId e = state.Declare("s.e", "s", Named(Geometry::Vector(2)));
   const double values[3] = {7, 8, 9};
   state.Initialise(std::array{d, e}, values, std::array{c}, j, own);
   const Eigen::MatrixXd expected = j * cc * j.transpose() + own;
@@ -185,8 +184,7 @@ TEST(State, BlocksInitialisedTogetherAreCorrelatedThroughTheirNoise) {
 
 TEST(State, FixedBlocksHaveAValueAndNoCovariance) {
   State state;
-  const BlockId id =
-      state.layout().Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kConstant);
+  const BlockId id = state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kConstant);
   const double value[2] = {1, 2};
   state.Add(id, value, Eigen::MatrixXd());
   EXPECT_EQ(state.covariance().size(), 0);
@@ -195,7 +193,7 @@ TEST(State, FixedBlocksHaveAValueAndNoCovariance) {
 
 TEST(State, MovesOnTheManifold) {
   State state;
-  const BlockId q = state.layout().Declare("s.q", "s", Named(Geometry::UnitQuaternion()));
+  const BlockId q = state.Declare("s.q", "s", Named(Geometry::UnitQuaternion()));
   const double identity[4] = {1, 0, 0, 0};
   state.Add(q, identity, Eigen::Matrix3d::Identity());
   // Half a turn about z by two quarter turns.
@@ -208,7 +206,7 @@ TEST(State, MovesOnTheManifold) {
 
 TEST(State, MoveToTransportsTheCovarianceOfADirection) {
   State state;
-  const BlockId s = state.layout().Declare("s.d", "s", Named(Geometry::UnitVector()));
+  const BlockId s = state.Declare("s.d", "s", Named(Geometry::UnitVector()));
   const double z[3] = {0.6, 0, 0.8};
   Eigen::Matrix2d p;
   p << 4, 1, 1, 2;

@@ -7,17 +7,12 @@
 #include <limits>
 
 #include "alidade/base/random.h"
+#include "random_matrices.h"
 
 namespace alidade::internal {
 namespace {
 
 using Eigen::MatrixXd;
-
-MatrixXd RandomMatrix(Eigen::Index rows, Eigen::Index columns, Random& random) {
-  MatrixXd m(rows, columns);
-  for (double& element : m.reshaped()) element = random.Normal();
-  return m;
-}
 
 /// Sizes around one tile and two.
 constexpr Eigen::Index kSizes[] = {0, 1, 5, kTile - 1, kTile, kTile + 1, 2 * kTile + 7};

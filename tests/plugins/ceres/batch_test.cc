@@ -328,7 +328,7 @@ void ExpectStationary(const Geometry& geometry) {
   const Smoothed found = SmoothOver(*MakeBatch(system), frames);
   ASSERT_EQ(found.x.size(), 3u);
   std::copy_n(found.x[0].data(), G::kAmbient, x.data());
-  EXPECT_NEAR(Defect(geometry, x.data()), 0.0, 1e-12);
+  EXPECT_NEAR(DistanceFrom(geometry, x.data()), 0.0, 1e-12);
   const auto cost = [&](int i, double step) {
     double d[3] = {}, moved[4], residual[3];
     d[i] = step;

@@ -255,7 +255,7 @@ void ExpectNearTheBatch(const Geometry& geometry, double tolerance) {
     lag->Process(frame);
     batch->Process(frame);
     ASSERT_FALSE(lag->failed());
-    EXPECT_NEAR(Defect(geometry, lag->state().values().data()), 0.0, 1e-12);
+    EXPECT_NEAR(DistanceFrom(geometry, lag->state().values().data()), 0.0, 1e-12);
     double d[3];
     geometry.Minus(lag->state().values().data(), batch->state().values().data(), d);
     for (int i = 0; i < geometry.tangent; ++i) {

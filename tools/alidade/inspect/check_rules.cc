@@ -90,7 +90,7 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
       const std::string defect = CellDefect(dense.back());
       if (!defect.empty()) return names[static_cast<std::size_t>(c)] + ' ' + defect;
     }
-    if (Defect(space.geometry, dense.data()) > 1e-9) {
+    if (DistanceFrom(space.geometry, dense.data()) > 1e-9) {
       return space.name + " is not a " + ToString(space.geometry.kind);
     }
   }

@@ -37,6 +37,7 @@ const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uin
 }
 
 void FinishedRuns::Add(const std::string& line) {
+  const std::lock_guard lock(mutex_);
   if (!folder_.kept()) folder_.Keep();
   file_->Write(line);
   file_->Flush();  // the next may take hours

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,8 +32,8 @@ class FinishedRuns {
   const Known* Find(const std::string& value, std::uint64_t seed) const;
   /// How many were.
   std::size_t size() const { return known_.size(); }
-  /// Adds the RunLine() of a run that came to its end; the folder is worth keeping from now on. Not
-  /// from two threads at once. Error: kIo.
+  /// Adds the RunLine() of a run that came to its end; the folder is worth keeping from now on.
+  /// From any thread. Error: kIo.
   void Add(const std::string& line);
   /// Error: kIo.
   void Close() { file_->Close(); }
@@ -42,6 +43,7 @@ class FinishedRuns {
 
   OutputFolder& folder_;
   std::map<std::pair<std::string, std::uint64_t>, Known> known_;
+  std::mutex mutex_;  ///< of Add
   std::unique_ptr<OutputFile> file_;
 };
 

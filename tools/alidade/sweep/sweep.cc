@@ -33,7 +33,8 @@ class Queue {
   /// Takes runs until there are none left. What ends it before that, Take() throws.
   void Work() noexcept {
     try {
-      while (TakeOne()) continue;
+      const Config config = CopyOfConfig();
+      while (TakeOne(config)) continue;
     } catch (...) {
       const std::lock_guard lock(mutex_);
       thrown_ = std::current_exception();
@@ -47,7 +48,7 @@ class Queue {
       const auto seed = first_seed_ + static_cast<std::uint64_t>(index);
       const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
       if (known == nullptr) continue;
-      const SweepRun again = RunSeed(seed);
+      const SweepRun again = RunSeed(config_, seed);
       if (again.status == RunStatus::kStopped) return;
       const std::string was = internal::RunLine(options_.value, known->run);
       if (again.status == RunStatus::kOk && internal::RunLine(options_.value, again) == was) return;
@@ -68,18 +69,18 @@ class Queue {
   bool Stopped() const { return options_.stop && options_.stop(); }
 
   /// False where none is left. Once it is stopped, only those that were finished before are taken.
-  bool TakeOne() {
+  bool TakeOne(const Config& config) {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
     const std::uint64_t seed = first_seed_ + static_cast<std::uint64_t>(index);
     const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
     if (known == nullptr && Stopped()) return true;
-    SweepRun run = known != nullptr ? known->run : RunSeed(seed);
+    SweepRun run = known != nullptr ? known->run : RunSeed(config, seed);
     if (run.status == RunStatus::kStopped) return true;
-    const bool adds = known == nullptr && options_.finished != nullptr;
-    const std::string line = adds ? internal::RunLine(options_.value, run) : "";
+    if (known == nullptr && options_.finished != nullptr && run.status == RunStatus::kOk) {
+      options_.finished->Add(internal::RunLine(options_.value, run));
+    }
     const std::lock_guard lock(mutex_);
-    if (adds && run.status == RunStatus::kOk) options_.finished->Add(line);
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
@@ -90,19 +91,19 @@ class Queue {
     return options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
   }
 
-  Config CopyFor(std::uint64_t seed) {
-    const std::lock_guard lock(config_mutex_);
-    Config copy = config_.Copy();
-    copy.Set("source.seed", std::to_string(seed), "--first-seed");
-    return copy;
+  /// For one thread: asking marks keys as read.
+  Config CopyOfConfig() {
+    const std::lock_guard lock(mutex_);
+    return config_.Copy();
   }
 
-  SweepRun RunSeed(std::uint64_t seed) {
+  SweepRun RunSeed(const Config& from, std::uint64_t seed) {
     SweepRun run;
     run.seed = seed;
     const LogScope log("seed " + std::to_string(seed) + ": ", LogLevel::kInfo);
     try {
-      const Config config = CopyFor(seed);
+      Config config = from.Copy();
+      config.Set("source.seed", std::to_string(seed), "--first-seed");
       Experiment experiment = BuildExperiment(config, host_);
       for (NamedEstimator& named : experiment.estimators) {
         named.on_divergence = OnDivergence::kReport;
@@ -129,8 +130,7 @@ class Queue {
     return run;
   }
 
-  const Config& config_;  ///< a copy of it marks its keys as read
-  std::mutex config_mutex_;
+  const Config& config_;
   const PluginHost& host_;
   const SweepOptions& options_;
   const std::uint64_t first_seed_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/state/outside.h"
+#include "alidade/state/outside_correlation.h"
 
 #include "alidade/state/vector_kernels.h"
 

@@ -12,9 +12,9 @@
 namespace alidade {
 
 /// How a state is correlated with what lies outside of it, b: Cov(x, b) = Phi C, with C (k x |b|)
-/// somewhere else. The rows of Phi (n x k) go through what the rows of the covariance that has this
-/// go through, which sees to it; k = 0 where nothing lies outside. Rows that nothing but updates
-/// has changed since SetStill are *still*.
+/// somewhere else; k = 0 where nothing lies outside. Covariance owns it, and does to the rows of
+/// Phi (n x k) whatever it does to those of P. Rows that nothing but updates has changed since
+/// SetStill are *still*.
 class OutsideCorrelation {
  public:
   using Transposed = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
@@ -31,7 +31,8 @@ class OutsideCorrelation {
   void SetParts(std::span<const JacobianPart> parts, const ConstMatrix& phi);
   /// (H Phi)' by columns, k x m.
   void Project(const JacobianRows& h, double* hphi) const;
-  bool still(int row) const { return still_[static_cast<std::size_t>(row)] != 0; }
+  /// False where k = 0.
+  bool still(int row) const { return columns_ > 0 && still_[static_cast<std::size_t>(row)] != 0; }
   void SetStill(int offset, int rows) { std::fill_n(still_.begin() + offset, rows, char{1}); }
 
  private:

@@ -69,7 +69,7 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
 /// All motion models, or nothing.
 template <int N>
 ALIDADE_INLINE bool FastPath::Step(double dt_s) {
-  Covariance::Lower lower = f_.state.covariance().lower();
+  LowerTriangle lower = f_.state.covariance().lower();
   const int stride = static_cast<int>(lower.outerStride());
   double p[N][N];
   Load(lower.data(), stride, p);
@@ -102,7 +102,7 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
                                         double* pht) {
   constexpr int kMost = M > 0 ? M : kMostOfOne;
   const int m = M > 0 ? M : sensor.rows;
-  const Covariance::Lower p = f_.state.covariance().lower();
+  const LowerTriangle p = f_.state.covariance().lower();
   const int stride = static_cast<int>(p.outerStride());
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
   for (int i = 0; i < m; ++i) h[i] = kNotWritten;
@@ -162,7 +162,7 @@ template <int N, int M>
 ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
   constexpr int kMost = M > 0 ? M : kRows;
   const int m = M > 0 ? M : count;
-  Covariance::Lower p = f_.state.covariance().lower();
+  LowerTriangle p = f_.state.covariance().lower();
   const int stride = static_cast<int>(p.outerStride());
   double w[kMost * N], inverse_d[kMost], dx[N], gain[kMost * N], moved[N], updated[N * N];
   if (!Solve<N, M>(m, rows.pht, rows.s, kRows, rows.innovation, w, inverse_d, dx, gain) ||

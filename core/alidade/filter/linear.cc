@@ -170,7 +170,7 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
   if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
   f.state.Retract(dx.data(), f.moved);
   if (!AllFinite(f.moved)) return Outcome::kNotFinite;
-  Covariance::Lower p = f.state.covariance().lower();
+  LowerTriangle p = f.state.covariance().lower();
   if (!kernels.downdate(p.data(), static_cast<int>(p.outerStride()), m, w.data(),
                         inverse_d.data())) {
     return CorrectLarge(f, rows, correction);

@@ -54,7 +54,7 @@ struct Parts {
 
 /// A comparison of vectors.
 template <int kWidth>
-class Comparison {
+class VectorMask {
  public:
   using Numbers = typename VectorsOf<kWidth>::Numbers;
   static constexpr std::uint64_t kAll = ~std::uint64_t{0} >> (64 - 8 * kWidth);
@@ -82,7 +82,7 @@ class Comparison {
 /// Vectors of eight are for AVX-512 alone, which compares into a mask, a bit for each: of
 /// comparisons as the language has them the compiler makes numbers, and bits of those.
 template <>
-class Comparison<8> {
+class VectorMask<8> {
  public:
   using Numbers = typename VectorsOf<8>::Numbers;
   static constexpr std::uint64_t kAll = 255;
@@ -100,7 +100,7 @@ class Comparison<8> {
   [[gnu::target("avx512f")]] void Select(const Numbers& a, const Numbers& b, Numbers& to) const {
     to = _mm512_mask_blend_pd(v_, b, a);
   }
-  void And(const Comparison& other) { v_ &= other.v_; }
+  void And(const VectorMask& other) { v_ &= other.v_; }
   std::uint64_t bits() const { return v_; }
 
  private:
@@ -112,7 +112,7 @@ class Comparison<8> {
 template <int kLanes>
 struct PackMask : Parts<kLanes> {
   using Base = Parts<kLanes>;
-  Comparison<Base::kWidth> v[Base::kParts];
+  VectorMask<Base::kWidth> v[Base::kParts];
 
   PackMask() = default;
   // Not trivial: else packs would go from function to function in registers, of which each
@@ -130,7 +130,7 @@ bool Any(const PackMask<kLanes>& mask) {
 }
 template <int kLanes>
 bool All(const PackMask<kLanes>& mask) {
-  constexpr std::uint64_t all = Comparison<Parts<kLanes>::kWidth>::kAll;
+  constexpr std::uint64_t all = VectorMask<Parts<kLanes>::kWidth>::kAll;
   std::uint64_t every = all;
   For<Parts<kLanes>::kParts>([&](auto k) { every &= mask.v[k].bits(); });
   return every == all;
@@ -223,7 +223,7 @@ struct Pack : Parts<kLanes> {
     return result;
   }
   static bool Agreed(const Mask& mask) {
-    constexpr std::uint64_t all = Comparison<Base::kWidth>::kAll;
+    constexpr std::uint64_t all = VectorMask<Base::kWidth>::kAll;
     std::uint64_t every = all, any = 0;
     ForParts([&](auto k) {
       const std::uint64_t bits = mask.v[k].bits();
@@ -253,7 +253,7 @@ struct FlagsOf {
 };
 template <int kLanes>
 struct FlagsOf<Pack<kLanes>> {
-  static constexpr bool kIsMask = Comparison<Parts<kLanes>::kWidth>::kIsMask;
+  static constexpr bool kIsMask = VectorMask<Parts<kLanes>::kWidth>::kIsMask;
   using Type = std::conditional_t<kIsMask, PackMask<kLanes>, Pack<kLanes>>;
 };
 template <class S>

@@ -13,6 +13,10 @@
 
 namespace alidade {
 
+/// A symmetric matrix where it lies: the lower triangle counts.
+using LowerTriangle = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+
 /// The covariance P of a state in its tangent, behind block queries: who uses it names rows by
 /// (offset, size). Dense: one symmetric matrix, the lower triangle authoritative, with spare
 /// capacity; what corrects all of it takes it from where it lies. Offsets and sizes lie in
@@ -23,9 +27,6 @@ namespace alidade {
 /// H P H' are made in projection.h.
 class Covariance {
  public:
-  using Lower = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-  using ConstLower = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-
   /// Rows in use, gaps included; a gap has zero rows and columns.
   int size() const { return size_; }
 
@@ -58,9 +59,11 @@ class Covariance {
   /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k). Phi_a <- F Phi_a.
   void Propagate(std::span<const JacobianPart> parts, const double* f, const double* q);
 
-  /// P where it lies; the lower triangle counts.
-  Lower lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
-  ConstLower lower() const { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
+  /// P where it lies.
+  LowerTriangle lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
+  ConstLowerTriangle lower() const {
+    return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())};
+  }
   /// The whole matrix, mirrored.
   Eigen::MatrixXd Dense() const;
 

@@ -9,9 +9,7 @@
 namespace alidade {
 namespace {
 
-double At(const Covariance::ConstLower& p, int i, int j) {
-  return p(std::max(i, j), std::min(i, j));
-}
+double At(const ConstLowerTriangle& p, int i, int j) { return p(std::max(i, j), std::min(i, j)); }
 
 /// L L' = A + d Var, d the least that the rounding of A asks for, in place of the lower triangle of
 /// A; `variances` are those that A comes from.
@@ -37,8 +35,8 @@ void Postponed::Begin(std::span<const int> rows, Covariance& active) {
   if (k > 0) active.Add(k);
   active.outside().Grow(k);
   active.outside().SetStill(0, k);
-  const Covariance::ConstLower whole = std::as_const(p).lower();
-  Covariance::Lower own = active.lower();
+  const ConstLowerTriangle whole = std::as_const(p).lower();
+  LowerTriangle own = active.lower();
   for (int j = 0; j < k; ++j) {
     for (int i = j; i < k; ++i) {
       own(i, j) = At(whole, rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
@@ -68,7 +66,7 @@ void Postponed::Correct(Covariance& active, const Workspace::Matrix& g, const Wo
 
 void Postponed::Recall(int row, int size, int at, Covariance& active, double* dx) {
   const Eigen::Index k = basis();
-  const Covariance::ConstLower whole = std::as_const(p).lower();
+  const ConstLowerTriangle whole = std::as_const(p).lower();
   Eigen::MatrixXd own(size, size), z(k, size), v(k, size);  // Z and Psi Z of these rows
   for (int j = 0; j < size; ++j) {
     for (int i = 0; i < size; ++i) own(i, j) = At(whole, row + i, row + j);
@@ -103,7 +101,7 @@ void Postponed::CatchUp(Covariance& active, std::span<const int> homes_of_rows,
                         std::vector<double>& dx) {
   const Eigen::Index n = p.size(), k = basis();
   Eigen::MatrixXd z(n, k), v = Eigen::MatrixXd::Zero(n, k);  // Z' and Z' Psi
-  const Covariance::ConstLower whole = std::as_const(p).lower();
+  const ConstLowerTriangle whole = std::as_const(p).lower();
   for (Eigen::Index j = 0; j < k; ++j) {
     const int row = basis_[static_cast<std::size_t>(j)];
     z.col(j).head(row) = whole.row(row).head(row);
@@ -124,8 +122,8 @@ void Postponed::CatchUp(Covariance& active, std::span<const int> homes_of_rows,
   const Eigen::MatrixXd phi = active.outside().phi()(Eigen::all, rows);
   v.setZero(n, std::ssize(rows));
   internal::AddProduct(v, z, phi);
-  Covariance::Lower now = p.lower();
-  const Covariance::ConstLower own = std::as_const(active).lower();
+  LowerTriangle now = p.lower();
+  const ConstLowerTriangle own = std::as_const(active).lower();
   for (std::size_t j = 0; j < rows.size(); ++j) {
     const int home = homes_of_rows[static_cast<std::size_t>(rows[j])];
     const auto column = v.col(static_cast<Eigen::Index>(j));

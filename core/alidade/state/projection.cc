@@ -13,7 +13,7 @@ namespace {
 /// What the M rows of H from `first` on add to s += H P H'; returns M. Of two entries of P that are
 /// one by symmetry it takes the lower one, for both, and half of each on the diagonal.
 template <int M>
-int AddRows(const Covariance::ConstLower& p, const JacobianRows& h, int first, double* s) {
+int AddRows(const ConstLowerTriangle& p, const JacobianRows& h, int first, double* s) {
   const auto row = [&](int i) { return h.data + std::ptrdiff_t{i} * h.stride; };
   for (const JacobianPart& right : h.parts) {
     for (int c = 0; c < right.size; ++c) {
@@ -52,7 +52,7 @@ void AddProjection(const Covariance& p, const JacobianRows& h, double* s) {
     std::array<double, internal::kSmall * internal::kSmall> pht;
     return Project(p, h, pht.data(), s);
   }
-  const Covariance::ConstLower lower = p.lower();
+  const ConstLowerTriangle lower = p.lower();
   for (int first = 0; first < h.rows;) {
     switch (h.rows - first) {
       case 1:
@@ -68,7 +68,7 @@ void AddProjection(const Covariance& p, const JacobianRows& h, double* s) {
 }
 
 void Project(const Covariance& p, const JacobianRows& h, double* pht, double* s) {
-  const Covariance::ConstLower lower = p.lower();
+  const ConstLowerTriangle lower = p.lower();
   if (internal::IsSmall(p) && h.whole) {
     const int ld = static_cast<int>(lower.outerStride());
     return internal::SmallKernelsFor(p.size()).project(lower.data(), ld, h.data, h.rows, pht, s);
@@ -88,7 +88,7 @@ void Project(const Covariance& p, const JacobianRows& h, double* pht, double* s)
 }
 
 void Project(const Covariance& p, std::span<const JacobianRows> rows, const internal::Panels& pht) {
-  const Covariance::ConstLower lower = p.lower();
+  const ConstLowerTriangle lower = p.lower();
   internal::BestVectorKernels().project(lower.data(), lower.outerStride(), p.size(), rows, pht.data,
                                         pht.columns, pht.height);
 }

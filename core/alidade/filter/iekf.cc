@@ -114,8 +114,8 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
     y.noalias() += at.h * dx;
     s.triangularView<Eigen::Lower>().solveInPlace(y);
     s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
-    step = -dx;
-    AddProduct(step, pht, y);
+    Multiply(pht, y, step);
+    step -= dx;
     step_v = -v;
     step_v.noalias() += at.h.transpose() * y;
     residual.noalias() = at.h * step;

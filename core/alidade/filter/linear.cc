@@ -13,11 +13,11 @@
 namespace alidade::internal {
 namespace {
 
-/// The variances of P - W W' + E E'; E has the given rows.
-void VariancesAfter(const Covariance& p, const Panels& w, std::span<const int> rows,
-                    const Workspace::Matrix& e, Workspace::Vector& left) {
-  for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i);
-  SubtractSquares(left, w);
+/// The variances of P - W W' + E E', of the squares of the rows of W in their place; E has the given
+/// rows.
+void TakeVariancesAfter(const Covariance& p, std::span<const int> rows, const Workspace::Matrix& e,
+                        Workspace::Vector& left) {
+  for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i) - left[i];
   for (std::size_t i = 0; i < rows.size(); ++i) {
     left[rows[i]] += e.row(static_cast<Eigen::Index>(i)).squaredNorm();
   }
@@ -227,14 +227,13 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const auto [lost_gain, e] = FindLost(f, rows, w, l);
   y = innovation;
   l.triangularView<Eigen::Lower>().solveInPlace(y);
-  dx.setZero();
-  AddProduct(dx, w, y);
+  Multiply(w, y, dx, left.data());
   for (std::size_t i = 0; i < lost_.size(); ++i) {
     dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(innovation);
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.data());
   f.state.Retract(dx.data(), f.moved);
-  VariancesAfter(p, w, lost_, e, left);
+  TakeVariancesAfter(p, lost_, e, left);
   if (!AllFinite(f.moved) || !left.allFinite()) return Outcome::kNotFinite;
   const bool cancels = Cancels(p, left);
   const bool recorded =

@@ -6,6 +6,8 @@
 #endif
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <iterator>
 
 #include "alidade/model/plugin_abi.h"
@@ -70,28 +72,42 @@ std::uint32_t SavedRegisters() {
   return low;
 }
 
-bool Has(const InstructionSet& set) {
-  std::uint32_t registers[4] = {};
-  return __get_cpuid_count(set.leaf, set.subleaf, &registers[kEax], &registers[kEbx],
-                           &registers[kEcx], &registers[kEdx]) != 0 &&
-         (registers[set.in] >> set.bit & 1u) != 0;
+/// What cpuid says of one leaf; zeros where the processor does not have it.
+struct Leaf {
+  std::uint32_t leaf, subleaf;
+  std::array<std::uint32_t, 4> registers = {};
+
+  Leaf(std::uint32_t of, std::uint32_t sub) : leaf(of), subleaf(sub) {
+    __get_cpuid_count(leaf, subleaf, &registers[kEax], &registers[kEbx], &registers[kEcx],
+                      &registers[kEdx]);
+  }
+};
+
+/// Each leaf of kKnown once: a virtual machine asks its host each time.
+std::uint32_t AskProcessor() {
+  const std::array<Leaf, 4> leaves = {Leaf{1, 0}, Leaf{7, 0}, Leaf{7, 1}, Leaf{kExtended, 0}};
+  const std::uint32_t saved = SavedRegisters();
+  std::uint32_t isa = 0;
+  for (const InstructionSet& set : kKnown) {
+    const auto* const from = std::ranges::find_if(leaves, [&](const Leaf& one) {
+      return one.leaf == set.leaf && one.subleaf == set.subleaf;
+    });
+    const bool has = (from->registers[set.in] >> set.bit & 1u) != 0;
+    if (has && (saved & set.saved) == set.saved) isa |= set.isa;
+  }
+  return isa;
 }
 #endif
 
 }  // namespace
 
 std::uint32_t InstructionSetsOfProcessor() {
-  static const std::uint32_t all = [] {  // a virtual machine asks its host each time
-    std::uint32_t isa = 0;
 #if defined(__x86_64__)
-    const std::uint32_t saved = SavedRegisters();
-    for (const InstructionSet& set : kKnown) {
-      if (Has(set) && (saved & set.saved) == set.saved) isa |= set.isa;
-    }
-#endif
-    return isa;
-  }();
+  static const std::uint32_t all = AskProcessor();
   return all;
+#else
+  return 0;
+#endif
 }
 
 std::string InstructionSetNames(std::uint32_t isa) {

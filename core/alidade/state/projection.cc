@@ -10,17 +10,20 @@
 namespace alidade {
 namespace {
 
-/// What the M rows of H from `first` on add to s += H P H'; returns M. Of two entries of P that are
-/// one by symmetry it takes the lower one, for both, and half of each on the diagonal.
-template <int M>
-int AddRows(const ConstLowerTriangle& p, const JacobianRows& h, int first, double* s) {
-  const auto row = [&](int i) { return h.data + std::ptrdiff_t{i} * h.stride; };
+/// Calls take(hp, column) for each column of H that P meets, hp the M rows of H from `first` on times
+/// that column of P. Of two entries of P that are one by symmetry it takes the lower one, for both,
+/// and half of each on the diagonal.
+template <int M, class Take>
+void ForEachColumn(const ConstLowerTriangle& p, const JacobianRows& h, int first,
+                   const Take& take) {
+  std::array<const double*, M> rows;
+  for (int i = 0; i < M; ++i) rows[i] = h.data + std::ptrdiff_t{first + i} * h.stride;
   for (const JacobianPart& right : h.parts) {
     for (int c = 0; c < right.size; ++c) {
       const int b = right.offset + c;
-      double hp[M] = {};  // H times column b of the lower triangle of P
+      std::array<double, M> hp = {};
       const auto add = [&](int column, double value) {
-        for (int i = 0; i < M; ++i) hp[i] += row(first + i)[column] * value;
+        for (int i = 0; i < M; ++i) hp[i] += rows[i][column] * value;
       };
       add(right.column + c, 0.5 * p(b, b));
       for (int d = c + 1; d < right.size; ++d) add(right.column + d, p(right.offset + d, b));
@@ -33,16 +36,34 @@ int AddRows(const ConstLowerTriangle& p, const JacobianRows& h, int first, doubl
           }
         }
       }
-      for (int i = 0; i < M; ++i) {
-        for (int k = 0; k < h.rows; ++k) {
-          const double both = hp[i] * row(k)[right.column + c];
-          s[(first + i) * h.rows + k] += both;
-          s[k * h.rows + first + i] += both;
-        }
-      }
+      take(hp, right.column + c);
     }
   }
-  return M;
+}
+
+/// s += H P H' of the M rows that H has. Sums are kept apart from s, in registers.
+template <int M>
+void AddAll(const ConstLowerTriangle& p, const JacobianRows& h, double* s) {
+  std::array<double, M* M> half = {};
+  ForEachColumn<M>(p, h, 0, [&](const std::array<double, M>& hp, int column) {
+    for (int i = 0; i < M; ++i) {
+      for (int k = 0; k < M; ++k) half[i * M + k] += hp[i] * h.data[k * h.stride + column];
+    }
+  });
+  for (int i = 0; i < M; ++i) {
+    for (int k = 0; k < M; ++k) s[i * M + k] += half[i * M + k] + half[k * M + i];
+  }
+}
+
+/// What the row `i` of H adds to s += H P H'.
+void AddRow(const ConstLowerTriangle& p, const JacobianRows& h, int i, double* s) {
+  ForEachColumn<1>(p, h, i, [&](const std::array<double, 1>& hp, int column) {
+    for (int k = 0; k < h.rows; ++k) {
+      const double both = hp[0] * h.data[std::ptrdiff_t{k} * h.stride + column];
+      s[i * h.rows + k] += both;
+      s[k * h.rows + i] += both;
+    }
+  });
 }
 
 }  // namespace
@@ -53,17 +74,15 @@ void AddProjection(const Covariance& p, const JacobianRows& h, double* s) {
     return Project(p, h, pht.data(), s);
   }
   const ConstLowerTriangle lower = p.lower();
-  for (int first = 0; first < h.rows;) {
-    switch (h.rows - first) {
-      case 1:
-        first += AddRows<1>(lower, h, first, s);
-        break;
-      case 2:
-        first += AddRows<2>(lower, h, first, s);
-        break;
-      default:
-        first += AddRows<3>(lower, h, first, s);
-    }
+  switch (h.rows) {
+    case 1:
+      return AddAll<1>(lower, h, s);
+    case 2:
+      return AddAll<2>(lower, h, s);
+    case 3:
+      return AddAll<3>(lower, h, s);
+    default:
+      for (int i = 0; i < h.rows; ++i) AddRow(lower, h, i, s);
   }
 }
 

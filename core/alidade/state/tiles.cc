@@ -17,17 +17,6 @@ void ForEachTile(Eigen::Index size, const Take& take) {
 Strided ByColumns(const ConstMatrixRef& a) { return {a.data(), 1, a.outerStride()}; }
 Strided Transposed(const ConstMatrixRef& a) { return {a.data(), a.outerStride(), 1}; }
 
-/// Calls take(first, count, a) for the panels: rows [first, first + count), which `a` begins with.
-template <class Take>
-void ForEachPanel(const Panels& panels, const Take& take) {
-  for (Eigen::Index at = 0; at < panels.rows; at += panels.height) {
-    const Eigen::Map<const Eigen::MatrixXd> all(panels.data + at * panels.columns, panels.height,
-                                                panels.columns);
-    const Eigen::Index count = std::min(panels.height, panels.rows - at);
-    take(at, count, all);
-  }
-}
-
 /// C <- C + sign A B of the given depth.
 void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
          bool lower = false) {
@@ -77,23 +66,16 @@ void SubtractOuterProduct(MatrixRef c, const Panels& w) {
   BestVectorKernels().subtract_outer_product(w.rows, w.columns, w.data, c.data(), c.outerStride());
 }
 
-void AddProduct(VectorRef y, const Panels& a, const ConstVectorRef& x) {
-  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
-    BestVectorKernels().combine(count, a.columns, 1, panel.data(), a.height, x.data(), a.columns,
-                                y.data() + at, y.size());
-  });
-}
-
-void SubtractSquares(VectorRef y, const Panels& a) {
-  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
-    y.segment(at, count) -= panel.topRows(count).rowwise().squaredNorm();
-  });
+void Multiply(const Panels& a, const ConstVectorRef& x, VectorRef product, double* squares) {
+  BestVectorKernels().multiply_panels(a.rows, a.columns, a.data, x.data(), product.data(), squares);
 }
 
 void Copy(const Panels& a, MatrixRef to) {
-  ForEachPanel(a, [&](Eigen::Index at, Eigen::Index count, const auto& panel) {
+  for (Eigen::Index at = 0; at < a.rows; at += a.height) {
+    const Eigen::Map<const Eigen::MatrixXd> panel(a.data + at * a.columns, a.height, a.columns);
+    const Eigen::Index count = std::min<Eigen::Index>(a.height, a.rows - at);
     to.middleRows(at, count) = panel.topRows(count);
-  });
+  }
 }
 
 Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m) {

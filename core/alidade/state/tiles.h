@@ -35,10 +35,9 @@ void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b);
 /// B <- B L^-T of panels, and the lower triangle of C <- C - W W'.
 void DivideByTransposed(const ConstMatrixRef& l, const Panels& b);
 void SubtractOuterProduct(MatrixRef c, const Panels& w);
-/// y <- y + A x.
-void AddProduct(VectorRef y, const Panels& a, const ConstVectorRef& x);
-/// y_i <- y_i - |row i of A|^2.
-void SubtractSquares(VectorRef y, const Panels& a);
+/// A x and, unless null, the squared norm of each row of A.
+void Multiply(const Panels& a, const ConstVectorRef& x, VectorRef product,
+              double* squares = nullptr);
 /// to <- A.
 void Copy(const Panels& a, MatrixRef to);
 /// n x m numbers of any value, as the kernels of this processor take them.

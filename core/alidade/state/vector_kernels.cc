@@ -361,6 +361,28 @@ struct Loops {
     }
   }
 
+  [[gnu::always_inline]] static void MultiplyPanels(long rows, long m, const double* panels,
+                                                    const double* x, double* product,
+                                                    double* squares) {
+    for (long at = 0; at < rows; at += kRows) {
+      const double* from = panels + at * m;
+      Vector sum[2][kVectors] = {};
+      for (long k = 0; k < m; ++k, from += kRows) {
+#pragma GCC unroll 8
+        for (int v = 0; v < kVectors; ++v) {
+          const Vector a = Load(from + v * kLanes);
+          sum[0][v] += a * x[k];
+          sum[1][v] += a * a;
+        }
+      }
+      double numbers[2][kRows];
+      std::memcpy(numbers, sum, sizeof numbers);
+      const long count = std::min<long>(kRows, rows - at);
+      std::copy_n(numbers[0], count, product + at);
+      if (squares != nullptr) std::copy_n(numbers[1], count, squares + at);
+    }
+  }
+
   using Block = Vector[kLanes];
   static constexpr auto kAll = std::make_integer_sequence<int, kLanes>{};
 
@@ -696,6 +718,10 @@ struct Loops {
                                             long ldc) {                                            \
       loops::SubtractOuterProduct(rows, m, panels, c, ldc);                                        \
     }                                                                                              \
+    target static void MultiplyPanels(long rows, long m, const double* panels, const double* x,    \
+                                      double* product, double* squares) {                          \
+      loops::MultiplyPanels(rows, m, panels, x, product, squares);                                 \
+    }                                                                                              \
     target static bool Factorise(long m, double* s, long lds) {                                    \
       return loops::Factorise(m, s, lds);                                                          \
     }                                                                                              \
@@ -708,9 +734,12 @@ struct Loops {
                                     const double* panels, double* s, long lds) {                   \
       loops::AddProjected(n, rows, panels, s, lds);                                                \
     }                                                                                              \
-    static constexpr VectorKernels kTable{                                                         \
-        shown_name,   AddProduct,   DivideByTransposed,   Combine, Factorise,                      \
-        loops::kRows, DividePanels, SubtractOuterProduct, Project, AddProjected};                  \
+    static constexpr VectorKernels kTable{shown_name,         AddProduct,                          \
+                                          DivideByTransposed, Combine,                             \
+                                          Factorise,          loops::kRows,                        \
+                                          DividePanels,       SubtractOuterProduct,                \
+                                          MultiplyPanels,     Project,                             \
+                                          AddProjected};                                           \
   }
 
 using BaselineLoops = Loops<2, 2, 4>;

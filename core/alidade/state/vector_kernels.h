@@ -38,6 +38,9 @@ struct VectorKernels {
   void (*divide_panels)(long rows, long m, const double* l, long ldl, double* panels);
   /// The lower triangle of C <- C - W W', W n x m in panels, C by columns.
   void (*subtract_outer_product)(long n, long m, const double* panels, double* c, long ldc);
+  /// A x and, unless null, the squared norm of each row of A, n x m in panels.
+  void (*multiply_panels)(long n, long m, const double* panels, const double* x, double* product,
+                          double* squares);
   /// P H' (n x m) of all rows of H, of the lower triangle of P, n x n by columns. Its rows from a
   /// multiple `at` of panel_rows on begin at pht + at * row_step: panels have row_step = m and
   /// ldpht = panel_rows, a matrix 1 and n.

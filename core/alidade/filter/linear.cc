@@ -13,8 +13,8 @@
 namespace alidade::internal {
 namespace {
 
-/// The variances of P - W W' + E E', of the squares of the rows of W in their place; E has the given
-/// rows.
+/// The variances of P - W W' + E E', in place of the squared norms of the rows of W; E has the
+/// given rows.
 void TakeVariancesAfter(const Covariance& p, std::span<const int> rows, const Workspace::Matrix& e,
                         Workspace::Vector& left) {
   for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i) - left[i];

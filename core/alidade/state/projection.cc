@@ -10,9 +10,9 @@
 namespace alidade {
 namespace {
 
-/// Calls take(hp, column) for each column of H that P meets, hp the M rows of H from `first` on times
-/// that column of P. Of two entries of P that are one by symmetry it takes the lower one, for both,
-/// and half of each on the diagonal.
+/// Calls take(hp, column) for each column of H that P meets, hp the M rows of H from `first` on
+/// times that column of P. Of two entries of P that are one by symmetry it takes the lower one, for
+/// both, and half of each on the diagonal.
 template <int M, class Take>
 void ForEachColumn(const ConstLowerTriangle& p, const JacobianRows& h, int first,
                    const Take& take) {

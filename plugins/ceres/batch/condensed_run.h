@@ -256,6 +256,7 @@ class CondensedRun {
  private:
   friend class KktSystem;  // the same run, linearised by frames instead of condensed
   friend class IncrementalSolve;
+  friend class EdgeOfDomain;
 
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {

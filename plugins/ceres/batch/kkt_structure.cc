@@ -7,7 +7,7 @@
 /// What a KktSystem consists of: nodes, constants, landmarks, and which of them its blocks tie.
 namespace alidade::ceres_batch {
 
-KktSystem::KktSystem(CondensedRun& run) : run_(run), points_(run.landmarks_.size()) {
+KktSystem::KktSystem(CondensedRun& run) : run_(run), points_(run.landmarks_.size()), edge_(run) {
   FindConstants();
   FindNodes();
   Build();

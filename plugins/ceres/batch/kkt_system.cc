@@ -77,7 +77,7 @@ bool KktSystem::Settle(Eigen::VectorXd& z, bool all, double left) {
   std::vector<Point> points;
   if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (points_[i].edge.size() > 0) continue;
+    if (edge_.holds(i)) continue;
     MapLandmark& landmark = run_.landmarks_[i];
     auto l = z.segment(points_[i].column, landmark.from.size());
     landmark.from = l;
@@ -341,7 +341,7 @@ void PutFirstCamera(const Eigen::MatrixXd& left, Eigen::Index column, Eigen::Ind
 }  // namespace
 
 /// Of l, with so many rows of x_f.
-void KktSystem::AccumulatePrior(const Point3& point, Eigen::Index rows, const Eigen::VectorXd& l) {
+void KktSystem::AccumulatePrior(std::size_t i, Eigen::Index rows, const Eigen::VectorXd& l) {
   if (l.size() == 0) {
     ++term_;
     return;
@@ -349,9 +349,9 @@ void KktSystem::AccumulatePrior(const Point3& point, Eigen::Index rows, const Ei
   const double root_mu = std::sqrt(1.0 + damping_);
   Eigen::MatrixXd prior(l.size(), l.size() + rows);
   prior.setIdentity();
-  if (rows > 0) prior.rightCols(rows) = -point.c;
-  const bool held = point.edge.size() > 0;
-  const Eigen::VectorXd free = held ? l - point.edge * point.edge.dot(l) : l;
+  if (rows > 0) prior.rightCols(rows) = -points_[i].c;
+  const Eigen::VectorXd& n = edge_.normal(i);
+  const Eigen::VectorXd free = edge_.holds(i) ? l - n * n.dot(l) : l;
   Accumulate(root_mu * prior, free / root_mu);
 }
 
@@ -361,8 +361,8 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
   Point3& point = points_[i];
   Inverse& place = point.place;
   if (!run_.Place(landmark, l, at_, place)) return false;
-  const bool held = point.edge.size() > 0;
-  if (held) place.by_d -= place.by_d * point.edge * point.edge.transpose();
+  const bool held = edge_.holds(i);
+  if (held) place.by_d -= place.by_d * edge_.normal(i) * edge_.normal(i).transpose();
   const auto n = Eigen::Index{run_.initial_.covariance().size()};
   std::vector<int> rows = read_rows_;  // of x_f
   for (const int constant : landmark_constants_) {
@@ -374,7 +374,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
   if (held) point.c.setZero();
   place.by_x = place.by_x(Eigen::all, rows).eval();
   const Eigen::MatrixXd rest = place.by_x - place.by_d * point.c;  // what is left to the camera
-  AccumulatePrior(point, landmark.first ? all : 0, l);
+  AccumulatePrior(i, landmark.first ? all : 0, l);
   Eigen::VectorXd r;
   Eigen::MatrixXd a, j;
   for (const auto& [epoch, index] : landmark.observations) {

@@ -12,6 +12,7 @@
 
 #include "block_ldl.h"
 #include "condensed_run.h"
+#include "edge_of_domain.h"
 
 namespace alidade::ceres_batch {
 
@@ -37,8 +38,8 @@ namespace alidade::ceres_batch {
 ///   that q moves the point but the camera alone does not: q is the point itself, in units of its
 ///   inputs, so later observations do not tie their cameras to the first one. Its prior is
 ///   |l + q - C dx_f|^2 / 2.
-/// - A landmark that is held at the edge of its domain has n' dl = 0 and C = 0: q = dl, and its
-///   observations tie their cameras to the first one.
+/// - A landmark that is held at the edge of its domain (EdgeOfDomain) has n' dl = 0 and C = 0:
+///   q = dl, and its observations tie their cameras to the first one.
 ///
 /// The multipliers are scaled: lambda = alpha lambda', alpha^2 = median H_ii / median Q_ii.
 class KktSystem {
@@ -64,18 +65,10 @@ class KktSystem {
   /// defined there, or by all: false then where one is not. Together they stop where less than
   /// about `left` of the cost is to gain.
   bool Settle(Eigen::VectorXd& z, bool all, double left);
-  /// Of a step to z, where a model is not defined: which landmarks it is not defined for.
-  void NoteUndefined(const Eigen::VectorXd& z);
-  /// Puts landmarks that such steps go on leading out of their domain to its edge, and holds them
-  /// there. Whether there were any.
-  bool HoldAtEdge(Eigen::VectorXd& z);
-  /// Puts those that are held back to the edge. False where they are not defined near z.
-  bool PutOnEdge(Eigen::VectorXd& z);
-  /// Frees those that cost less inside. Whether there were any.
-  bool LetGoOfEdge(const Eigen::VectorXd& z);
-  /// Frees all, where they are.
-  void FreeAtEdge();
-  std::vector<std::int64_t> AtEdge() const;  ///< ids of those that are held
+  EdgeOfDomain& edge() { return edge_; }
+  const EdgeOfDomain& edge() const { return edge_; }
+  /// Of a step to z, where a model is not defined.
+  void NoteUndefined(const Eigen::VectorXd& z) { edge_.NoteUndefined(z, at_); }
   /// At z, on the states that it gives. False where a model is not defined.
   bool Linearise(const Eigen::VectorXd& z, double damping);
   /// About `trajectory` instead, freezing there, with landmarks where they cost least, in z too.
@@ -128,9 +121,6 @@ class KktSystem {
     bool anchored = false;  ///< its observations tie their cameras to the first one
     bool ties = false;      ///< so it must be built so
     Eigen::MatrixXd c;      ///< C, by the tangent of x_f
-    Eigen::VectorXd edge;   ///< n of the edge that it is held at; empty: it is free
-    int refused = 0;        ///< steps that led it out of its domain
-    int released = 0;       ///< how often it was let go of an edge
     Inverse place;
   };
   /// Residuals that some variables have in common: their places in variables_ and blocks_.
@@ -157,16 +147,8 @@ class KktSystem {
   bool LinearisePlain(std::size_t k, bool about);
   bool LineariseLandmarks(const Eigen::VectorXd& z, bool about);
   bool BuildAnew();
-  void AccumulatePrior(const Point3& point, Eigen::Index rows, const Eigen::VectorXd& l);
+  void AccumulatePrior(std::size_t i, Eigen::Index rows, const Eigen::VectorXd& l);
   bool LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool about);
-  bool IsDefined(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                 const std::vector<Point>& points) const;
-  std::optional<double> EdgeAlong(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                                  const Eigen::VectorXd& s, double from, double to,
-                                  const std::vector<Point>& points) const;
-  std::optional<Eigen::VectorXd> NormalOfEdge(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                                              const Eigen::VectorXd& s, double t,
-                                              const std::vector<Point>& points) const;
   void PutConstraint(std::size_t k, const Point& point, const Eigen::VectorXd& z);
   Eigen::VectorXd Multipliers(const Node& node) const;
   void ChooseScale();
@@ -184,6 +166,7 @@ class KktSystem {
   std::vector<Node> nodes_;
   std::vector<std::size_t> node_of_;  ///< by epoch
   std::vector<Point3> points_;        ///< by landmark
+  EdgeOfDomain edge_;
   std::vector<int> landmark_constants_;
   std::vector<bool> left_out_;  ///< by observation of a landmark, in their order
   int inputs_ = 0;              ///< of z

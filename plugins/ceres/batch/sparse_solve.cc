@@ -86,7 +86,7 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
       cost + (failed_ ? summary_ : ended_) + (held ? ", " : "") + at_edge_ + "; sparse, " +
       (kkt_.in_time_order() ? "from the last frame back, " : "in order of minimum degree, ") +
       internal::RoundedText(flops(), 2) + " flops an iteration";
-  kkt_.FreeAtEdge();  // the covariance is that of a landmark that is free there
+  kkt_.edge().Free();  // the covariance is that of a landmark that is free there
   if ((!failed_ && !held) || (kkt_.Linearise(z_, 0.0) && kkt_.Solve())) return true;
   failed_ = true;
   summary_ += "; then " + run_.problem();
@@ -96,7 +96,7 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
 /// Landmarks at the edge of their domain, by their ids.
 std::string SparseSolve::TextOfEdge() const {
   constexpr std::size_t kMost = 10;  // names
-  const std::vector<std::int64_t> ids = kkt_.AtEdge();
+  const std::vector<std::int64_t> ids = kkt_.edge().Held();
   if (ids.empty()) return "";
   std::string text =
       std::to_string(ids.size()) + (ids.size() == 1 ? " landmark at the edge of its domain: "
@@ -276,7 +276,7 @@ bool SparseSolve::Descend() {
     if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
       z_ = std::move(next.z);
       if (mu == 0.0 && lengths.Settled()) {
-        if (!kkt_.LetGoOfEdge(z_)) return true;
+        if (!kkt_.edge().LetGo(z_)) return true;
         last_.clear();
         lengths.same = 0;
       }
@@ -291,7 +291,7 @@ bool SparseSolve::Descend() {
       nu *= 2.0;
       if (!(mu < kMost)) break;
     }
-    if (kkt_.HoldAtEdge(z_)) {
+    if (kkt_.edge().Hold(z_)) {
       mu = 0.0;
       nu = 2.0;
       last_.clear();

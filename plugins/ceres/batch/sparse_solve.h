@@ -63,7 +63,7 @@ class SparseSolve {
   };
   /// Of z, landmarks that are held at the edge of their domain put back there.
   std::optional<double> CostAt(Eigen::VectorXd& z) {
-    return kkt_.PutOnEdge(z) ? kkt_.Cost(z) : std::nullopt;
+    return kkt_.edge().PutBack(z) ? kkt_.Cost(z) : std::nullopt;
   }
   std::string TextOfEdge() const;
   Trial AfterStep(double predicted);

@@ -7,8 +7,8 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
+#include "alidade/filter/method.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

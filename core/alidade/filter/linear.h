@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "alidade/filter/frame_loop.h"
+#include "alidade/filter/method.h"
 #include "alidade/state/panels.h"
 
 namespace alidade::internal {

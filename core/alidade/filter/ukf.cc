@@ -9,7 +9,7 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/frame_loop.h"
+#include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
 #include "alidade/state/tiles.h"
 

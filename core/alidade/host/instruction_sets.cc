@@ -6,7 +6,6 @@
 #endif
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <iterator>
 
@@ -30,6 +29,7 @@ struct InstructionSet {
 };
 
 constexpr std::uint32_t kExtended = 0x80000001u;
+/// Those of one leaf on end.
 constexpr InstructionSet kKnown[] = {
     {ALIDADE_ISA_SSE3, "SSE3", 1, 0, kEcx, 0},
     {ALIDADE_ISA_SSSE3, "SSSE3", 1, 0, kEcx, 9},
@@ -39,11 +39,10 @@ constexpr InstructionSet kKnown[] = {
     {ALIDADE_ISA_AVX, "AVX", 1, 0, kEcx, 28, kYmm},
     {ALIDADE_ISA_F16C, "F16C", 1, 0, kEcx, 29, kYmm},
     {ALIDADE_ISA_FMA, "FMA", 1, 0, kEcx, 12, kYmm},
+    {ALIDADE_ISA_MOVBE, "MOVBE", 1, 0, kEcx, 22},
     {ALIDADE_ISA_AVX2, "AVX2", 7, 0, kEbx, 5, kYmm},
     {ALIDADE_ISA_BMI, "BMI", 7, 0, kEbx, 3},
     {ALIDADE_ISA_BMI2, "BMI2", 7, 0, kEbx, 8},
-    {ALIDADE_ISA_LZCNT, "LZCNT", kExtended, 0, kEcx, 5},
-    {ALIDADE_ISA_MOVBE, "MOVBE", 1, 0, kEcx, 22},
     {ALIDADE_ISA_AVX512F, "AVX-512F", 7, 0, kEbx, 16, kZmm},
     {ALIDADE_ISA_AVX512BW, "AVX-512BW", 7, 0, kEbx, 30, kZmm},
     {ALIDADE_ISA_AVX512CD, "AVX-512CD", 7, 0, kEbx, 28, kZmm},
@@ -55,10 +54,11 @@ constexpr InstructionSet kKnown[] = {
     {ALIDADE_ISA_AVX512VNNI, "AVX-512VNNI", 7, 0, kEcx, 11, kZmm},
     {ALIDADE_ISA_AVX512BITALG, "AVX-512BITALG", 7, 0, kEcx, 12, kZmm},
     {ALIDADE_ISA_AVX512VPOPCNTDQ, "AVX-512VPOPCNTDQ", 7, 0, kEcx, 14, kZmm},
-    {ALIDADE_ISA_AVX512BF16, "AVX-512BF16", 7, 1, kEax, 5, kZmm},
     {ALIDADE_ISA_AVX512FP16, "AVX-512FP16", 7, 0, kEdx, 23, kZmm},
-    {ALIDADE_ISA_AVXVNNI, "AVX-VNNI", 7, 1, kEax, 4, kYmm},
     {ALIDADE_ISA_GFNI, "GFNI", 7, 0, kEcx, 8},
+    {ALIDADE_ISA_AVX512BF16, "AVX-512BF16", 7, 1, kEax, 5, kZmm},
+    {ALIDADE_ISA_AVXVNNI, "AVX-VNNI", 7, 1, kEax, 4, kYmm},
+    {ALIDADE_ISA_LZCNT, "LZCNT", kExtended, 0, kEcx, 5},
 };
 
 #if defined(__x86_64__)
@@ -72,27 +72,19 @@ std::uint32_t SavedRegisters() {
   return low;
 }
 
-/// What cpuid says of one leaf; zeros where the processor does not have it.
-struct Leaf {
-  std::uint32_t leaf, subleaf;
-  std::array<std::uint32_t, 4> registers = {};
-
-  Leaf(std::uint32_t of, std::uint32_t sub) : leaf(of), subleaf(sub) {
-    __get_cpuid_count(leaf, subleaf, &registers[kEax], &registers[kEbx], &registers[kEcx],
-                      &registers[kEdx]);
-  }
-};
-
-/// Each leaf of kKnown once: a virtual machine asks its host each time.
+/// Each leaf is asked for once: a virtual machine asks its host each time.
 std::uint32_t AskProcessor() {
-  const std::array<Leaf, 4> leaves = {Leaf{1, 0}, Leaf{7, 0}, Leaf{7, 1}, Leaf{kExtended, 0}};
   const std::uint32_t saved = SavedRegisters();
-  std::uint32_t isa = 0;
+  std::uint32_t isa = 0, registers[4] = {};
+  const InstructionSet* last = nullptr;
   for (const InstructionSet& set : kKnown) {
-    const auto* const from = std::ranges::find_if(leaves, [&](const Leaf& one) {
-      return one.leaf == set.leaf && one.subleaf == set.subleaf;
-    });
-    const bool has = (from->registers[set.in] >> set.bit & 1u) != 0;
+    if (last == nullptr || last->leaf != set.leaf || last->subleaf != set.subleaf) {
+      std::ranges::fill(registers, 0u);  // what a processor without the leaf leaves
+      __get_cpuid_count(set.leaf, set.subleaf, &registers[kEax], &registers[kEbx], &registers[kEcx],
+                        &registers[kEdx]);
+    }
+    last = &set;
+    const bool has = (registers[set.in] >> set.bit & 1u) != 0;
     if (has && (saved & set.saved) == set.saved) isa |= set.isa;
   }
   return isa;

@@ -14,8 +14,8 @@ void ForEachTile(Eigen::Index size, const Take& take) {
   for (Eigen::Index at = 0; at < size; at += kTile) take(at, std::min(kTile, size - at));
 }
 
-Strided ByColumns(const ConstMatrixRef& a) { return {a.data(), 1, a.outerStride()}; }
-Strided Transposed(const ConstMatrixRef& a) { return {a.data(), a.outerStride(), 1}; }
+Strided ByColumns(const ConstMatrix& a) { return {a.data(), 1, a.outerStride()}; }
+Strided Transposed(const ConstMatrix& a) { return {a.data(), a.outerStride(), 1}; }
 
 /// C <- C + sign A B of the given depth.
 void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
@@ -26,25 +26,24 @@ void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, d
 
 }  // namespace
 
-void AddProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b, double sign) {
+void AddProduct(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
   Add(c, a.cols(), ByColumns(a), ByColumns(b), sign);
 }
 
-void AddProductWithTransposed(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
+void AddProductWithTransposed(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b,
                               double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(b), sign);
 }
 
-void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign) {
+void AddOuterProduct(MatrixRef c, const ConstMatrix& a, double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(a), sign, true);
 }
 
-void AddSymmetricProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
-                         double sign) {
+void AddSymmetricProduct(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(b), sign, true);
 }
 
-void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a) {
+void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrix& a) {
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
       const int row = rows[static_cast<std::size_t>(i)], column = rows[static_cast<std::size_t>(j)];
@@ -53,12 +52,12 @@ void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRe
   }
 }
 
-void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b) {
+void DivideByTransposed(const ConstMatrix& l, MatrixRef b) {
   BestVectorKernels().divide_by_transposed(b.rows(), l.rows(), l.data(), l.outerStride(), b.data(),
                                            b.outerStride());
 }
 
-void DivideByTransposed(const ConstMatrixRef& l, const Panels& b) {
+void DivideByTransposed(const ConstMatrix& l, const Panels& b) {
   BestVectorKernels().divide_panels(b.rows, b.columns, l.data(), l.outerStride(), b.data);
 }
 
@@ -83,7 +82,7 @@ Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m) {
   return {work.Take((n + height - 1) / height * height, m).data(), n, m, height};
 }
 
-void Divide(const ConstMatrixRef& l, MatrixRef b) {
+void Divide(const ConstMatrix& l, MatrixRef b) {
   ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
     const Eigen::Index j = l.rows() - from_end - columns;
     AddProduct(b.middleCols(j, columns), b.rightCols(from_end),
@@ -97,7 +96,7 @@ void Divide(const ConstMatrixRef& l, MatrixRef b) {
   });
 }
 
-bool Joseph(MatrixRef p, const ConstMatrixRef& k, const ConstMatrixRef& h, const ConstMatrixRef& r,
+bool Joseph(MatrixRef p, const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r,
             Workspace& work) {
   const Workspace::Use use(work);
   const Eigen::Index n = p.rows(), m = h.rows();

@@ -67,6 +67,11 @@ void EdgeOfDomain::ForEach(const Take& take) {
   }
 }
 
+bool EdgeOfDomain::HoldsAny() const {
+  return std::ranges::any_of(landmarks_,
+                             [](const Landmark& known) { return known.normal.size() > 0; });
+}
+
 void EdgeOfDomain::NoteUndefined(const Eigen::VectorXd& z, const std::vector<Point>& points) {
   ForEach([&](const MapLandmark& landmark, Landmark& known, Eigen::Index column) {
     const Eigen::VectorXd l = z.segment(column, landmark.from.size());
@@ -107,7 +112,7 @@ bool EdgeOfDomain::Hold(Eigen::VectorXd& z) {
 
 bool EdgeOfDomain::PutBack(Eigen::VectorXd& z) {
   constexpr double kReach = 1.0;  // sigma
-  if (Held().empty()) return true;
+  if (!HoldsAny()) return true;
   std::vector<Point> points;
   if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
   bool defined = true;
@@ -128,7 +133,7 @@ bool EdgeOfDomain::PutBack(Eigen::VectorXd& z) {
 
 bool EdgeOfDomain::LetGo(const Eigen::VectorXd& z) {
   std::vector<Point> points;
-  if (Held().empty() || !run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
+  if (!HoldsAny() || !run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
   bool any = false;
   CondensedRun::Normal normal;
   ForEach([&](const MapLandmark& landmark, Landmark& known, Eigen::Index column) {

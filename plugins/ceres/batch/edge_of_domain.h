@@ -49,6 +49,7 @@ class EdgeOfDomain {
 
   template <class Take>
   void ForEach(const Take& take);
+  bool HoldsAny() const;
   bool IsDefined(const MapLandmark& landmark, const Eigen::VectorXd& l,
                  const std::vector<Point>& points) const;
   std::optional<double> EdgeAlong(const MapLandmark& landmark, const Eigen::VectorXd& l,

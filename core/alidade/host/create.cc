@@ -180,7 +180,8 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
   NewInstance instance(entry);
   std::int32_t code;
   {
-    const std::lock_guard lock(create_mutex_);
+    std::unique_lock lock(create_mutex_, std::defer_lock);
+    if ((entry.thread_flags & ALIDADE_THREAD_INSTANCES) == 0) lock.lock();
     code = instance.Create(c, reader.host());
   }
   reader.Check();

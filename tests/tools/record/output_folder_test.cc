@@ -680,10 +680,10 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
   SweepResult result;
   result.runs = 1;
   result.estimators = {"ekf"};
-  SweepRun& run = result.done.emplace_back();
-  run.estimators.resize(1);
-  run.estimators[0].name = "ekf";
-  run.estimators[0].metrics["rmse:depth"] = 0.5;
+  EstimatorResult one;
+  one.name = "ekf";
+  one.metrics["rmse:depth"] = 0.5;
+  result.done.emplace_back().estimators.emplace_back(one);
   const TemporaryFolder folder;
   int calls = 0;
   for (int n = 1; n < 100; ++n) {

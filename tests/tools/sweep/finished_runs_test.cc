@@ -6,6 +6,10 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <optional>
+#include <set>
+#include <thread>
+#include <vector>
 
 #include "alidade/sweep/run_line.h"
 #include "support/temporary_folder.h"
@@ -19,7 +23,7 @@ SweepRun MakeRun(std::uint64_t seed) {
   run.code = ExitCode::kDiverged;
   run.reason = "estimator 'a' \"diverged\"\n";
   run.withheld = true;
-  EstimatorResult& one = run.estimators.emplace_back();
+  EstimatorResult one;
   one.name = "a";
   one.diverged = one.failed = true;
   one.units = {{"depth", "m"}};
@@ -29,6 +33,7 @@ SweepRun MakeRun(std::uint64_t seed) {
                  {"zero", -0.0},
                  {"nan", std::numeric_limits<double>::quiet_NaN()},
                  {"inf", -std::numeric_limits<double>::infinity()}};
+  run.estimators.emplace_back(one);
   run.reprojection = {{"a", "pixels", "px", {1.0 / 3.0, std::nan(""), 0.5}},
                       {"a", "pairs", "", {}}};
   return run;
@@ -61,21 +66,51 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   EXPECT_EQ(known->run.reprojection[0].rms[0], 1.0 / 3.0);
   EXPECT_TRUE(std::isnan(known->run.reprojection[0].rms[1]));
   ASSERT_EQ(known->run.estimators.size(), 1u);
-  const EstimatorResult &one = known->run.estimators[0], &was = expected.estimators[0];
+  const SweepEstimator &one = known->run.estimators[0], &was = expected.estimators[0];
   EXPECT_EQ(one.name, was.name);
   EXPECT_TRUE(one.diverged && one.failed && !one.inconsistent);
-  EXPECT_EQ(one.units, was.units);
-  EXPECT_EQ(one.counts, was.counts);
-  ASSERT_EQ(one.metrics.size(), was.metrics.size());
-  for (const auto& [key, value] : was.metrics) {
+  EXPECT_EQ(one.units.names(), was.units.names());
+  EXPECT_EQ(one.units.values(), was.units.values());
+  EXPECT_EQ(one.counts.names(), was.counts.names());
+  EXPECT_EQ(one.counts.values(), was.counts.values());
+  ASSERT_EQ(one.metrics.names(), was.metrics.names());
+  for (const std::string& key : was.metrics.names()) {
+    const double value = *was.metrics.Find(key);
     if (std::isnan(value)) {
-      EXPECT_TRUE(std::isnan(one.metrics.at(key)));
+      EXPECT_TRUE(std::isnan(*one.metrics.Find(key)));
     } else {
-      EXPECT_EQ(one.metrics.at(key), value) << key;
-      EXPECT_EQ(std::signbit(one.metrics.at(key)), std::signbit(value)) << key;
+      EXPECT_EQ(*one.metrics.Find(key), value) << key;
+      EXPECT_EQ(std::signbit(*one.metrics.Find(key)), std::signbit(value)) << key;
     }
   }
   EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
+}
+
+TEST(FinishedRuns, OfSeveralThreadsAreAllWritten) {
+  const testing::TemporaryFolder temporary;
+  OutputFolder folder(temporary / "out", false);
+  FinishedRuns runs(folder, {});
+  constexpr std::uint64_t kThreads = 4, kRuns = 3;
+  std::set<std::uint64_t> seeds;
+  std::ifstream stream(folder.partial() / "finished_runs.jsonl");
+  // Again and again, for the end of a round is where a line may be left behind.
+  for (std::uint64_t round = 0; round < 200; ++round) {
+    {
+      std::vector<std::jthread> threads;
+      for (std::uint64_t i = 0; i < kThreads; ++i) {
+        threads.emplace_back([&runs, first = (round * kThreads + i) * kRuns] {
+          for (std::uint64_t k = 0; k < kRuns; ++k) runs.Add(RunLine("", MakeRun(first + k)));
+        });
+      }
+    }
+    stream.clear();
+    for (std::string line; std::getline(stream, line);) {
+      const std::optional<LineOfRun> read = ReadRunLine(line);
+      ASSERT_TRUE(read) << line;
+      EXPECT_TRUE(seeds.insert(read->run.seed).second) << "twice: " << read->run.seed;
+    }
+    ASSERT_EQ(seeds.size(), (round + 1) * kThreads * kRuns);
+  }
 }
 
 TEST(RunLine, OfARunThatFailedSaysSo) {

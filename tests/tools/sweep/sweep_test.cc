@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
+
+#include "support/recording.h"
 
 namespace alidade {
 namespace {
@@ -27,13 +30,27 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
   EXPECT_EQ(Quantile({1.0, 2.0, kInfinity}, 0.5), 2.0);
 }
 
-EstimatorResult Result(double rmse, bool diverged = false, bool inconsistent = false) {
+using Metrics = std::map<std::string, double>;
+
+/// A run that has these metrics besides.
+SweepEstimator Add(const SweepEstimator& to, const Metrics& more) {
   EstimatorResult one;
+  one.name = to.name;
+  one.diverged = to.diverged;
+  one.inconsistent = to.inconsistent;
+  one.metrics = more;
+  for (std::size_t i = 0; i < to.metrics.names().size(); ++i) {
+    one.metrics.try_emplace(to.metrics.names()[i], to.metrics.values()[i]);
+  }
+  return SweepEstimator(one);
+}
+
+SweepEstimator Result(double rmse, bool diverged = false, bool inconsistent = false) {
+  SweepEstimator one;
   one.name = "ekf";
   one.diverged = diverged;
   one.inconsistent = inconsistent;
-  one.metrics["rmse:x"] = rmse;
-  return one;
+  return Add(one, {{"rmse:x", rmse}});
 }
 
 /// Three runs that count, one of them inconsistent, two that diverged, one that failed (and was
@@ -64,10 +81,13 @@ TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
 TEST(Summarise, LeavesOutWhatIsNotANumber) {
   SweepResult result = SixRuns();
   for (SweepRun& run : result.done) {
-    run.estimators[0].metrics["rmse:never"] = std::numeric_limits<double>::quiet_NaN();
+    run.estimators[0] =
+        Add(run.estimators[0], {{"rmse:never", std::numeric_limits<double>::quiet_NaN()}});
   }
-  result.done[0].estimators[0].metrics["rmse:x"] = std::numeric_limits<double>::quiet_NaN();
-  result.done[1].estimators[0].metrics["rmse:a"] = 7.0;  // of one run, before the others' keys
+  SweepEstimator& first = result.done[0].estimators[0];
+  first = Add(first, {{"rmse:x", std::numeric_limits<double>::quiet_NaN()}});
+  SweepEstimator& second = result.done[1].estimators[0];
+  second = Add(second, {{"rmse:a", 7.0}});  // of one run, before the others' keys
   const std::vector<SweepSummary> summaries = Summarise(result);
   EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 4.0);
@@ -75,6 +95,42 @@ TEST(Summarise, LeavesOutWhatIsNotANumber) {
 }
 
 std::string TableOf(const SweepResult& result) { return SweepTable(result, Summarise(result)); }
+
+TEST(SweepFolder, RunsHaveTheirValuesInTheColumnsOfAll) {
+  SweepResult result = SixRuns();
+  result.done.resize(3);
+  SweepEstimator& first = result.done[0].estimators[0];
+  first = Add(first, {{"rmse:y", 5.0}});
+  SweepEstimator& third = result.done[2].estimators[0];
+  third = Add(third, {{"rmse:a", 7.0}, {"nis.mean:y", 8.0}});
+  const testing::TemporaryFolder temporary;
+  SweepFolder(temporary / "out", false)
+      .Write(result, Summarise(result), Config::FromText("{}", ""));
+  const std::vector<std::string> lines = testing::Lines(temporary / "out/runs.csv");
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_EQ(lines[0], "seed,estimator,diverged,inconsistent,rmse:a,rmse:x,rmse:y,nis.mean:y");
+  EXPECT_EQ(lines[1], "1,ekf,false,false,,1,5,");
+  EXPECT_EQ(lines[2], "2,ekf,false,false,,2,,");
+  EXPECT_EQ(lines[3], "3,ekf,true,false,7,100,,8");
+}
+
+TEST(Sweep, ItsRunsShareTheirNames) {
+  const Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
+                                         "examples/05_depth_principled/config.yaml");
+  const PluginHost host(PluginPaths(config));
+  SweepOptions options;
+  options.runs = 8;
+  options.jobs = 2;
+  const SweepResult result = Sweep(config, host, options);
+  ASSERT_EQ(result.done.size(), 8u);
+  const SweepEstimator& first = result.done[0].estimators.at(0);
+  EXPECT_FALSE(first.metrics.names().empty());
+  for (const SweepRun& run : result.done) {
+    EXPECT_EQ(&run.estimators.at(0).metrics.names(), &first.metrics.names()) << run.seed;
+    EXPECT_EQ(&run.estimators.at(0).counts.names(), &first.counts.names()) << run.seed;
+    EXPECT_EQ(&run.estimators.at(0).units.names(), &first.units.names()) << run.seed;
+  }
+}
 
 TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
   EXPECT_EQ(TableOf(SixRuns()),
@@ -88,15 +144,16 @@ TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
 TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
   SweepResult result = SixRuns();
   for (SweepRun& run : result.done) {
-    run.estimators[0].metrics["nees.mean:x"] = 4.0;
-    run.estimators[0].metrics["nees.dof:x"] = 2.0;
+    run.estimators[0] = Add(run.estimators[0], {{"nees.mean:x", 4.0}, {"nees.dof:x", 2.0}});
   }
   // Three runs of two degrees of freedom: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6 = 2.408.
   const std::string line =
       "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
       "overconfident\n";
   EXPECT_TRUE(TableOf(result).ends_with(line)) << TableOf(result);
-  for (SweepRun& run : result.done) run.estimators[0].metrics["nees.mean:x"] = 2.0;
+  for (SweepRun& run : result.done) {
+    run.estimators[0] = Add(run.estimators[0], {{"nees.mean:x", 2.0}});
+  }
   EXPECT_EQ(TableOf(result).find("bounds"), std::string::npos);
 }
 

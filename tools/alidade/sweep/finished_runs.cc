@@ -2,6 +2,7 @@
 #include "alidade/sweep/finished_runs.h"
 
 #include <fstream>
+#include <utility>
 
 #include "alidade/sweep/run_line.h"
 
@@ -37,10 +38,19 @@ const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uin
 }
 
 void FinishedRuns::Add(const std::string& line) {
-  const std::lock_guard lock(mutex_);
-  if (!folder_.kept()) folder_.Keep();
-  file_->Write(line);
-  file_->Flush();  // the next may take hours
+  std::unique_lock lock(mutex_);
+  waiting_ += line;
+  if (writing_) return;
+  writing_ = true;
+  while (!waiting_.empty()) {
+    const std::string lines = std::exchange(waiting_, {});
+    lock.unlock();
+    if (!folder_.kept()) folder_.Keep();
+    file_->Write(lines);
+    file_->Flush();  // the next may take hours
+    lock.lock();
+  }
+  writing_ = false;
 }
 
 }  // namespace alidade::internal

@@ -11,7 +11,6 @@
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
-#include "alidade/sweep/in_step.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
 #include "alidade/sweep/shards.h"
@@ -133,12 +132,18 @@ std::string SweepJson(const VariedSweep& sweep) {
 RunResult AllKeys(const Parts& parts) {
   RunResult all;
   EstimatorResult& keys = all.estimators.emplace_back();
+  const void *metrics = nullptr, *counts = nullptr;  // the names of the run before
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const EstimatorResult& one : run.estimators) {
-        const auto nothing = [](auto&&...) {};
-        internal::InStep(one.metrics, keys.metrics, nothing);
-        internal::InStep(one.counts, keys.counts, nothing);
+      for (const SweepEstimator& one : run.estimators) {
+        if (&one.metrics.names() != metrics) {
+          for (const std::string& name : one.metrics.names()) keys.metrics[name];
+        }
+        if (&one.counts.names() != counts) {
+          for (const std::string& name : one.counts.names()) keys.counts[name];
+        }
+        metrics = &one.metrics.names();
+        counts = &one.counts.names();
       }
     }
   }
@@ -153,22 +158,30 @@ std::vector<std::string> Header(const std::string& key, std::vector<std::string>
 
 /// Columns of a table, which go by names of their own order.
 template <class Value>
-struct Columns {
-  std::vector<std::string> names;
-  std::map<std::string, std::size_t> places;  ///< by name
-  std::vector<const Value*> cells;
+class Columns {
+ public:
+  explicit Columns(std::vector<std::string> names) : names_(std::move(names)) {
+    for (std::size_t i = 0; i < names_.size(); ++i) columns_[names_[i]] = i;
+  }
+  const std::vector<std::string>& names() const { return names_; }
+  /// The cells of a row with those values, none of other names; null: it has none.
+  const std::vector<const Value*>& Of(const NamedValues<Value>& row) {
+    if (&row.names() != row_names_) {
+      row_names_ = &row.names();
+      places_.clear();
+      for (const std::string& name : row.names()) places_.push_back(columns_.at(name));
+      cells_.assign(names_.size(), nullptr);
+    }
+    for (std::size_t i = 0; i < places_.size(); ++i) cells_[places_[i]] = &row.values()[i];
+    return cells_;
+  }
 
-  explicit Columns(std::vector<std::string> of) : names(std::move(of)) {
-    for (std::size_t i = 0; i < names.size(); ++i) places[names[i]] = i;
-  }
-  /// Of a row with those values, none of other names; null: it has none.
-  template <class Map>
-  const std::vector<const Value*>& Of(const Map& values) {
-    cells.assign(names.size(), nullptr);
-    internal::InStep(values, places,
-                     [&](const Value& value, std::size_t at) { cells[at] = &value; });
-    return cells;
-  }
+ private:
+  std::vector<std::string> names_;
+  std::map<std::string, std::size_t> columns_;           ///< by name
+  const std::vector<std::string>* row_names_ = nullptr;  ///< of the row before
+  std::vector<std::size_t> places_;                      ///< the columns of its values
+  std::vector<const Value*> cells_;
 };
 
 void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string& key) {
@@ -176,10 +189,10 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
   Columns<double> metrics(internal::OrderedMetrics(all));
   Columns<std::int64_t> counts(internal::OrderedCounts(all));
   std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
-  header.insert(header.end(), metrics.names.begin(), metrics.names.end());
-  header.insert(header.end(), counts.names.begin(), counts.names.end());
+  header.insert(header.end(), metrics.names().begin(), metrics.names().end());
+  header.insert(header.end(), counts.names().begin(), counts.names().end());
   CsvFile csv(folder, "runs.csv", header);
-  const auto write_run = [&](const Part& part, const SweepRun& run, const EstimatorResult& one) {
+  const auto write_run = [&](const Part& part, const SweepRun& run, const SweepEstimator& one) {
     if (!key.empty()) csv.Text(part.value);
     csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
     csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
@@ -193,7 +206,7 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
   };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const EstimatorResult& one : run.estimators) {
+      for (const SweepEstimator& one : run.estimators) {
         if (run.Uses(one) || one.diverged) write_run(part, run, one);
       }
     }

@@ -20,12 +20,12 @@ std::string TextOfNumber(double value) {
 const char* TextOfFlag(bool flag) { return flag ? "true" : "false"; }
 
 /// `"KEY":{...}`, the values as `text` gives them.
-template <class Map, class F>
-std::string MapText(const char* key, const Map& map, const F& text) {
+template <class Value, class F>
+std::string MapText(const char* key, const NamedValues<Value>& map, const F& text) {
   std::string all = JsonString(key) + ":{";
   const char* comma = "";
-  for (const auto& [name, value] : map) {
-    all.append(comma).append(JsonString(name)).append(":").append(text(value));
+  for (std::size_t i = 0; i < map.names().size(); ++i) {
+    all.append(comma).append(JsonString(map.names()[i])).append(":").append(text(map.values()[i]));
     comma = ",";
   }
   return all + '}';
@@ -39,7 +39,7 @@ double NumberOf(const Json& json) {
   return text == "-inf" ? -infinity : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string TextOfResult(const EstimatorResult& one) {
+std::string TextOfEstimator(const SweepEstimator& one) {
   const auto count = [](std::int64_t value) { return std::to_string(value); };
   const auto unit = [](const std::string& value) { return JsonString(value); };
   return "{\"name\":" + JsonString(one.name) + ",\"diverged\":" + TextOfFlag(one.diverged) +
@@ -49,7 +49,7 @@ std::string TextOfResult(const EstimatorResult& one) {
          MapText("metrics", one.metrics, TextOfNumber) + '}';
 }
 
-EstimatorResult EstimatorOf(const Json& json) {
+SweepEstimator EstimatorOf(const Json& json) {
   EstimatorResult one;
   one.name = json.at("name").get<std::string>();
   one.diverged = json.at("diverged").get<bool>();
@@ -58,7 +58,7 @@ EstimatorResult EstimatorOf(const Json& json) {
   one.units = json.at("units").get<std::map<std::string, std::string>>();
   one.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();
   for (const auto& [key, value] : json.at("metrics").items()) one.metrics[key] = NumberOf(value);
-  return one;
+  return SweepEstimator(one);
 }
 
 std::string TextOfErrors(const FrameErrors& errors) {
@@ -102,8 +102,8 @@ std::string RunLine(const std::string& value, const SweepRun& run) {
                      ",\"code\":" + std::to_string(static_cast<int>(run.code)) +
                      ",\"reason\":" + JsonString(run.reason) +
                      ",\"withheld\":" + TextOfFlag(run.withheld) + ",\"estimators\":[";
-  for (const EstimatorResult& one : run.estimators) {
-    line += TextOfResult(one);
+  for (const SweepEstimator& one : run.estimators) {
+    line += TextOfEstimator(one);
     if (&one != &run.estimators.back()) line += ',';
   }
   line += "],\"reprojection\":[";

@@ -13,7 +13,6 @@
 #include "alidade/base/signal_stack.h"
 #include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
-#include "alidade/sweep/in_step.h"
 #include "alidade/sweep/processors.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
@@ -81,6 +80,7 @@ class Queue {
       options_.finished->Add(internal::RunLine(options_.value, run));
     }
     const std::lock_guard lock(mutex_);
+    ShareNames(run.estimators);
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
@@ -89,6 +89,23 @@ class Queue {
   /// Null: it was not.
   const internal::FinishedRuns::Known* FinishedBefore(std::uint64_t seed) const {
     return options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
+  }
+
+  /// All runs share the names of the newest that has others than the ones before.
+  void ShareNames(std::vector<SweepEstimator>& estimators) {
+    like_.resize(std::max(like_.size(), estimators.size()));
+    for (std::size_t i = 0; i < estimators.size(); ++i) {
+      SweepEstimator& one = estimators[i];
+      const bool same = one.metrics.ShareNames(like_[i].metrics) &&
+                        one.counts.ShareNames(like_[i].counts) &&
+                        one.units.ShareNames(like_[i].units);
+      if (!same) like_[i] = one;
+    }
+  }
+
+  std::vector<SweepEstimator> Like() {
+    const std::lock_guard lock(mutex_);
+    return like_;
   }
 
   /// For one thread: asking marks keys as read.
@@ -118,9 +135,12 @@ class Queue {
       run.code = result.code;
       run.reason = std::move(result.reason);
       run.withheld = !result.withheld.empty();
-      run.estimators = std::move(result.estimators);
+      std::vector<SweepEstimator> like = Like();
+      like.resize(std::max(like.size(), result.estimators.size()));
+      for (const EstimatorResult& one : result.estimators) {
+        run.estimators.emplace_back(one, like[run.estimators.size()]);
+      }
       run.reprojection = reprojection.Take();
-      for (EstimatorResult& one : run.estimators) one.events = {};
     } catch (...) {
       Failure failure = CaughtFailure();
       run.status = RunStatus::kFailed;
@@ -138,6 +158,7 @@ class Queue {
   std::atomic<std::int64_t> next_{0};
   std::mutex mutex_;
   std::vector<SweepRun> done_;
+  std::vector<SweepEstimator> like_;  ///< by estimator: whose names they share
   std::exception_ptr thrown_;
 };
 
@@ -203,29 +224,70 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   return result;
 }
 
-std::vector<SweepSummary> Summarise(const SweepResult& result) {
-  std::vector<SweepSummary> summaries;
-  for (const std::string& name : result.estimators) {
-    SweepSummary& summary = summaries.emplace_back();
-    summary.name = name;
-    std::map<std::string, std::vector<double>> values;
-    for (const SweepRun& run : result.done) {
-      for (const EstimatorResult& one : run.estimators) {
-        if (one.name != name) continue;
-        summary.units.insert(one.units.begin(), one.units.end());
-        summary.diverged += one.diverged ? 1 : 0;
-        if (!run.Uses(one)) continue;
-        ++summary.used;
-        summary.inconsistent += one.inconsistent ? 1 : 0;
-        internal::InStep(one.metrics, values, [](double value, std::vector<double>& list) {
-          if (!std::isnan(value)) list.push_back(value);
-        });
-      }
+namespace {
+
+/// The values of one estimator over all runs, by name.
+class ValuesByName {
+ public:
+  /// But for those that are not a number.
+  void Add(const NamedValues<double>& row) {
+    if (&row.names() != names_) {
+      names_ = &row.names();
+      lists_.clear();
+      for (const std::string& name : row.names()) lists_.push_back(&values_[name]);
     }
-    for (auto& [key, list] : values) {
-      if (!list.empty()) summary.metrics[key] = SpreadOf(std::move(list));
+    for (std::size_t i = 0; i < lists_.size(); ++i) {
+      const double value = row.values()[i];
+      if (!std::isnan(value)) lists_[i]->push_back(value);
     }
   }
+  /// Of each name that has one.
+  std::map<std::string, Spread> TakeSpreads() {
+    std::map<std::string, Spread> spreads;
+    for (auto& [name, list] : values_) {
+      if (!list.empty()) spreads[name] = SpreadOf(std::move(list));
+    }
+    return spreads;
+  }
+
+ private:
+  std::map<std::string, std::vector<double>> values_;
+  const NamedValues<double>::Names* names_ = nullptr;  ///< of the row before
+  std::vector<std::vector<double>*> lists_;            ///< its places in values_
+};
+
+void AddUnits(const NamedValues<std::string>& row, std::map<std::string, std::string>& units) {
+  for (std::size_t i = 0; i < row.names().size(); ++i) {
+    units.try_emplace(row.names()[i], row.values()[i]);
+  }
+}
+
+SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
+  SweepSummary summary;
+  summary.name = name;
+  ValuesByName values;
+  const NamedValues<std::string>::Names* units = nullptr;  // of the run before
+  for (const SweepRun& run : result.done) {
+    for (const SweepEstimator& one : run.estimators) {
+      if (one.name != name) continue;
+      if (&one.units.names() != units) AddUnits(one.units, summary.units);
+      units = &one.units.names();
+      summary.diverged += one.diverged ? 1 : 0;
+      if (!run.Uses(one)) continue;
+      ++summary.used;
+      summary.inconsistent += one.inconsistent ? 1 : 0;
+      values.Add(one.metrics);
+    }
+  }
+  summary.metrics = values.TakeSpreads();
+  return summary;
+}
+
+}  // namespace
+
+std::vector<SweepSummary> Summarise(const SweepResult& result) {
+  std::vector<SweepSummary> summaries;
+  for (const std::string& name : result.estimators) summaries.push_back(SummaryOf(result, name));
   return summaries;
 }
 

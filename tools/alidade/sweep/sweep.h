@@ -12,6 +12,7 @@
 
 #include "alidade/base/statistics.h"
 #include "alidade/run/run.h"
+#include "alidade/sweep/named_values.h"
 
 namespace alidade {
 
@@ -48,18 +49,41 @@ struct FrameErrors {
   std::vector<double> rms;  ///< not a number where a frame has none
 };
 
+/// What became of one estimator in one run: of an EstimatorResult, what all runs together rest on.
+struct SweepEstimator {
+  SweepEstimator() = default;
+  explicit SweepEstimator(const EstimatorResult& result) : SweepEstimator(result, {}) {}
+  /// Shares the names of another run's where they are the same.
+  SweepEstimator(const EstimatorResult& result, const SweepEstimator& like)
+      : name(result.name),
+        metrics(result.metrics, like.metrics),
+        counts(result.counts, like.counts),
+        units(result.units, like.units),
+        diverged(result.diverged),
+        inconsistent(result.inconsistent),
+        failed(result.failed) {}
+
+  std::string name;
+  NamedValues<double> metrics;
+  NamedValues<std::int64_t> counts;
+  NamedValues<std::string> units;
+  bool diverged = false;
+  bool inconsistent = false;
+  bool failed = false;
+};
+
 /// One run of a sweep.
 struct SweepRun {
   std::uint64_t seed = 0;
   RunStatus status = RunStatus::kOk;
   ExitCode code = ExitCode::kOk;
   std::string reason;
-  std::vector<EstimatorResult> estimators;     ///< without events
+  std::vector<SweepEstimator> estimators;
   std::vector<FrameErrors> reprojection = {};  ///< of a varied sweep, the first 500 frames
   bool withheld = false;                       ///< no reference to compare with, as in RunResult
 
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
-  bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
+  bool Uses(const SweepEstimator& one) const { return status == RunStatus::kOk && !one.diverged; }
 };
 
 struct SweepResult {

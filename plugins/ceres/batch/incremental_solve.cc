@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "dense_front.h"
-#include "kkt_system.h"
+#include "kkt_covariance.h"
 
 namespace alidade::ceres_batch {
 
@@ -818,8 +818,7 @@ bool IncrementalSolve::PutMapOfRun(std::vector<LandmarkEstimate>& map) const {
   }
   const Eigen::VectorXd z = kkt.Join(e);
   if (!kkt.TakeLandmarks(z) || !kkt.Linearise(z, 0.0) || !kkt.Solve()) return false;
-  kkt.Invert();
-  kkt.PutMap(map);
+  KktSystem::Covariances(kkt).PutMap(map);
   return true;
 }
 

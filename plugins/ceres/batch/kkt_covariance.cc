@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "kkt_covariance.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 
-#include "kkt_system.h"
-
-/// The covariances of states and landmarks, from the inverse of a KktSystem.
 namespace alidade::ceres_batch {
 
 Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
@@ -18,57 +17,56 @@ Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
   return eigen.eigenvectors() * positive.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-void KktSystem::Invert() {
+KktSystem::Covariances::Covariances(KktSystem& of) : s_(of) {
   std::vector<std::pair<int, int>> wanted;
-  found_.clear();
   const auto want = [&](int i, int j) {
     if (i < 0 || j < 0) return;
     if (found_.try_emplace(KeyOf(std::max(i, j), std::min(i, j)), wanted.size()).second) {
       wanted.emplace_back(std::max(i, j), std::min(i, j));
     }
   };
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    const std::vector<Part> parts = PartsOf(k);
+  for (std::size_t k = 0; k < s_.nodes_.size(); ++k) {
+    const Node& node = s_.nodes_[k];
+    const std::vector<Part> parts = s_.PartsOf(k);
     for (const Part& a : parts) {
       for (const Part& b : parts) want(a.variable, b.variable);
     }
     if (node.first == node.last) continue;
     std::vector<int> multipliers{node.multiplier};
-    for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+    for (const std::size_t i : node.born) multipliers.push_back(s_.constants_[i].multiplier);
     for (const int i : multipliers) {
       for (const int j : multipliers) want(i, j);
       if (k == 0) continue;
-      for (const Part& part : PartsOf(k - 1)) want(i, part.variable);
+      for (const Part& part : s_.PartsOf(k - 1)) want(i, part.variable);
     }
   }
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const MapLandmark& landmark = run_.landmarks_[i];
-    const std::vector<int> own = ConstantsOf(landmark);
+  for (std::size_t i = 0; i < s_.points_.size(); ++i) {
+    const MapLandmark& landmark = s_.run_.landmarks_[i];
+    const std::vector<int> own = s_.ConstantsOf(landmark);
     for (const int a : own) {
       for (const int b : own) {
-        want(constants_[static_cast<std::size_t>(a)].value,
-             constants_[static_cast<std::size_t>(b)].value);
+        want(s_.constants_[static_cast<std::size_t>(a)].value,
+             s_.constants_[static_cast<std::size_t>(b)].value);
       }
     }
-    want(points_[i].variable, points_[i].variable);
+    want(s_.points_[i].variable, s_.points_[i].variable);
     if (!landmark.first) continue;
-    want(points_[i].variable, nodes_[node_of_[landmark.first->epoch]].read);
-    for (const int constant : landmark_constants_) {
-      want(points_[i].variable, constants_[static_cast<std::size_t>(constant)].value);
+    want(s_.points_[i].variable, s_.nodes_[s_.node_of_[landmark.first->epoch]].read);
+    for (const int constant : s_.landmark_constants_) {
+      want(s_.points_[i].variable, s_.constants_[static_cast<std::size_t>(constant)].value);
     }
   }
-  inverse_ = ldl_.Inverse(wanted);
+  inverse_ = of.ldl_.Inverse(wanted);
 }
 
-double KktSystem::Inexactness() const {
-  const auto read = std::ssize(read_rows_);
+double KktSystem::Covariances::Inexactness() const {
+  const auto read = std::ssize(s_.read_rows_);
   Eigen::VectorXd squared = Eigen::VectorXd::Zero(read), p = squared;
-  for (const Node& node : nodes_) {
+  for (const Node& node : s_.nodes_) {
     if (node.read < 0) continue;
-    const auto own = block_of_.find(KeyOf(node.read, node.read));
-    if (own == block_of_.end()) continue;
-    squared += ldl_.Block(own->second).diagonal().cwiseAbs2();
+    const auto own = s_.block_of_.find(KeyOf(node.read, node.read));
+    if (own == s_.block_of_.end()) continue;
+    squared += s_.ldl_.Block(own->second).diagonal().cwiseAbs2();
     p = p.cwiseMax(Found(node.read, node.read).diagonal());
   }
   const Eigen::VectorXd share = squared.cwiseSqrt().cwiseProduct(p);
@@ -76,75 +74,75 @@ double KktSystem::Inexactness() const {
 }
 
 /// The covariance of two variables.
-Eigen::MatrixXd KktSystem::Found(int i, int j) const {
+Eigen::MatrixXd KktSystem::Covariances::Found(int i, int j) const {
   const Eigen::MatrixXd& block = inverse_[found_.at(KeyOf(std::max(i, j), std::min(i, j)))];
   return i >= j ? block : Eigen::MatrixXd(block.transpose());
 }
 
 /// The covariance of variables side by side.
-Eigen::MatrixXd KktSystem::JointOf(const std::vector<int>& variables) const {
+Eigen::MatrixXd KktSystem::Covariances::JointOf(const std::vector<int>& variables) const {
   Eigen::Index size = 0, row = 0;
-  for (const int v : variables) size += ldl_.SizeOf(v);
+  for (const int v : variables) size += s_.ldl_.SizeOf(v);
   Eigen::MatrixXd p(size, size);
   for (const int a : variables) {
     Eigen::Index column = 0;
     for (const int b : variables) {
-      p.block(row, column, ldl_.SizeOf(a), ldl_.SizeOf(b)) = Found(a, b);
-      column += ldl_.SizeOf(b);
+      p.block(row, column, s_.ldl_.SizeOf(a), s_.ldl_.SizeOf(b)) = Found(a, b);
+      column += s_.ldl_.SizeOf(b);
     }
-    row += ldl_.SizeOf(a);
+    row += s_.ldl_.SizeOf(a);
   }
   return p;
 }
 
 /// P of node k, with zeros for landmarks.
-Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
-  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+Eigen::MatrixXd KktSystem::Covariances::JointOf(std::size_t k) const {
+  const auto n = Eigen::Index{s_.run_.initial_.covariance().size()};
   Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
-  const std::vector<Part> parts = PartsOf(k);
+  const std::vector<Part> parts = s_.PartsOf(k);
   for (const Part& a : parts) {
     for (const Part& b : parts) p(*a.rows, *b.rows) = Found(a.variable, b.variable);
   }
   if (k > 0) return p;
   // What the prior knows exactly has no variance, not that of rounding.
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    if (nodes_[0].b.row(static_cast<Eigen::Index>(i)).any()) continue;
-    p.row(rows_[i]).setZero();
-    p.col(rows_[i]).setZero();
+  for (std::size_t i = 0; i < s_.rows_.size(); ++i) {
+    if (s_.nodes_[0].b.row(static_cast<Eigen::Index>(i)).any()) continue;
+    p.row(s_.rows_[i]).setZero();
+    p.col(s_.rows_[i]).setZero();
   }
   return p;
 }
 
 /// Of a frame inside a node, x = F x_{k-1} + B w:  Cov(w) = I + B' L B, Cov(x_{k-1}, w) = M B,
 /// where L and M are the blocks of the inverse of lambda_k, and of x_{k-1} and lambda_k.
-Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
-  const std::size_t k = node_of_[frame];
-  const Node& node = nodes_[k];
-  const auto system = run_.binding_.initial.covariance().size();
+Eigen::MatrixXd KktSystem::Covariances::OfFrame(std::size_t frame) const {
+  const std::size_t k = s_.node_of_[frame];
+  const Node& node = s_.nodes_[k];
+  const auto system = s_.run_.binding_.initial.covariance().size();
   if (frame == node.last) return Clipped(JointOf(k).topLeftCorner(system, system));
-  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  const auto n = Eigen::Index{s_.run_.initial_.covariance().size()};
   std::vector<int> multipliers;
   if (node.multiplier >= 0) multipliers.push_back(node.multiplier);
-  for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+  for (const std::size_t i : node.born) multipliers.push_back(s_.constants_[i].multiplier);
   Eigen::MatrixXd of_w = Eigen::MatrixXd::Identity(node.columns, node.columns);
   Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(n, node.columns);
   Eigen::Index at = 0;
   for (const int i : multipliers) {
-    const auto b_i = node.b.middleRows(at, ldl_.SizeOf(i));
+    const auto b_i = node.b.middleRows(at, s_.ldl_.SizeOf(i));
     Eigen::Index other = 0;
     for (const int j : multipliers) {
-      const auto b_j = node.b.middleRows(other, ldl_.SizeOf(j));
-      of_w += alpha_ * alpha_ * b_i.transpose() * Found(i, j) * b_j;
+      const auto b_j = node.b.middleRows(other, s_.ldl_.SizeOf(j));
+      of_w += s_.alpha_ * s_.alpha_ * b_i.transpose() * Found(i, j) * b_j;
       other += b_j.rows();
     }
     if (k > 0) {
-      for (const Part& part : PartsOf(k - 1)) {
-        cross(*part.rows, Eigen::all) += alpha_ * Found(part.variable, i) * b_i;
+      for (const Part& part : s_.PartsOf(k - 1)) {
+        cross(*part.rows, Eigen::all) += s_.alpha_ * Found(part.variable, i) * b_i;
       }
     }
     at += b_i.rows();
   }
-  const Eigen::MatrixXd& s = at_[frame].s;
+  const Eigen::MatrixXd& s = s_.at_[frame].s;
   const Eigen::MatrixXd by_w = s.rightCols(node.columns);
   Eigen::MatrixXd p = by_w * of_w * by_w.transpose();
   if (k > 0) {
@@ -154,16 +152,16 @@ Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
   return Clipped(p.topLeftCorner(system, system));
 }
 
-Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
-  const MapLandmark& landmark = run_.landmarks_[i];
+Eigen::MatrixXd KktSystem::Covariances::OfLandmark(std::size_t i) const {
+  const MapLandmark& landmark = s_.run_.landmarks_[i];
   if (landmark.in_state()) {
-    const StateLayout& layout = run_.initial_.layout();
+    const StateLayout& layout = s_.run_.initial_.layout();
     const int first = layout[landmark.blocks.front()].tangent_offset;
     const Block& last = layout[landmark.blocks.back()];
     const int size = last.tangent_offset + last.geometry().tangent - first;
     std::vector<int> variables, rows;  // the others stay
-    for (const int own : ConstantsOf(landmark)) {
-      const Constant& constant = constants_[static_cast<std::size_t>(own)];
+    for (const int own : s_.ConstantsOf(landmark)) {
+      const Constant& constant = s_.constants_[static_cast<std::size_t>(own)];
       variables.push_back(constant.value);
       for (const int row : constant.rows) rows.push_back(row - first);
     }
@@ -171,13 +169,13 @@ Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
     if (!rows.empty()) p(rows, rows) = Clipped(JointOf(variables));
     return p;
   }
-  const Point3& point = points_[i];
+  const Point3& point = s_.points_[i];
   const Eigen::MatrixXd own = Found(point.variable, point.variable);
   const Eigen::MatrixXd& by_l = point.place.by_d;
   if (!landmark.first) return Clipped(by_l * own * by_l.transpose());
-  std::vector<int> variables{nodes_[node_of_[landmark.first->epoch]].read};
-  for (const int constant : landmark_constants_) {
-    variables.push_back(constants_[static_cast<std::size_t>(constant)].value);
+  std::vector<int> variables{s_.nodes_[s_.node_of_[landmark.first->epoch]].read};
+  for (const int constant : s_.landmark_constants_) {
+    variables.push_back(s_.constants_[static_cast<std::size_t>(constant)].value);
   }
   std::erase(variables, -1);
   variables.insert(variables.begin(), point.variable);
@@ -186,15 +184,15 @@ Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
   return Clipped(j * JointOf(variables) * j.transpose());
 }
 
-void KktSystem::PutMap(std::vector<LandmarkEstimate>& map) const {
+void KktSystem::Covariances::PutMap(std::vector<LandmarkEstimate>& map) const {
   for (LandmarkEstimate& estimate : map) {
-    const auto found = std::ranges::find_if(run_.landmarks_, [&](const MapLandmark& landmark) {
+    const auto found = std::ranges::find_if(s_.run_.landmarks_, [&](const MapLandmark& landmark) {
       return landmark.id == estimate.id && landmark.generation == estimate.generation;
     });
-    if (found == run_.landmarks_.end()) continue;
+    if (found == s_.run_.landmarks_.end()) continue;
     if (found->from.size() == 0 && !found->in_state()) continue;  // known exactly
-    const auto i = static_cast<std::size_t>(found - run_.landmarks_.begin());
-    run_.Describe(*found, LandmarkCovariance(i), estimate);
+    const auto i = static_cast<std::size_t>(found - s_.run_.landmarks_.begin());
+    s_.run_.Describe(*found, OfLandmark(i), estimate);
   }
 }
 

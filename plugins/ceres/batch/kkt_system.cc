@@ -46,13 +46,13 @@ bool KktSystem::TakeLandmarks(const Eigen::VectorXd& z) {
   return true;
 }
 
-std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
+std::optional<KktSystem::Frozen> KktSystem::Freeze(const Eigen::VectorXd& z) {
   const Eigen::VectorXd e = z.head(run_.inputs_);
   std::vector<Point> points;
   if (!TakeLandmarks(z)) return {};
   const std::optional<double> change = run_.Freeze(e);
   if (!change || !TakeLandmarks(z) || !run_.PointsOf(e, false, points)) return {};
-  joined_ = false;
+  bool joined = false;
   std::vector<double> h;
   for (std::size_t k = 0; k < points.size(); ++k) {
     for (Factor& factor : run_.epochs_[k].factors) {
@@ -63,11 +63,11 @@ std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
           factor.row < 0 ? WithLandmark(points[k].x, landmark.y) : points[k].x;
       factor.left_out =
           factor.l.size() == 0 || run_.See(factor, x, h, nullptr) != Outcome::kAccepted;
-      joined_ = joined_ || (chosen_ && !factor.left_out);
+      joined = joined || (chosen_ && !factor.left_out);
     }
   }
   chosen_ = true;
-  return change;
+  return Frozen{*change, joined};
 }
 
 bool KktSystem::Settle(Eigen::VectorXd& z, bool all, double left) {
@@ -446,14 +446,14 @@ bool KktSystem::Solve() {
   if (!ldl_.Factorise()) return run_.Fail("the batch has a singular pivot");
   solution_ = ldl_.Solve(rhs_, kRefinements);
   if (!solution_.allFinite()) return run_.Fail("the step of the batch is not finite");
-  step_.resize(inputs_);
+  step_.dz.resize(inputs_);
   Eigen::VectorXd states = solution_;  // and no multipliers
   const auto drop = [&](int variable) {
     if (variable >= 0) states.segment(ldl_.RowOf(variable), ldl_.SizeOf(variable)).setZero();
   };
   for (const Node& node : nodes_) {
     const auto w = z_.segment(node.column, node.columns);
-    step_.segment(node.column, node.columns) =
+    step_.dz.segment(node.column, node.columns) =
         (alpha_ * (node.b.transpose() * Multipliers(node)) - w) / (1.0 + damping_);
     drop(node.multiplier);
   }
@@ -462,14 +462,14 @@ bool KktSystem::Solve() {
     const Point3& point = points_[i];
     if (point.variable < 0) continue;
     const int size = ldl_.SizeOf(point.variable);
-    auto l = step_.segment(point.column, size);
+    auto l = step_.dz.segment(point.column, size);
     l = solution_.segment(ldl_.RowOf(point.variable), size);
     const MapLandmark& landmark = run_.landmarks_[i];
     if (landmark.first) l -= point.c * CameraOf(landmark, solution_);
   }
   // dz' (A + mu I) dz: that of e, and in the states that of r and l.
-  decrement_ =
-      (1.0 + damping_) * step_.head(run_.inputs_).squaredNorm() + states.dot(ldl_.Multiply(states));
+  step_.decrement = (1.0 + damping_) * step_.dz.head(run_.inputs_).squaredNorm() +
+                    states.dot(ldl_.Multiply(states));
   return true;
 }
 
@@ -505,7 +505,7 @@ void KktSystem::Move(Trajectory& trajectory) const {
       now(constant.rows) =
           solution_.segment(ldl_.RowOf(constant.value), ldl_.SizeOf(constant.value));
     }
-    const auto w = step_.segment(node.column, node.columns);
+    const auto w = step_.dz.segment(node.column, node.columns);
     for (std::size_t i = node.first; i <= node.last; ++i) {
       Eigen::VectorXd d = now;
       if (i < node.last) {

@@ -44,6 +44,8 @@ namespace alidade::ceres_batch {
 /// The multipliers are scaled: lambda = alpha lambda', alpha^2 = median H_ii / median Q_ii.
 class KktSystem {
  public:
+  class Covariances;  // in kkt_covariance.h
+
   explicit KktSystem(CondensedRun& run);
 
   const Elimination& elimination() const { return ldl_.elimination(); }
@@ -54,10 +56,13 @@ class KktSystem {
   Eigen::VectorXd Join(const Eigen::VectorXd& e) const;
   /// The landmarks become those of z. False where one is not defined.
   bool TakeLandmarks(const Eigen::VectorXd& z);
-  /// Takes Q and R at z, as CondensedRun::Freeze; observations of landmarks that are not defined
-  /// there are left out until they are.
-  std::optional<double> Freeze(const Eigen::VectorXd& z);
-  bool joined() const { return joined_; }  ///< by the last Freeze, one that was left out before
+  struct Frozen {
+    double change;  ///< as of CondensedRun::Freeze
+    bool joined;    ///< an observation that was left out before
+  };
+  /// Takes Q and R at z; observations of landmarks that are not defined there are left out until
+  /// they are. Nothing where it cannot be done.
+  std::optional<Frozen> Freeze(const Eigen::VectorXd& z);
 
   /// phi(z). Nothing where a model is not defined.
   std::optional<double> Cost(const Eigen::VectorXd& z);
@@ -75,21 +80,14 @@ class KktSystem {
   bool LineariseAbout(const Trajectory& trajectory, Eigen::VectorXd& z);
   /// Factorises and solves. False where a pivot is singular: a model or prior is not defined.
   bool Solve();
-  double cost() const { return cost_; }                  ///< where it is linearised
-  const Eigen::VectorXd& step() const { return step_; }  ///< dz
-  double decrement() const { return decrement_; }        ///< dz' (A + mu I) dz = -dz' grad phi
+  struct Step {
+    Eigen::VectorXd dz;
+    double decrement = 0.0;  ///< dz' (A + mu I) dz = -dz' grad phi
+  };
+  const Step& step() const { return step_; }  ///< the solution
+  double cost() const { return cost_; }       ///< where it is linearised
   /// The states that the step leads to, in the tangent.
   void Move(Trajectory& trajectory) const;
-
-  /// Makes the covariances, for damping 0.
-  void Invert();
-  /// By what share, about, rounding may change the variances of what sensors read: they lose what a
-  /// variance has more than the information of all frames, which it cancels in, eps P_ii |H_ii|.
-  double Inexactness() const;
-  /// P of frame k.
-  Eigen::MatrixXd Covariance(std::size_t k) const;
-  /// `map`, the landmarks that a filter has at the end: place and covariance.
-  void PutMap(std::vector<LandmarkEstimate>& map) const;
 
  private:
   using Inverse = CondensedRun::Inverse;
@@ -152,11 +150,7 @@ class KktSystem {
   void PutConstraint(std::size_t k, const Point& point, const Eigen::VectorXd& z);
   Eigen::VectorXd Multipliers(const Node& node) const;
   void ChooseScale();
-  Eigen::MatrixXd JointOf(std::size_t k) const;
-  Eigen::MatrixXd Found(int i, int j) const;
   Eigen::VectorXd CameraOf(const MapLandmark& landmark, const Eigen::VectorXd& from) const;
-  Eigen::MatrixXd LandmarkCovariance(std::size_t landmark) const;
-  Eigen::MatrixXd JointOf(const std::vector<int>& variables) const;
 
   CondensedRun& run_;
   std::vector<int> rows_;  ///< tangent rows that move: those that sensors read, then the rest
@@ -171,18 +165,17 @@ class KktSystem {
   std::vector<bool> left_out_;  ///< by observation of a landmark, in their order
   int inputs_ = 0;              ///< of z
   BlockLdl ldl_;
-  bool in_time_order_ = true, joined_ = false, chosen_ = false;
+  bool in_time_order_ = true, chosen_ = false;
   std::unordered_map<std::uint64_t, std::size_t> block_of_;
   std::vector<Term> terms_;
   std::vector<int> variables_;
   std::vector<std::size_t> blocks_;
   std::size_t term_ = 0;  ///< next one
 
-  double damping_ = 0.0, cost_ = 0.0, decrement_ = 0.0, alpha_ = 1.0, next_alpha_ = 1.0;
-  Eigen::VectorXd z_, rhs_, solution_, step_;
+  double damping_ = 0.0, cost_ = 0.0, alpha_ = 1.0, next_alpha_ = 1.0;
+  Eigen::VectorXd z_, rhs_, solution_;
+  Step step_;
   std::vector<Point> at_;  ///< by epoch: x; of frames inside a node S and offset too
-  std::vector<Eigen::MatrixXd> inverse_;
-  std::unordered_map<std::uint64_t, std::size_t> found_;
 };
 
 }  // namespace alidade::ceres_batch

@@ -7,6 +7,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "kkt_covariance.h"
 
 namespace alidade::ceres_batch {
 
@@ -32,11 +33,10 @@ void SparseSolve::NoteNew(Timestamp timestamp, std::string& told,
 
 void SparseSolve::NoteInexact(Timestamp timestamp, std::vector<Event>& events) const {
   constexpr double kMost = 0.01;
-  const double share = kkt_.Inexactness();
-  if (!(share > kMost)) return;
+  if (!(inexactness_ > kMost)) return;
   events.push_back({timestamp, "inexact",
                     "variances may be wrong by " +
-                        internal::RoundedText(std::min(100.0, 100.0 * share), 1) +
+                        internal::RoundedText(std::min(100.0, 100.0 * inexactness_), 1) +
                         " % and more, by rounding: a prior is very vague of what nothing else "
                         "tells; a smaller sigma costs fewer digits"});
 }
@@ -119,8 +119,8 @@ bool SparseSolve::Start(const Trajectory& about) {
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!kkt_.LineariseAbout(trajectory, z_) || !kkt_.Solve()) break;
     linearised = true;
-    z_.head(shape.inputs) += kkt_.step().head(shape.inputs);
-    if (!shape.has_unit_vector || kkt_.step().norm() <= kSettled) break;
+    z_.head(shape.inputs) += kkt_.step().dz.head(shape.inputs);
+    if (!shape.has_unit_vector || kkt_.step().dz.norm() <= kSettled) break;
     kkt_.Move(trajectory);
   }
   if (linearised && kkt_.Settle(z_, false, 0.0) && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
@@ -135,12 +135,12 @@ bool SparseSolve::Minimise() {
   while (true) {
     ++solves_;
     if (!Descend()) return false;
-    const std::optional<double> change = kkt_.Freeze(z_);
-    if (!change) {
+    const std::optional<KktSystem::Frozen> frozen = kkt_.Freeze(z_);
+    if (!frozen) {
       summary_ = run_.problem();
       return false;
     }
-    if (*change <= kSettled && !kkt_.joined()) return true;
+    if (frozen->change <= kSettled && !frozen->joined) return true;
     if (solves_ >= options_.max_outer_iterations) {
       summary_ = "the noise that depends on the state did not settle; a larger " +
                  SettingText("max_outer_iterations", options_.max_outer_iterations) + " may do";
@@ -163,7 +163,7 @@ SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
   constexpr double kLeft = 1e-4;    // of what the step promises, to the next one
   const double cost = kkt_.cost();
   Trial next;
-  next.z = z_ + kkt_.step();
+  next.z = z_ + kkt_.step().dz;
   next.cost = CostAt(next.z);
   if (!next.cost) {
     ++undefined_;
@@ -193,11 +193,11 @@ std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
     const bool newest = i + 1 == count;
     const Stepped* const to = newest ? nullptr : &last_[static_cast<std::size_t>(i) + 1];
     dz.col(i) = (newest ? z_ : to->z) - from.z;
-    ds.col(i) = (newest ? kkt_.step() : to->step) - from.step;
+    ds.col(i) = (newest ? kkt_.step().dz : to->step) - from.step;
   }
-  const Eigen::VectorXd t = ds.colPivHouseholderQr().solve(kkt_.step());
+  const Eigen::VectorXd t = ds.colPivHouseholderQr().solve(kkt_.step().dz);
   Trial trial;
-  trial.z = z_ + kkt_.step() - (dz + ds) * t;
+  trial.z = z_ + kkt_.step().dz - (dz + ds) * t;
   if (!trial.z.allFinite()) return {};
   trial.cost = CostAt(trial.z);
   const double cost = kkt_.cost(), most = cost + kRounding * (1.0 + cost) - kEnough * predicted;
@@ -210,7 +210,7 @@ SparseSolve::Trial SparseSolve::NextPoint(double mu, double predicted) {
   std::optional<Trial> extrapolated;
   if (mu == 0.0) {
     if (!last_.empty()) extrapolated = Extrapolated(predicted);
-    last_.push_back({z_, kkt_.step()});
+    last_.push_back({z_, kkt_.step().dz});
     if (last_.size() > kFrom) last_.pop_front();
   }
   return extrapolated ? *std::move(extrapolated) : AfterStep(predicted);
@@ -265,8 +265,8 @@ bool SparseSolve::Descend() {
   }
   for (int i = 0; i < options_.max_iterations; ++i) {
     HeedStop();
-    const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.decrement());
-    const double squared = kkt_.step().squaredNorm();
+    const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.step().decrement);
+    const double squared = kkt_.step().dz.squaredNorm();
     if (mu == 0.0) lengths.Take(std::sqrt(decrement));
     if (lengths.Rounded()) return EndUnsettled(lengths.left, End::kRounding);
     const double predicted = 0.5 * (decrement + mu * squared);
@@ -341,17 +341,18 @@ bool SparseSolve::EndUnsettled(double left, End end) {
 }
 
 bool SparseSolve::PutAll(const Take& take, std::vector<LandmarkEstimate>& map) {
-  kkt_.Invert();
+  const KktSystem::Covariances covariances(kkt_);
+  inexactness_ = covariances.Inexactness();
   const Eigen::VectorXd e = z_.head(run_.shape().inputs);
   const auto put = [&](std::size_t k, const Point& point) {
-    take(k, point.x, [&] { return kkt_.Covariance(k); });
+    take(k, point.x, [&] { return covariances.OfFrame(k); });
   };
   if (!kkt_.TakeLandmarks(z_) || !run_.ForEachFrame(e, run_.shape().frames, put, false)) {
     failed_ = true;
     summary_ += "; then " + run_.problem();
     return false;
   }
-  kkt_.PutMap(map);
+  covariances.PutMap(map);
   return true;
 }
 

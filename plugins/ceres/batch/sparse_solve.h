@@ -45,7 +45,7 @@ class SparseSolve {
   const std::string& summary() const { return summary_; }
   /// As MapSolve::Note.
   void Note(Timestamp timestamp, std::vector<Event>& events) const;
-  /// The event `inexact`, where rounding leaves little of what the covariances are.
+  /// The event `inexact`, where rounding leaves little of the covariances that PutAll gave.
   void NoteInexact(Timestamp timestamp, std::vector<Event>& events) const;
   /// As Note, of one solve after another: and the event `edge_of_domain` where other landmarks are
   /// held there than in `told`, which becomes those.
@@ -89,6 +89,7 @@ class SparseSolve {
   std::string ended_;    ///< how, where it has not failed
   std::string at_edge_;  ///< landmarks that the last solve holds at the edge of their domain; or ""
   bool failed_ = false;
+  double inexactness_ = 0.0;  ///< as KktSystem::Covariances has it
 };
 
 }  // namespace alidade::ceres_batch

@@ -33,7 +33,7 @@
 #include "alidade/host/in_process.h"
 #include "bench/speed/interleaved.h"
 #include "motion_models/quaternion_pose.h"
-#include "plugins/ceres/batch/kkt_system.h"
+#include "plugins/ceres/batch/kkt_covariance.h"
 #include "sensors/depth_feature.h"
 #include "sensors/inverse_depth_feature.h"
 
@@ -255,7 +255,7 @@ Times TimeBatch(const Scene& scene, int iterations) {
     if (!done) throw std::runtime_error("the batch failed: " + run.problem());
   };
   must(kkt.LineariseAbout(about, z) && kkt.Solve());
-  z += kkt.step();
+  z += kkt.step().dz;
   must(kkt.Freeze(z).has_value());
   Times times;
   const double begin = NowS();
@@ -266,13 +266,13 @@ Times TimeBatch(const Scene& scene, int iterations) {
     now = NowS();
     must(kkt.Solve());
     times.solve_s += (NowS() - now) / iterations;
-    z += kkt.step();
+    z += kkt.step().dz;
     must(kkt.Cost(z).has_value());
   }
   times.iteration_s = (NowS() - begin) / iterations;
   const double end = NowS();
-  kkt.Invert();
-  for (std::size_t k = 0; k < scene.start.size(); ++k) kkt.Covariance(k);
+  const ceres_batch::KktSystem::Covariances covariances(kkt);
+  for (std::size_t k = 0; k < scene.start.size(); ++k) covariances.OfFrame(k);
   times.covariances_s = NowS() - end;
   times.flops = kkt.elimination().flops;
   times.in_time_order = kkt.in_time_order();

@@ -125,7 +125,7 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   }
   Project<N>(p.data(), stride, sensor.H.data(), m, pht, s);
   bool tiny = false;
-  for (int i = 0; i < m; ++i) tiny |= !(noise[i] > Gate::kVanishing * s[i * m + i]);
+  for (int i = 0; i < m; ++i) tiny |= Gate::Vanishes(noise[i], s[i * m + i]);
   if (tiny && !gate_.warned(static_cast<std::size_t>(entry.sensor))) return false;
   double work[kMost * (kMost + 1)];
   entry.nis = SquaredMahalanobis(s, r, m, work);
@@ -139,8 +139,8 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
 
 /// Puts a measurement that passed its gate below the `at` rows before it; their P H' is there.
 template <int N, int M>
-ALIDADE_INLINE void FastPath::Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows,
-                                    int at) {
+ALIDADE_INLINE void FastPath::Stack(const Sensor& sensor, MeasurementReport& entry,
+                                    RowStack<N>& rows, int at) {
   const int m = M > 0 ? M : sensor.rows;
   const double* const own = entry.s.data();
   for (int i = 0; i < m; ++i) {
@@ -159,7 +159,7 @@ ALIDADE_INLINE void FastPath::Stack(const Sensor& sensor, MeasurementReport& ent
 
 /// The update with M rows (0: known at run time only), or nothing.
 template <int N, int M>
-ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
+ALIDADE_INLINE bool FastPath::Correct(const RowStack<N>& rows, int count) {
   constexpr int kMost = M > 0 ? M : kRows;
   const int m = M > 0 ? M : count;
   LowerTriangle p = f_.state.covariance().lower();
@@ -185,7 +185,7 @@ ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
 /// before it, where it passes its gate.
 template <int N, int M>
 ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement& measurement,
-                                              Rows<N>& rows, int at) {
+                                              RowStack<N>& rows, int at) {
   const int m = M > 0 ? M : sensor.rows;
   const double* const z = measurement.values.data();
   if (std::ssize(measurement.values) != m || !measurement.covariance.empty() ||
@@ -203,6 +203,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
     return Taken::kLeftOut;
   }
   if (entry.dof != m || std::ssize(entry.gain) != m * N) Fit(entry, m, N);
+  // Not Reset: vectors of the last frame have their size, and all numbers are written over.
   entry.sensor = sensor.index;
   entry.landmark = measurement.landmark;
   entry.dof = m;
@@ -221,7 +222,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
 /// The measurements of a frame as one update, or nothing.
 template <int N>
 ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
-  Rows<N> rows;
+  RowStack<N> rows;
   int m = 0, last_sensor = -1;
   const Measurement* last = nullptr;
   f_.report.ClearMeasurements();
@@ -246,19 +247,21 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
                       : m == 2 ? Correct<N, 2>(rows, m)
                                : Correct<N, 0>(rows, m);
     if (!done) return false;
-    f_.said.last_used.sensor = last_sensor;
-    f_.said.last_used.timestamp = last->timestamp;
-    Fit(f_.said.last_used.z, static_cast<int>(std::ssize(last->values)));
-    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.said.last_used.z);
+    f_.health.last_used.sensor = last_sensor;
+    f_.health.last_used.timestamp = last->timestamp;
+    Fit(f_.health.last_used.z, static_cast<int>(std::ssize(last->values)));
+    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.health.last_used.z);
   }
-  for (const MeasurementReport& entry : f_.report.measurements()) gate_.Count(f_, entry);
+  for (const MeasurementReport& entry : f_.report.measurements()) {
+    gate_.Count(f_, entry);  // no sensor has to recover: Take asked IsDueNext
+  }
   return true;
 }
 
 template <int N>
 bool FastPath::ProcessSized(const Frame& frame) {
   Timestamp elapsed = 0;
-  if (f_.said.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
+  if (f_.health.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
       __builtin_sub_overflow(frame.timestamp, f_.timestamp, &elapsed)) {
     return false;
   }
@@ -353,7 +356,7 @@ std::unique_ptr<FastPath> FastPath::For(FilterState& f, Timeline& time, Gate& ga
       !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
   }
-  f.said.last_used.z.reserve(kMostOfOne);
+  f.health.last_used.z.reserve(kMostOfOne);
   std::unique_ptr<FastPath> path(new FastPath(f, time, gate));
   if (!path->AddMotions() || !path->AddSensors()) return nullptr;
   const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {

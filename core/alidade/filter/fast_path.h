@@ -15,16 +15,18 @@ namespace alidade::internal {
 /// updates in which nothing but acceptance and gating happens, in functions compiled for the number
 /// of states. A measurement that its model calls invalid is reported as such. Of a frame with
 /// anything else it does the step at most, and says false: the frame loop then does the rest and
-/// finds the words. The first frame of all is the loop's, where
-/// Filter::Start gave no time.
+/// finds the words. The loop's are the first frame of all, where Filter::Start gave no time, and
+/// those that discrete noise is held over from the frame before, which had no accepted measurement:
+/// the M = Cov(x, w) of Motions is not kept here.
 class FastPath {
  public:
   /// Null where the filter is not one of few states, all of them estimated vectors in the order of
-  /// the layout, and sensors of a vector of at most 3 elements each, all of whose roles are
-  /// corrected and linearised at the estimate, without loss or known numbers. It points into
-  /// all three.
+  /// the layout, and sensors of a vector of at most 3 elements each, without loss or known numbers,
+  /// all of whose roles are blocks of their own, corrected and linearised at the estimate. It
+  /// points into all three.
   static std::unique_ptr<FastPath> For(FilterState& f, Timeline& time, Gate& gate);
-  /// As a filter processes a frame, all of it or nothing but the step.
+  /// As a filter processes a frame. False: nothing of it is done but, at most, the step, and what
+  /// the report has of measurements is not to be read.
   bool Process(const Frame& frame);
 
  private:
@@ -36,7 +38,8 @@ class FastPath {
     Motions::Step* step;
     std::vector<const double*> x;
     std::vector<double*> next;
-    int offset, size, noise;
+    int offset;  ///< in P, x and next alike
+    int size, noise;
   };
   struct Sensor {
     explicit Sensor(const SensorModel& of) : model(of) {}
@@ -53,12 +56,11 @@ class FastPath {
   };
   /// The rows that passed their gates, stacked.
   template <int N>
-  struct Rows {
+  struct RowStack {
     double pht[kRows * N];  ///< P H', by columns
     double s[kRows * kRows];
     double innovation[kRows];
-    double*
-        gain[kRows];  ///< each row's column of K in its report, which may move: the memory stays
+    double* gain[kRows];  ///< column of K in the memory of its entry, which stays if that moves
   };
 
   enum class Taken { kUnusual, kLeftOut, kStacked };
@@ -73,15 +75,15 @@ class FastPath {
   template <int N, int K, int W>
   bool StepModel(const Motion& motion, double dt_s, double (&p)[N][N]);
   template <int N, int M>
-  Taken Take(Sensor& sensor, const Measurement& measurement, Rows<N>& rows, int at);
+  Taken Take(Sensor& sensor, const Measurement& measurement, RowStack<N>& rows, int at);
   template <int N>
   bool Update(const Frame& frame);
   template <int N, int M>
   bool Linearise(Sensor& sensor, const double* z, MeasurementReport& entry, double* pht);
   template <int N, int M>
-  void Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows, int at);
+  void Stack(const Sensor& sensor, MeasurementReport& entry, RowStack<N>& rows, int at);
   template <int N, int M>
-  bool Correct(const Rows<N>& rows, int count);
+  bool Correct(const RowStack<N>& rows, int count);
 
   FilterState& f_;
   Timeline& time_;

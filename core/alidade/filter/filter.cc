@@ -84,8 +84,8 @@ const UpdateReport& Filter::Process(const Frame& frame) {
 const System& Filter::system() const { return loop_->f.binding->system; }
 const State& Filter::state() const { return loop_->f.state; }
 Timestamp Filter::timestamp() const { return loop_->f.timestamp; }
-bool Filter::diverged() const { return loop_->f.said.diverged; }
-bool Filter::failed() const { return loop_->f.said.ended; }
+bool Filter::diverged() const { return loop_->f.health.diverged; }
+bool Filter::failed() const { return loop_->f.health.ended; }
 
 std::vector<LandmarkEstimate> Filter::landmarks() const {
   if (!loop_->landmarks) return {};

@@ -26,7 +26,7 @@ std::string Describe(const State& state, std::span<const BlockId> blocks) {
 }
 
 void NoteDivergence(FilterState& f, const char* kind, std::string text) {
-  f.said.diverged = true;
+  f.health.diverged = true;
   Note(f, kind, std::move(text)).divergence = true;
 }
 
@@ -38,8 +38,8 @@ FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_est
       motions(*binding),
       first_estimates(binding->system.layout.blocks().size()),
       keeps_first_estimates_(keeps_first_estimates) {
-  said.out_of_domain.assign(binding->sensor_places.size(), 0);
-  said.inflated = said.out_of_domain;
+  health.out_of_domain.assign(binding->sensor_places.size(), 0);
+  health.inflated = health.out_of_domain;
   Activate();
 }
 
@@ -85,7 +85,7 @@ void NotePluginFailure(FilterState& f, const Row& row) {
 void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
   const SensorBinding& sensor = *row.binding;
   if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
-  char& said = f.said.out_of_domain[static_cast<std::size_t>(row.sensor)];
+  char& said = f.health.out_of_domain[static_cast<std::size_t>(row.sensor)];
   // A landmark behind the camera, say, is no divergence.
   if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;
   said = 1;
@@ -96,16 +96,16 @@ void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
 }
 
 void End(FilterState& f, const char* kind, const std::string& what) {
-  f.said.ended = true;
+  f.health.ended = true;
   std::vector<BlockId> all(f.binding->system.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
   std::string text =
       what + "; last good state at " + SecondsText(f.timestamp) + ": " + Describe(f.state, all);
-  if (f.said.last_used.sensor >= 0) {
+  if (f.health.last_used.sensor >= 0) {
     text += "; last measurement used: sensor '" +
-            f.binding->system.sensors[static_cast<std::size_t>(f.said.last_used.sensor)].name +
-            "' at " + SecondsText(f.said.last_used.timestamp) + ", z =";
-    for (const double z : f.said.last_used.z) text += ' ' + RoundedText(z, 6);
+            f.binding->system.sensors[static_cast<std::size_t>(f.health.last_used.sensor)].name +
+            "' at " + SecondsText(f.health.last_used.timestamp) + ", z =";
+    for (const double z : f.health.last_used.z) text += ' ' + RoundedText(z, 6);
   }
   NoteDivergence(f, kind, std::move(text));
 }

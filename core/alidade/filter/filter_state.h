@@ -15,8 +15,8 @@ namespace alidade::internal {
 
 struct Row;  // in alidade/filter/rows.h
 
-/// What a filter has said of itself, so that it says it once.
-struct Said {
+/// How a filter is, and what it has said of that, so that it says it once.
+struct Health {
   std::vector<char> out_of_domain, inflated;  ///< by sensor: since its last acceptance
   bool diverged = false, ended = false;
   /// The last accepted measurement.
@@ -45,7 +45,7 @@ struct FilterState {
   /// By block of the system: the value that H is taken at; empty: the latest.
   std::vector<std::vector<double>> first_estimates;
   UpdateReport report;  ///< of the frame
-  Said said;
+  Health health;
   /// What Activate last found among the blocks of the system.
   struct {
     int activations = 0;         ///< calls of Activate

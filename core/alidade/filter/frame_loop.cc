@@ -29,7 +29,7 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
   method->Begin(f);
 }
 
-/// Null afterwards where the frame loop is the only way.
+/// fast_.path is null afterwards where Run is the only way.
 void FrameLoop::MakeFastPath() {
   const bool apt =
       options_.fuse == Fuse::kJoint && dynamic_cast<const Linear*>(&*method) != nullptr;
@@ -41,7 +41,7 @@ void FrameLoop::Process(const Frame& frame) {
   f.report.Clear();
   if (fast_.made_at != f.blocks.activations) MakeFastPath();
   took_fast_path = fast_.path != nullptr && fast_.path->Process(frame);
-  if (!took_fast_path) Run(frame);
+  if (!took_fast_path) Run(frame);  // steps no further if that did, and starts the entries anew
   if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
@@ -51,10 +51,10 @@ void FrameLoop::Run(const Frame& frame) {
   if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
-  if (!f.report.stale && !f.said.ended) StepTo(frame.timestamp);
+  if (!f.report.stale && !f.health.ended) StepTo(frame.timestamp);
   Spent(FramePart::kStep);
   std::optional<Outcome> refused;
-  if (f.said.ended) refused = Outcome::kEnded;
+  if (f.health.ended) refused = Outcome::kEnded;
   if (f.report.stale) refused = Outcome::kStale;
   rows_.Collect(frame, *f.binding, f.report, refused);
   if (refused) return;
@@ -64,9 +64,9 @@ void FrameLoop::Run(const Frame& frame) {
   }
   if (f.blocks.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);
-  Fuse(all);
+  UpdateInGroups(all);
   recovery_.RepairCovariance(f, all);
-  if (f.said.ended) return;
+  if (f.health.ended) return;
   for (Row& row : all) {
     if (landmarks && row.binding->model.has_landmark()) continue;  // its rejections do not count
     if (gate_.Count(f, *row.report)) recovery_.Recover(f, row);
@@ -105,7 +105,7 @@ void FrameLoop::StepTo(Timestamp timestamp) {
 }
 
 /// The updates of a frame, group by group.
-void FrameLoop::Fuse(std::span<Row> all) {
+void FrameLoop::UpdateInGroups(std::span<Row> all) {
   std::vector<Row*>& group = groups_.group;
   group.clear();
   for (Row& row : all) {
@@ -124,7 +124,7 @@ void FrameLoop::Fuse(std::span<Row> all) {
 
 /// One update by those of a group that pass; with a consensus a second one by those it rescues.
 void FrameLoop::Update(std::span<Row* const> group) {
-  Pass(group, groups_.passed);
+  PredictAndGate(group, groups_.passed);
   if (!landmarks || !Consensus::IsAsked(groups_.passed)) {
     Correct(groups_.passed);
     return;
@@ -140,7 +140,7 @@ void FrameLoop::Update(std::span<Row* const> group) {
     }
     return;
   }
-  Pass(groups_.rest, groups_.passed);
+  PredictAndGate(groups_.rest, groups_.passed);
   std::erase_if(groups_.passed, [&](const Row* row) {
     if (consensus_.Rescues(*row)) return false;
     row->report->outcome = Outcome::kGated;
@@ -152,7 +152,7 @@ void FrameLoop::Update(std::span<Row* const> group) {
 }
 
 /// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
-void FrameLoop::Pass(std::span<Row* const> group, std::vector<Row*>& passed) {
+void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed) {
   passed.clear();
   for (Row* const row : group) row->report->outcome = method->Predict(f, *row);
   Spent(FramePart::kEvaluate);
@@ -181,15 +181,15 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   if (outcome != Outcome::kAccepted) return false;
   f.motions.EndInterval();
   const Row& last = *rows.back();
-  f.said.last_used.sensor = last.sensor;
-  f.said.last_used.timestamp = last.measurement->timestamp;
-  f.said.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+  f.health.last_used.sensor = last.sensor;
+  f.health.last_used.timestamp = last.measurement->timestamp;
+  f.health.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
   return true;
 }
 
 std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
                                             const std::vector<double>& known) {
-  if (f.said.ended || f.report.stale) return std::nullopt;
+  if (f.health.ended || f.report.stale) return std::nullopt;
   Measurement one;
   one.landmark = landmark;
   one.known = known;

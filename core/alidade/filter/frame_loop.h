@@ -23,15 +23,17 @@ namespace alidade::internal {
 
 /// What a filter is made of, and what a frame goes through there:
 ///
-///   plain frames of few states      FastPath::Process, all of it; any other:
+///   plain frames of few states      FastPath::Process, all but the inputs; any other, Run:
 ///   step         StepTo             Timeline::First, Method::Step
 ///   collect                         Rows::Collect: one row for each measurement and sensor
 ///   initialise                      InitialiseWaiting, Landmarks::Attach
-///   predict      Pass               Method::Predict of each row
-///   gate         Pass               Gate::Pass of each row; Consensus::Split
+///   group        UpdateInGroups     Update of each group by itself, as `fuse` has them:
+///   predict      PredictAndGate     Method::Predict of each row
+///   gate                            Gate::Pass of each row; Consensus::Split
 ///   correct      Correct            Gate::Weigh, Method::Correct
 ///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                       Landmarks::Maintain, Compression::Apply
+///   inputs                          Timeline::TakeInputs: they act from here on
 ///
 /// Parts point to the binding, which copies share, and not into one another; only the fast path
 /// does, and a copy makes its own. So a copy is a filter by itself.
@@ -51,15 +53,15 @@ class FrameLoop {
   FilterState f;
   Indirect<Method> method;
   std::optional<Landmarks> landmarks;  ///< where the system has any
-  bool took_fast_path = false;         ///< the last frame
+  bool took_fast_path = false;         ///< the last frame; for tests
 
  private:
   void MakeFastPath();
   void Run(const Frame& frame);
   void StepTo(Timestamp timestamp);
-  void Fuse(std::span<Row> rows);
+  void UpdateInGroups(std::span<Row> rows);
   void Update(std::span<Row* const> group);
-  void Pass(std::span<Row* const> group, std::vector<Row*>& passed);
+  void PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed);
   bool Correct(std::span<Row* const> rows);
   void Spent(FramePart part);
 

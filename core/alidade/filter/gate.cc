@@ -88,7 +88,7 @@ void Gate::CheckConditioning(FilterState& f, const Row& row) {
   for (std::size_t i = 0; i < m && !tiny; ++i) {
     noise = row.R[i * m + i];
     total = row.report->s[i * m + i];
-    tiny = noise <= kVanishing * total || noise <= 0.0;
+    tiny = Vanishes(noise, total);
   }
   if (!tiny) return;
   warned_[sensor] = true;

@@ -14,14 +14,15 @@ namespace alidade::internal {
 /// snapshot.
 class Gate {
  public:
-  /// Of S, less noise than this vanishes compared with H P H'.
-  static constexpr double kVanishing = 1e-13;
-
   Gate(const System& system, const EkfOptions& options);
 
   /// NIS and w of a row with r, R and S, and whether it passes: kAccepted, or why not. What lies so
   /// far out that its R / w is not finite does not.
   Outcome Pass(FilterState& f, Row& row);
+  /// Whether noise, of the variance `total` on the diagonal of S, vanishes compared with H P H'.
+  static bool Vanishes(double noise, double total) {
+    return !(noise > 1e-13 * total) || noise <= 0.0;
+  }
   /// R <- R / w in R and in S.
   static void Weigh(Row& row);
 
@@ -33,7 +34,7 @@ class Gate {
     }
     const auto sensor = static_cast<std::size_t>(entry.sensor);
     rejections_[sensor] = 0;
-    f.said.out_of_domain[sensor] = f.said.inflated[sensor] = 0;
+    f.health.out_of_domain[sensor] = f.health.inflated[sensor] = 0;
     return false;
   }
   /// Whether one more rejection of the sensor is one too many.

@@ -85,7 +85,7 @@ Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
 /// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
 /// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
 std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Row* const> rows) {
-  const Eigen::Index n = f.size(), m = CountOf(rows);
+  const Eigen::Index n = f.size(), m = TotalDof(rows);
   Minimum minimum{f.work.Take(n)};
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);

@@ -123,19 +123,20 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
     const std::vector<bool>& consider = row->place->consider;
     return std::ranges::find(consider, true) != consider.end();
   };
-  const bool small = IsSmall(f.state.covariance()) && CountOf(rows) <= kSmall &&
+  const bool small = IsSmall(f.state.covariance()) && TotalDof(rows) <= kSmall &&
                      !f.blocks.considering && std::ranges::none_of(rows, considers) &&
                      f.state.postponed() == nullptr;
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
-/// Few states and few rows, in arrays: CorrectLarge takes longer there.
+/// Few states and few rows, in arrays: CorrectLarge takes longer there, and is what is left where
+/// digits of P would cancel.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
   constexpr std::size_t kMost = kSmall;
   std::array<double, kMost * kMost> pht, hpht, s, w, gain;
   std::array<double, kMost> innovation, inverse_d, dx;
   const auto n = static_cast<std::size_t>(f.size());
-  const int m = static_cast<int>(CountOf(rows));
+  const int m = static_cast<int>(TotalDof(rows));
   const auto all = static_cast<std::size_t>(m);
   std::size_t at = 0;
   for (const Row* row : rows) {

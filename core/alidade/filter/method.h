@@ -9,7 +9,7 @@
 namespace alidade::internal {
 
 /// What Kalman filters differ in: how x and P are stepped, what a measurement is expected to be,
-/// and how x and P are corrected by it. Knows nothing of gates, frames or landmarks.
+/// and how x and P are corrected by it. Knows nothing of gates or frames.
 class Method {
  public:
   virtual ~Method() = default;

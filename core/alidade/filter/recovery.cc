@@ -101,7 +101,7 @@ void Recovery::Recover(FilterState& f, Row& row) {
          why + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
-  char& inflated = f.said.inflated[static_cast<std::size_t>(row.sensor)];
+  char& inflated = f.health.inflated[static_cast<std::size_t>(row.sensor)];
   if (inflated != 0) return;
   inflated = 1;
   Note(f, "rejection_recovery",

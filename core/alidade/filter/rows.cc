@@ -88,12 +88,12 @@ Outcome Rows::Check(const Row& row) {
 }
 
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
-             const std::vector<double>& known, std::vector<const double*>& roles) {
+             const std::vector<double>& known_roles, std::vector<const double*>& roles) {
   roles.clear();
   for (std::size_t i = 0; i < place.values.size(); ++i) {
     const int at = place.values[i];
     const bool knows = i < sensor.roles.size() && sensor.roles[i].mode == RoleMode::kKnown;
-    roles.push_back(at < 0 ? nullptr : (knows ? known : x).data() + at);
+    roles.push_back(at < 0 ? nullptr : (knows ? known_roles : x).data() + at);
   }
 }
 
@@ -174,7 +174,7 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
   own = chained;
 }
 
-Eigen::Index CountOf(std::span<Row* const> rows) {
+Eigen::Index TotalDof(std::span<Row* const> rows) {
   Eigen::Index m = 0;
   for (const Row* row : rows) m += row->report->dof;
   return m;
@@ -196,7 +196,7 @@ Stacked Stack(FilterState& f, std::span<Row* const> rows) {
 }
 
 Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Matrix h = f.work.Take(CountOf(rows), f.size());
+  Workspace::Matrix h = f.work.Take(TotalDof(rows), f.size());
   h.setZero();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     const JacobianRows own = row.jacobian();
@@ -209,7 +209,7 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
 }
 
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Matrix noise = f.work.Take(CountOf(rows), CountOf(rows));
+  Workspace::Matrix noise = f.work.Take(TotalDof(rows), TotalDof(rows));
   noise.setZero();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     const Eigen::Index k = row.report->dof;
@@ -219,7 +219,7 @@ Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows) {
 }
 
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Vector innovation = f.work.Take(CountOf(rows));
+  Workspace::Vector innovation = f.work.Take(TotalDof(rows));
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     std::ranges::copy(row.report->innovation, innovation.data() + at);
   });
@@ -227,7 +227,7 @@ Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
 }
 
 Panels ProjectionOf(FilterState& f, std::span<Row* const> rows) {
-  const Panels pht = TakePanels(f.work, f.size(), CountOf(rows));
+  const Panels pht = TakePanels(f.work, f.size(), TotalDof(rows));
   f.jacobians.clear();
   for (const Row* const row : rows) f.jacobians.push_back(row->jacobian());
   Project(f.state.covariance(), f.jacobians, pht);
@@ -240,7 +240,7 @@ void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s)
 
 Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
   const OutsideCorrelation& correlation = f.state.covariance().outside();
-  Workspace::Matrix outside = f.work.Take(correlation.columns(), CountOf(rows));
+  Workspace::Matrix outside = f.work.Take(correlation.columns(), TotalDof(rows));
   if (correlation.columns() == 0) return outside;
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     correlation.Project(row.jacobian(), outside.data() + at * outside.rows());

@@ -67,10 +67,10 @@ class Rows {
 // A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point, a
 // point of a batch. What it does not write is not a number. m: tangent size of the measurement.
 
-/// The values that fill the roles of a sensor at x; of roles that it knows those of `known`. Null:
-/// the role has no place.
+/// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
+/// Null: the role has no place.
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
-             const std::vector<double>& known, std::vector<const double*>& roles);
+             const std::vector<double>& known_roles, std::vector<const double*>& roles);
 
 /// h of a measurement at the roles, ambient, and unless null H, m rows of the place's width.
 /// `columns` is memory.
@@ -102,7 +102,7 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
 // The rows of an update below one another: m rows in all, n = size of P.
 
 /// m, of all rows of an update.
-Eigen::Index CountOf(std::span<Row* const> rows);
+Eigen::Index TotalDof(std::span<Row* const> rows);
 
 /// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
 inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
@@ -134,7 +134,7 @@ void ForEachConsidered(const FilterState& f, std::span<Row* const> rows, const Z
        ++i) {
     const Block& block = f.state.layout()[static_cast<BlockId>(i)];
     if (!block.present || block.status != BlockStatus::kConsider) continue;
-    zero(block.tangent_offset, block.geometry().tangent, 0, CountOf(rows));
+    zero(block.tangent_offset, block.geometry().tangent, 0, TotalDof(rows));
   }
   Eigen::Index at = 0;
   for (const Row* row : rows) {

@@ -108,8 +108,8 @@ RtsSmoother::~RtsSmoother() = default;
 void RtsSmoother::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
 const State& RtsSmoother::state() const { return loop_->f.state; }
 Timestamp RtsSmoother::timestamp() const { return loop_->f.timestamp; }
-bool RtsSmoother::diverged() const { return loop_->f.said.diverged; }
-bool RtsSmoother::failed() const { return loop_->f.said.ended; }
+bool RtsSmoother::diverged() const { return loop_->f.health.diverged; }
+bool RtsSmoother::failed() const { return loop_->f.health.ended; }
 
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
   auto& tape = dynamic_cast<internal::Taped&>(*loop_->method);

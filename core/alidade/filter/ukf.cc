@@ -388,7 +388,7 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
 Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   const Workspace::Use use(f.work);
   const Eigen::MatrixXd& root = Root(f);
-  const Eigen::Index n = root.cols(), m = CountOf(rows);
+  const Eigen::Index n = root.cols(), m = TotalDof(rows);
   int halvings = 0;  // of the narrowest
   for (const Row* row : rows) {
     halvings = std::max(halvings, PredictedOf(f, *row).halvings);

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
+#include <mutex>
 #include <sstream>
+#include <thread>
 
 #include "alidade/base/words.h"
 #include "alidade/host/abi_read.h"
@@ -21,6 +23,18 @@ using internal::ParamRecorder;
 
 std::uint32_t ToKind(PluginEntry::Kind kind) {
   return kind == PluginEntry::Kind::kSensor ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
+}
+
+/// For what takes some microseconds, as most creations do: to look again takes less than to sleep.
+std::unique_lock<std::recursive_mutex> LockShortly(std::recursive_mutex& mutex) {
+  constexpr int kLooks = 100;
+  std::unique_lock lock(mutex, std::try_to_lock);
+  for (int i = 0; i < kLooks && !lock; ++i) {
+    std::this_thread::yield();
+    static_cast<void>(lock.try_lock());
+  }
+  if (!lock) lock.lock();
+  return lock;
 }
 
 /// An instance that `create` fills, destroyed unless it is released.
@@ -110,7 +124,7 @@ auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mute
   decltype(create(params)) made;
   const std::string plugin = entry.plugin.string();
   try {
-    const std::lock_guard lock(mutex);
+    const auto lock = LockShortly(mutex);
     const internal::NamedCall call("Create", internal::KindName(entry.kind), entry.name, plugin);
     made = create(params);
   } catch (const Error&) {
@@ -180,8 +194,7 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
   NewInstance instance(entry);
   std::int32_t code;
   {
-    std::unique_lock lock(create_mutex_, std::defer_lock);
-    if ((entry.thread_flags & ALIDADE_THREAD_INSTANCES) == 0) lock.lock();
+    const auto lock = LockShortly(create_mutex_);
     code = instance.Create(c, reader.host());
   }
   reader.Check();

@@ -139,8 +139,7 @@ class PluginHost {
   std::vector<PluginEntry> entries_;
   std::vector<std::string> searched_;
   std::vector<Refusal> refusals_;
-  /// Of what may not be created several at once; a source may create models.
-  mutable std::recursive_mutex create_mutex_;
+  mutable std::recursive_mutex create_mutex_;  ///< a source may create models
 };
 
 /// The remedy for a plugin that was built without optimisation.

@@ -378,7 +378,7 @@ typedef struct AlidadeInstance {
 
 /* Bits of AlidadeEntry.thread_flags. */
 enum {
-  ALIDADE_THREAD_INSTANCES = 1, /* several instances may be created and work at once */
+  ALIDADE_THREAD_INSTANCES = 1, /* several instances may work at once */
   ALIDADE_THREAD_CALLS = 2      /* one instance may be called from several threads at once */
 };
 

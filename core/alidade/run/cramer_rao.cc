@@ -125,7 +125,7 @@ bool CramerRaoBound::Add(const SourceFrame& frame) {
     loop_.Process(at_truth);
     lost_ = lost_ || (!all && f.report.landmarks.initialised > 0);
   }
-  lost_ = lost_ || LostOne(f.report) || f.said.ended || !MoveToTruth(frame.truth);
+  lost_ = lost_ || LostOne(f.report) || f.health.ended || !MoveToTruth(frame.truth);
   return !lost_;
 }
 

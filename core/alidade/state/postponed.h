@@ -10,11 +10,10 @@
 
 namespace alidade {
 
-/// The part b of a state that no measurement touches for a while, exactly
-/// [Guivant2001], [Knight2001].
-/// The part a that is left, the active one, is a filter by itself, of any cost but that of b; Phi
-/// lies there (Covariance::outside). What
-/// its steps and updates mean for b is kept in k numbers and a k x k matrix until it is asked for:
+/// The part b of a state that no measurement touches for a while, exactly [Guivant2001],
+/// [Knight2001]. The part a that is left, the active one, is a filter by itself, of any cost but
+/// that of b; Phi lies there (Covariance::outside). What its steps and updates mean for b is kept
+/// in k numbers and a k x k matrix until it is asked for:
 ///
 ///   P_ab = Phi Z,  P_bb = P0_bb - Z' Psi Z,  x_b = x0_b (+) Z' theta
 ///   S Z = P0_kb,  S S' = P0_kk: k are the rows of P0 that were active then, and those that became

@@ -5,10 +5,10 @@
 
 #include "alidade/state/covariance.h"
 
-/// The arithmetic of a filter of few states, with loops over the n states of constant length. P is
-/// column-major with leading dimension `ld`, its lower triangle authoritative; H is m x n dense
-/// row-major; P H' and K are n x m column-major; S (leading
-/// dimension `lds`), F and Q are row-major.
+/// The arithmetic of a filter of few states, with loops over the n states of constant length; what
+/// has no such loop serves filters of any size. P is column-major with leading dimension `ld`, its
+/// lower triangle authoritative; H is m x n dense row-major; P H' and K are n x m column-major; S
+/// (leading dimension `lds`), F and Q are row-major.
 namespace alidade::internal {
 
 inline constexpr int kSmall = 16;

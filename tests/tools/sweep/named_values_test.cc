@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+
 namespace alidade {
 namespace {
 
@@ -20,23 +22,23 @@ TEST(NamedValues, AreThoseOfTheMap) {
 }
 
 TEST(NamedValues, ShareTheNamesThatAreTheSame) {
-  const NamedValues<double> first(Map{{"a", 1.0}, {"b", 2.0}});
-  const NamedValues<double> second(Map{{"a", 3.0}, {"b", 4.0}}, first);
-  EXPECT_EQ(&second.names(), &first.names());
-  EXPECT_EQ(second.values(), (std::vector<double>{3.0, 4.0}));
+  SharedNames shared;
+  NamedValues<double> first(Map{{"a", 1.0}, {"b", 2.0}});
+  first.ShareNames(shared);
+  EXPECT_EQ(first.names(), (std::vector<std::string>{"a", "b"}));
   for (const Map& other : {Map{{"a", 3.0}}, Map{{"a", 3.0}, {"c", 4.0}},
                            Map{{"a", 3.0}, {"b", 4.0}, {"c", 5.0}}, Map{}}) {
-    NamedValues<double> third(other, first);
-    EXPECT_NE(&third.names(), &first.names());
-    EXPECT_EQ(third.names().size(), other.size());
-    EXPECT_FALSE(third.ShareNames(first));
-    EXPECT_EQ(third.names().size(), other.size());
+    NamedValues<double> row(other);
+    const std::vector<std::string> names = row.names();
+    row.ShareNames(shared);
+    EXPECT_NE(&row.names(), &first.names());
+    EXPECT_EQ(row.names(), names);
   }
-  NamedValues<double> made_apart(Map{{"a", 5.0}, {"b", 6.0}});
-  EXPECT_NE(&made_apart.names(), &first.names());
-  EXPECT_TRUE(made_apart.ShareNames(first));
-  EXPECT_EQ(&made_apart.names(), &first.names());
-  EXPECT_EQ(made_apart.values(), (std::vector<double>{5.0, 6.0}));
+  NamedValues<std::int64_t> same(std::map<std::string, std::int64_t>{{"a", 5}, {"b", 6}});
+  EXPECT_NE(&same.names(), &first.names());
+  same.ShareNames(shared);
+  EXPECT_EQ(&same.names(), &first.names());
+  EXPECT_EQ(same.values(), (std::vector<std::int64_t>{5, 6}));
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ FinishedRuns::FinishedRuns(OutputFolder& folder, const std::vector<std::filesyst
 void FinishedRuns::Read(const std::filesystem::path& file) {
   std::ifstream stream(file);
   Place place{file.string(), 0, 0};
+  SharedNames names;
   for (std::string line; std::getline(stream, line);) {
     if (stream.eof()) return;  // cut short
     ++place.line;
@@ -28,6 +29,7 @@ void FinishedRuns::Read(const std::filesystem::path& file) {
                                                 "a run as JSON; leave out --resume"));
     }
     const std::uint64_t seed = read->run.seed;
+    read->run.ShareNames(names);
     known_.try_emplace({read->value, seed}, Known{std::move(read->run), place});
   }
 }
@@ -37,16 +39,16 @@ const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uin
   return found == known_.end() ? nullptr : &found->second;
 }
 
-void FinishedRuns::Add(const std::string& line) {
+void FinishedRuns::Add(std::string line) {
   std::unique_lock lock(mutex_);
-  waiting_ += line;
+  waiting_.push_back(std::move(line));
   if (writing_) return;
   writing_ = true;
   while (!waiting_.empty()) {
-    const std::string lines = std::exchange(waiting_, {});
+    const std::vector<std::string> lines = std::exchange(waiting_, {});
     lock.unlock();
     if (!folder_.kept()) folder_.Keep();
-    file_->Write(lines);
+    for (const std::string& one : lines) file_->Write(one);
     file_->Flush();  // the next may take hours
     lock.lock();
   }

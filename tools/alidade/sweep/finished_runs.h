@@ -33,9 +33,9 @@ class FinishedRuns {
   /// How many were.
   std::size_t size() const { return known_.size(); }
   /// Adds the RunLine() of a run that came to its end; the folder is worth keeping from now on.
-  /// From any thread: one that writes already writes it too, so that none waits for the disk. After
-  /// an error nothing is written any more. Error: kIo.
-  void Add(const std::string& line);
+  /// From any thread: one that writes already writes it too, so that none waits for another. After
+  /// an error nothing is written any more. Errors: kCannotCreate, kIo.
+  void Add(std::string line);
   /// Error: kIo.
   void Close() { file_->Close(); }
 
@@ -44,9 +44,9 @@ class FinishedRuns {
 
   OutputFolder& folder_;
   std::map<std::pair<std::string, std::uint64_t>, Known> known_;
-  std::mutex mutex_;      ///< of the two below
-  std::string waiting_;   ///< lines to be written
-  bool writing_ = false;  ///< a thread is in Add that writes them, or was when that failed
+  std::mutex mutex_;                  ///< of the two below
+  std::vector<std::string> waiting_;  ///< lines to be written
+  bool writing_ = false;              ///< a thread is in Add that writes them, or failed there
   std::unique_ptr<OutputFile> file_;
 };
 

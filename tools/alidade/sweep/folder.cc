@@ -3,6 +3,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <unordered_map>
 
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
@@ -132,18 +134,16 @@ std::string SweepJson(const VariedSweep& sweep) {
 RunResult AllKeys(const Parts& parts) {
   RunResult all;
   EstimatorResult& keys = all.estimators.emplace_back();
-  const void *metrics = nullptr, *counts = nullptr;  // the names of the run before
+  std::set<const void*> seen;  // lists of names
+  const auto add = [&seen](const auto& row, auto& to) {
+    if (!seen.insert(&row.names()).second) return;
+    for (const std::string& name : row.names()) to[name];
+  };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
       for (const SweepEstimator& one : run.estimators) {
-        if (&one.metrics.names() != metrics) {
-          for (const std::string& name : one.metrics.names()) keys.metrics[name];
-        }
-        if (&one.counts.names() != counts) {
-          for (const std::string& name : one.counts.names()) keys.counts[name];
-        }
-        metrics = &one.metrics.names();
-        counts = &one.counts.names();
+        add(one.metrics, keys.metrics);
+        add(one.counts, keys.counts);
       }
     }
   }
@@ -166,21 +166,20 @@ class Columns {
   const std::vector<std::string>& names() const { return names_; }
   /// The cells of a row with those values, none of other names; null: it has none.
   const std::vector<const Value*>& Of(const NamedValues<Value>& row) {
-    if (&row.names() != row_names_) {
-      row_names_ = &row.names();
-      places_.clear();
-      for (const std::string& name : row.names()) places_.push_back(columns_.at(name));
-      cells_.assign(names_.size(), nullptr);
+    std::vector<std::size_t>& places = places_[&row.names()];
+    if (places.empty()) {
+      for (const std::string& name : row.names()) places.push_back(columns_.at(name));
     }
-    for (std::size_t i = 0; i < places_.size(); ++i) cells_[places_[i]] = &row.values()[i];
+    cells_.assign(names_.size(), nullptr);
+    for (std::size_t i = 0; i < places.size(); ++i) cells_[places[i]] = &row.values()[i];
     return cells_;
   }
 
  private:
   std::vector<std::string> names_;
-  std::map<std::string, std::size_t> columns_;           ///< by name
-  const std::vector<std::string>* row_names_ = nullptr;  ///< of the row before
-  std::vector<std::size_t> places_;                      ///< the columns of its values
+  std::map<std::string, std::size_t> columns_;  ///< by name
+  /// By list of names: the columns of its values.
+  std::unordered_map<const void*, std::vector<std::size_t>> places_;
   std::vector<const Value*> cells_;
 };
 

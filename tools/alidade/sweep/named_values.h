@@ -4,41 +4,48 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace alidade {
+
+/// Lists of names, each kept once.
+class SharedNames {
+ public:
+  using List = std::shared_ptr<const std::vector<std::string>>;
+
+  /// The first of those given that is the same.
+  const List& Of(const List& names) { return *lists_.insert(names).first; }
+
+ private:
+  struct Before {
+    bool operator()(const List& a, const List& b) const { return *a < *b; }
+  };
+  std::set<List, Before> lists_;
+};
 
 /// Values by name, in the order of the names. The runs of a sweep have the same names, mostly: they
 /// share one list of them, and a run is a row of numbers.
 template <class Value>
 class NamedValues {
  public:
-  using Names = std::vector<std::string>;
-
-  NamedValues() = default;
-  /// `like`: its names are shared where they are the same.
-  explicit NamedValues(const std::map<std::string, Value>& from, const NamedValues& like = {}) {
-    const auto is_named = [](const auto& one, const std::string& name) {
-      return one.first == name;
-    };
+  NamedValues() : NamedValues(std::map<std::string, Value>()) {}
+  explicit NamedValues(const std::map<std::string, Value>& from) {
+    std::vector<std::string> names;
+    names.reserve(from.size());
     values_.reserve(from.size());
-    for (const auto& [name, value] : from) values_.push_back(value);
-    if (std::ranges::equal(from, like.names(), is_named)) {
-      names_ = like.names_;
-      return;
+    for (const auto& [name, value] : from) {
+      names.push_back(name);
+      values_.push_back(value);
     }
-    Names names;
-    for (const auto& [name, value] : from) names.push_back(name);
-    names_ = std::make_shared<const Names>(std::move(names));
+    names_ = std::make_shared<const std::vector<std::string>>(std::move(names));
   }
 
   /// By address the same for all that share it.
-  const Names& names() const {
-    static const Names none;
-    return names_ == nullptr ? none : *names_;
-  }
+  const std::vector<std::string>& names() const { return *names_; }
   const std::vector<Value>& values() const { return values_; }
   /// Null: there is none of that name.
   const Value* Find(std::string_view name) const {
@@ -47,17 +54,11 @@ class NamedValues {
     return &values_[static_cast<std::size_t>(at - names().begin())];
   }
 
-  /// Whether both have the same names, which they share from now on.
-  bool ShareNames(const NamedValues& like) {
-    if (&names() == &like.names()) return true;
-    if (names() != like.names()) return false;
-    names_ = like.names_;
-    return true;
-  }
+  void ShareNames(SharedNames& with) { names_ = with.Of(names_); }
 
  private:
-  std::shared_ptr<const Names> names_;  ///< null: none
-  std::vector<Value> values_;           ///< by name
+  SharedNames::List names_;
+  std::vector<Value> values_;  ///< by name
 };
 
 }  // namespace alidade

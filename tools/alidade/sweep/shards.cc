@@ -124,9 +124,9 @@ void Order(std::vector<ShardFolder>& shards) {
                   (count > kShown ? " and " + std::to_string(count - kShown) + " more" : ""));
 }
 
-/// Adds the runs of a shard to `results`, which are by value.
+/// Adds the runs of a shard to `results`, which are by value; all share `names`.
 void AddRuns(const ShardFolder& one, const SeedRange& seeds, const std::vector<std::string>& values,
-             std::vector<SweepResult>& results) {
+             SharedNames& names, std::vector<SweepResult>& results) {
   const fs::path file = one.folder / kShardRuns;
   std::ifstream stream(file);
   if (!stream)
@@ -144,6 +144,7 @@ void AddRuns(const ShardFolder& one, const SeedRange& seeds, const std::vector<s
       if (std::getline(stream, line)) read = ReadRunLine(line);
       if (!read || read->value != values[v] || read->run.seed != seed)
         fail("is not the run of seed " + std::to_string(seed));
+      read->run.ShareNames(names);
       results[v].done.push_back(std::move(read->run));
     }
   }
@@ -182,8 +183,9 @@ std::vector<SweepResult> ReadResults(const std::vector<ShardFolder>& shards,
   } catch (const Json::exception&) {
   }
   if (results.size() != values.size()) FailData(file, "is not what a sweep of this version writes");
+  SharedNames names;
   for (const ShardFolder& one : shards) {
-    AddRuns(one, SeedsOf(one.shard, first_seed, runs), values, results);
+    AddRuns(one, SeedsOf(one.shard, first_seed, runs), values, names, results);
   }
   return results;
 }

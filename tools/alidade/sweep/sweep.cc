@@ -80,7 +80,7 @@ class Queue {
       options_.finished->Add(internal::RunLine(options_.value, run));
     }
     const std::lock_guard lock(mutex_);
-    ShareNames(run.estimators);
+    run.ShareNames(names_);
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
@@ -89,23 +89,6 @@ class Queue {
   /// Null: it was not.
   const internal::FinishedRuns::Known* FinishedBefore(std::uint64_t seed) const {
     return options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
-  }
-
-  /// All runs share the names of the newest that has others than the ones before.
-  void ShareNames(std::vector<SweepEstimator>& estimators) {
-    like_.resize(std::max(like_.size(), estimators.size()));
-    for (std::size_t i = 0; i < estimators.size(); ++i) {
-      SweepEstimator& one = estimators[i];
-      const bool same = one.metrics.ShareNames(like_[i].metrics) &&
-                        one.counts.ShareNames(like_[i].counts) &&
-                        one.units.ShareNames(like_[i].units);
-      if (!same) like_[i] = one;
-    }
-  }
-
-  std::vector<SweepEstimator> Like() {
-    const std::lock_guard lock(mutex_);
-    return like_;
   }
 
   /// For one thread: asking marks keys as read.
@@ -135,11 +118,7 @@ class Queue {
       run.code = result.code;
       run.reason = std::move(result.reason);
       run.withheld = !result.withheld.empty();
-      std::vector<SweepEstimator> like = Like();
-      like.resize(std::max(like.size(), result.estimators.size()));
-      for (const EstimatorResult& one : result.estimators) {
-        run.estimators.emplace_back(one, like[run.estimators.size()]);
-      }
+      for (const EstimatorResult& one : result.estimators) run.estimators.emplace_back(one);
       run.reprojection = reprojection.Take();
     } catch (...) {
       Failure failure = CaughtFailure();
@@ -158,7 +137,7 @@ class Queue {
   std::atomic<std::int64_t> next_{0};
   std::mutex mutex_;
   std::vector<SweepRun> done_;
-  std::vector<SweepEstimator> like_;  ///< by estimator: whose names they share
+  SharedNames names_;
   std::exception_ptr thrown_;
 };
 
@@ -252,8 +231,8 @@ class ValuesByName {
 
  private:
   std::map<std::string, std::vector<double>> values_;
-  const NamedValues<double>::Names* names_ = nullptr;  ///< of the row before
-  std::vector<std::vector<double>*> lists_;            ///< its places in values_
+  const std::vector<std::string>* names_ = nullptr;  ///< of the row before
+  std::vector<std::vector<double>*> lists_;          ///< its places in values_
 };
 
 void AddUnits(const NamedValues<std::string>& row, std::map<std::string, std::string>& units) {
@@ -266,7 +245,7 @@ SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
   SweepSummary summary;
   summary.name = name;
   ValuesByName values;
-  const NamedValues<std::string>::Names* units = nullptr;  // of the run before
+  const std::vector<std::string>* units = nullptr;  // of the run before
   for (const SweepRun& run : result.done) {
     for (const SweepEstimator& one : run.estimators) {
       if (one.name != name) continue;

@@ -52,13 +52,11 @@ struct FrameErrors {
 /// What became of one estimator in one run: of an EstimatorResult, what all runs together rest on.
 struct SweepEstimator {
   SweepEstimator() = default;
-  explicit SweepEstimator(const EstimatorResult& result) : SweepEstimator(result, {}) {}
-  /// Shares the names of another run's where they are the same.
-  SweepEstimator(const EstimatorResult& result, const SweepEstimator& like)
+  explicit SweepEstimator(const EstimatorResult& result)
       : name(result.name),
-        metrics(result.metrics, like.metrics),
-        counts(result.counts, like.counts),
-        units(result.units, like.units),
+        metrics(result.metrics),
+        counts(result.counts),
+        units(result.units),
         diverged(result.diverged),
         inconsistent(result.inconsistent),
         failed(result.failed) {}
@@ -82,6 +80,14 @@ struct SweepRun {
   std::vector<FrameErrors> reprojection = {};  ///< of a varied sweep, the first 500 frames
   bool withheld = false;                       ///< no reference to compare with, as in RunResult
 
+  /// With other runs.
+  void ShareNames(SharedNames& with) {
+    for (SweepEstimator& one : estimators) {
+      one.metrics.ShareNames(with);
+      one.counts.ShareNames(with);
+      one.units.ShareNames(with);
+    }
+  }
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
   bool Uses(const SweepEstimator& one) const { return status == RunStatus::kOk && !one.diverged; }
 };

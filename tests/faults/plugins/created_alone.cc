@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model that sees whether another one is created while it is.
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+#include "alidade/model/plugin.h"
+#include "probe.h"
+
+namespace {
+
+/// Fails where a second one comes.
+struct Alone : Probe {
+  explicit Alone(alidade::Params& p) : Probe(p) {
+    static std::atomic<int> inside{0};
+    bool alone = ++inside == 1;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    alone = alone && inside == 1;
+    --inside;
+    if (!alone) throw std::runtime_error("somebody came");
+  }
+};
+
+}  // namespace
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(Alone, "alone", "", ""))

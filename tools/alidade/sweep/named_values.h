@@ -54,6 +54,7 @@ class NamedValues {
     return &values_[static_cast<std::size_t>(at - names().begin())];
   }
 
+  /// Of several that have the same names all have one list then.
   void ShareNames(SharedNames& with) { names_ = with.Of(names_); }
 
  private:

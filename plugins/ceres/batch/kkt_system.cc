@@ -155,7 +155,7 @@ bool KktSystem::Linearise(const Eigen::VectorXd& z, double damping) {
   if (!LineariseLandmarks(z, false)) return false;
   if (BuildAnew()) return Linearise(z, damping);
   ChooseScale();
-  return std::isfinite(cost_);
+  return std::isfinite(step_.cost);
 }
 
 /// Whether there are more ties than it was built with.
@@ -202,7 +202,7 @@ bool KktSystem::LineariseStates(const Eigen::VectorXd& z, const Trajectory* abou
   term_ = 0;
   alpha_ = next_alpha_;
   z_ = z;
-  cost_ = 0.5 * z.squaredNorm();
+  step_.cost = 0.5 * z.squaredNorm();
   at_.resize(run_.epochs_.size());
   Point point;
   if (!nodes_.empty() && !run_.Begin(e.data(), nodes_.front().columns, point)) return false;
@@ -301,7 +301,7 @@ bool KktSystem::LinearisePlain(std::size_t k, bool about) {
     }
     const RobustLoss& loss = run_.SensorOf(factor).loss;
     const double d = r.norm(), root = std::sqrt(Weight(loss, d));
-    cost_ += Rho(loss, d);
+    step_.cost += Rho(loss, d);
     const Term& term = terms_[term_];
     j.resize(r.size(), 0);
     for (int i = 0; i < term.count; ++i) {
@@ -387,7 +387,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
     }
     const RobustLoss& loss = run_.SensorOf(factor).loss;
     const double d = r.norm(), root = std::sqrt(Weight(loss, d));
-    cost_ += Rho(loss, d);
+    step_.cost += Rho(loss, d);
     const auto a_y = a.rightCols(a.cols() - n);
     const bool here = landmark.first && landmark.first->epoch == epoch;
     const bool tied = point.anchored && !here && read > 0;

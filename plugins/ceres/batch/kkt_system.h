@@ -81,11 +81,11 @@ class KktSystem {
   /// Factorises and solves. False where a pivot is singular: a model or prior is not defined.
   bool Solve();
   struct Step {
+    double cost = 0.0;  ///< where it is linearised: Linearise knows it already
     Eigen::VectorXd dz;
     double decrement = 0.0;  ///< dz' (A + mu I) dz = -dz' grad phi
   };
   const Step& step() const { return step_; }  ///< the solution
-  double cost() const { return cost_; }       ///< where it is linearised
   /// The states that the step leads to, in the tangent.
   void Move(Trajectory& trajectory) const;
 
@@ -172,7 +172,7 @@ class KktSystem {
   std::vector<std::size_t> blocks_;
   std::size_t term_ = 0;  ///< next one
 
-  double damping_ = 0.0, cost_ = 0.0, alpha_ = 1.0, next_alpha_ = 1.0;
+  double damping_ = 0.0, alpha_ = 1.0, next_alpha_ = 1.0;
   Eigen::VectorXd z_, rhs_, solution_;
   Step step_;
   std::vector<Point> at_;  ///< by epoch: x; of frames inside a node S and offset too

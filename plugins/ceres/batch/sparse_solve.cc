@@ -77,7 +77,7 @@ bool SparseSolve::Solve(const std::function<bool()>& start) {
     return false;
   }
   failed_ = !Minimise();
-  const std::string cost = "cost " + internal::RoundedText(kkt_.cost(), 9) + ", " +
+  const std::string cost = "cost " + internal::RoundedText(kkt_.step().cost, 9) + ", " +
                            std::to_string(iterations_) + " iterations in " +
                            std::to_string(solves_) + (solves_ == 1 ? " solve: " : " solves: ");
   at_edge_ = TextOfEdge();
@@ -161,7 +161,7 @@ constexpr double kRounding = 1e-13;  // of the cost
 SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
   constexpr double kLinear = 0.75;  // gain ratio below which landmarks are settled on their own
   constexpr double kLeft = 1e-4;    // of what the step promises, to the next one
-  const double cost = kkt_.cost();
+  const double cost = kkt_.step().cost;
   Trial next;
   next.z = z_ + kkt_.step().dz;
   next.cost = CostAt(next.z);
@@ -200,7 +200,8 @@ std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
   trial.z = z_ + kkt_.step().dz - (dz + ds) * t;
   if (!trial.z.allFinite()) return {};
   trial.cost = CostAt(trial.z);
-  const double cost = kkt_.cost(), most = cost + kRounding * (1.0 + cost) - kEnough * predicted;
+  const double cost = kkt_.step().cost,
+               most = cost + kRounding * (1.0 + cost) - kEnough * predicted;
   return trial.cost && *trial.cost <= most ? std::optional(std::move(trial)) : std::nullopt;
 }
 
@@ -265,7 +266,7 @@ bool SparseSolve::Descend() {
   }
   for (int i = 0; i < options_.max_iterations; ++i) {
     HeedStop();
-    const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.step().decrement);
+    const double cost = kkt_.step().cost, decrement = std::max(0.0, kkt_.step().decrement);
     const double squared = kkt_.step().dz.squaredNorm();
     if (mu == 0.0) lengths.Take(std::sqrt(decrement));
     if (lengths.Rounded()) return EndUnsettled(lengths.left, End::kRounding);
@@ -312,7 +313,7 @@ bool SparseSolve::EndUnsettled(double left, End end) {
   const bool spent = end == End::kSpent;
   const std::string larger =
       "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do";
-  if (left <= kLong + 1e-6 * std::sqrt(2.0 * kkt_.cost()) && (!spent || run_.shape().robust)) {
+  if (left <= kLong + 1e-6 * std::sqrt(2.0 * kkt_.step().cost) && (!spent || run_.shape().robust)) {
     if (end == End::kRounding) {
       ended_ = "converged to rounding, by steps of " + internal::RoundedText(left, 2) + " sigma";
     }

@@ -80,7 +80,7 @@ struct SweepRun {
   std::vector<FrameErrors> reprojection = {};  ///< of a varied sweep, the first 500 frames
   bool withheld = false;                       ///< no reference to compare with, as in RunResult
 
-  /// With other runs.
+  /// Lets its estimators have one list of names with all that have the same, of other runs too.
   void ShareNames(SharedNames& with) {
     for (SweepEstimator& one : estimators) {
       one.metrics.ShareNames(with);

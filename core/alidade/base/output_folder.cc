@@ -385,36 +385,30 @@ void OutputFolder::Remove(const std::string& name) const {
   fs::remove_all(partial_ / name, ignored);
 }
 
-std::vector<std::string> OutputFolder::Names() const {
+std::vector<std::string> OutputFolder::Contents(const std::string& scratch) const {
   std::vector<std::string> names;
   std::error_code error;
   fs::recursive_directory_iterator entry(partial_, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
-    names.push_back(entry->path().lexically_relative(partial_).string());
+    std::string name = entry->path().lexically_relative(partial_).string();
+    if (name != kMarker && name != kKeep && name != scratch) names.push_back(std::move(name));
   }
   if (error) FailIo(shown_.string(), "read", error.value());
   return names;
 }
 
-void OutputFolder::WriteList(const std::string& scratch) const {
-  std::vector<std::string> names = {kList};
-  for (const std::string& name : Names()) {
-    if (name != kMarker && name != kKeep && name != scratch) names.push_back(name);
-  }
+void OutputFolder::ListAndSync(std::vector<std::string> names) const {
+  names.push_back(kList);
   std::sort(names.begin(), names.end());
   std::string text;
   for (const std::string& name : names) text += name + '\n';
   Write(kList, text);
-}
-
-void OutputFolder::SyncAll() const {
-  for (const std::string& name : Names()) Sync(partial_ / name, Shown(name));
+  for (const std::string& name : names) Sync(partial_ / name, Shown(name));
   Sync(partial_, shown_.string());
 }
 
 void OutputFolder::Commit(const std::string& scratch) {
-  WriteList(scratch);
-  SyncAll();
+  ListAndSync(Contents(scratch));
   const FolderLock lock(target_.parent_path());
   CheckTarget({});
   const fs::path old = Exists(target_) ? MoveAway() : fs::path();

@@ -71,10 +71,10 @@ class OutputFolder {
   std::filesystem::path MoveAway() const;
   void MakeParents();
   std::filesystem::path Sibling(const char* kind) const;
-  /// Of all files and folders in it, at any depth.
-  std::vector<std::string> Names() const;
-  void WriteList(const std::string& scratch) const;
-  void SyncAll() const;
+  /// The files and folders in it, at any depth, but for its marks and `scratch`.
+  std::vector<std::string> Contents(const std::string& scratch) const;
+  /// Writes the list of `names`, and syncs them with it.
+  void ListAndSync(std::vector<std::string> names) const;
 
   std::filesystem::path shown_;   ///< as given
   std::filesystem::path target_;  ///< absolute, behind links

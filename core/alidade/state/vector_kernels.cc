@@ -262,7 +262,14 @@ struct Loops {
     for (; j + kColumns <= first + count; j += kColumns) {
       SolveColumns<kHeight, kColumns>(j, k, last, l, ldl, panel);
     }
-    for (; j + 2 <= first + count; j += 2) SolveColumns<kHeight, 2>(j, k, last, l, ldl, panel);
+    if (j + 4 <= first + count) {
+      SolveColumns<kHeight, 4>(j, k, last, l, ldl, panel);
+      j += 4;
+    }
+    if (j + 2 <= first + count) {
+      SolveColumns<kHeight, 2>(j, k, last, l, ldl, panel);
+      j += 2;
+    }
     if (j < first + count) SolveColumns<kHeight, 1>(j, k, last, l, ldl, panel);
   }
 
@@ -609,19 +616,41 @@ struct Loops {
     }
   }
 
-  /// Puts L of A = L L' in place of the lower triangle of A, kColumns square and by columns; false
-  /// where that is not finite and positive.
-  [[gnu::always_inline]] static bool FactoriseOwn(double* a) {
+  /// The compiler would keep what is stored in registers for whoever loads it next, so many that it
+  /// has none left for the loop before (a quarter of the time of a factorisation).
+  [[gnu::always_inline]] static void EmptyRegisters() {
+#if defined(__x86_64__)
+    asm volatile("" ::: "memory");
+#endif
+  }
+
+  /// L of A = L L', kColumns square; of A the lower triangle is read. False where a pivot is not
+  /// positive, or has no finite reciprocal.
+  [[gnu::always_inline]] static bool FactoriseOwn(const double* a, long lda, double* l) {
+    constexpr int kHeight = kColumns / kLanes;
+    constexpr double kLeast = std::numeric_limits<double>::min();
+    Vector x[kColumns][kHeight];
+#pragma GCC unroll 8
+    for (int c = 0; c < kColumns; ++c) {
+#pragma GCC unroll 8
+      for (int v = 0; v < kHeight; ++v) x[c][v] = Load(a + c * lda + v * kLanes);
+    }
+#pragma GCC unroll 8
     for (int j = 0; j < kColumns; ++j) {
-      double& pivot = a[j + j * kColumns];
-      if (!(pivot > 0.0 && pivot <= std::numeric_limits<double>::max())) return false;
-      pivot = std::sqrt(pivot);
+      const double pivot = x[j][j / kLanes][j % kLanes];
+      if (!(pivot >= kLeast && pivot <= 1.0 / kLeast)) return false;
+      // The next pivot waits for this division alone, not for the root.
       const double reciprocal = 1.0 / pivot;
-      for (int i = j + 1; i < kColumns; ++i) a[i + j * kColumns] *= reciprocal;
+#pragma GCC unroll 8
       for (int c = j + 1; c < kColumns; ++c) {
-        for (int i = c; i < kColumns; ++i) {
-          a[i + c * kColumns] -= a[i + j * kColumns] * a[c + j * kColumns];
-        }
+        const double factor = x[j][c / kLanes][c % kLanes] * reciprocal;
+#pragma GCC unroll 8
+        for (int v = 0; v < kHeight; ++v) x[c][v] -= x[j][v] * factor;
+      }
+      const double root = std::sqrt(pivot);
+#pragma GCC unroll 8
+      for (int v = 0; v < kHeight; ++v) {
+        Store(l + j * kColumns + v * kLanes, x[j][v] * (root * reciprocal));
       }
     }
     return true;
@@ -641,11 +670,9 @@ struct Loops {
         // Of its own columns the panel has the rows of L itself.
         double* const own = panel + j * kRows;
         SubtractColumns<kVectors, kColumns>(0, j, panel + j - at, kRows, panel, own);
+        EmptyRegisters();
         double l[kColumns * kColumns];
-        for (int c = 0; c < kColumns; ++c) {
-          for (int i = 0; i < kColumns; ++i) l[i + c * kColumns] = own[j - at + i + c * kRows];
-        }
-        if (!FactoriseOwn(l)) return false;
+        if (!FactoriseOwn(own + j - at, kRows, l)) return false;
         DivideColumns<kVectors, kColumns>(l, kColumns, own);
       }
       for (long k = 0; k < end; ++k) {

@@ -117,8 +117,11 @@ struct Loops {
           for (int v = 0; v < kVectors; ++v) Store(to + v * kLanes, Load(from + v * kLanes));
           continue;
         }
+        if (count < kRows) {
+#pragma GCC unroll 8
+          for (int v = 0; v < kVectors; ++v) Store(to + v * kLanes, Vector{});
+        }
         for (long r = 0; r < count; ++r) to[r] = from[r * steps.row_step];
-        for (long r = count; r < kRows; ++r) to[r] = 0.0;
       }
     }
   }

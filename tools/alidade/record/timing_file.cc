@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/timing_file.h"
 
+#include <utility>
+
 #include "alidade/base/number_text.h"
 
 namespace alidade::internal {
@@ -39,8 +41,9 @@ void TimingFile::AddTime(int estimator, double wall_s) {
 }
 
 void TimingFile::EndRow() {
-  if (timestamp_ == kNoTimestamp) return;
-  file_.Time(timestamp_);
+  const Timestamp timestamp = std::exchange(timestamp_, kNoTimestamp);  // once, also where it fails
+  if (timestamp == kNoTimestamp) return;
+  file_.Time(timestamp);
   for (std::optional<double>& cell : row_) {
     cell ? file_.Number(*cell) : file_.Empty();
     cell.reset();
@@ -50,7 +53,6 @@ void TimingFile::EndRow() {
 
 void TimingFile::Close() {
   EndRow();
-  timestamp_ = kNoTimestamp;
   file_.Close();
 }
 

@@ -45,7 +45,7 @@ void ReadShard(const std::string& text, SweepOptions& options) {
   const auto read = [](const std::string& part, int& number) {
     const char* const end = part.data() + part.size();
     const auto [rest, error] = std::from_chars(part.data(), end, number);
-    return error == std::errc() && rest == end;
+    return error == std::errc() && rest == end && !part.starts_with('0');
   };
   const std::size_t slash = text.find('/');
   Shard& shard = options.shard.emplace();

@@ -121,6 +121,22 @@ TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ExpectRefused({"s1", "s2"}, "s2: is not of the same sweep as s1: build of program: now ");
 }
 
+TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
+  ASSERT_EQ(Sweep("s1", "1/2").code, 0);
+  if (Contains(Read("s1/inputs.json"), "\"kernels\": \"baseline\"")) {
+    GTEST_SKIP() << "this processor has no others";
+  }
+  before_ = "export ALIDADE_KERNELS=baseline";
+  ASSERT_EQ(Sweep("s2", "2/2").code, 0);
+  ExpectRefused({"s1", "s2"}, "s2: is not of the same sweep as s1: kernels: now 'baseline', was ");
+  before_ = "export ALIDADE_KERNELS=none";
+  const Outcome none = Sweep("s3", "2/2");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_TRUE(Contains(none.err, "environment variable ALIDADE_KERNELS: 'none' is none of"))
+      << none.err;
+  EXPECT_FALSE(Exists("s3"));
+}
+
 TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   ASSERT_EQ(Sweep("whole", "").code, 0);

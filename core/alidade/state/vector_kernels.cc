@@ -804,7 +804,7 @@ const VectorKernels& BestVectorKernels() {
   static const VectorKernels& best = []() -> const VectorKernels& {
     const std::span<const VectorKernels> all = AllVectorKernels();
     const char* const asked = std::getenv("ALIDADE_KERNELS");
-    if (asked == nullptr) return all.back();
+    if (asked == nullptr || *asked == '\0') return all.back();
     std::string names;
     for (const VectorKernels& kernels : all) {
       if (std::string_view(asked) == kernels.name) return kernels;

@@ -134,7 +134,7 @@ TEST(RunInputs, WhatIsNoRecordIsRefused) {
 
 TEST(BuildIds, NameTheProgramAndTheLibrariesThatCompute) {
   const auto ids = BuildIds();
-  for (const char* name : {"program", "processor"}) {
+  for (const char* name : {"program", "processor", "kernels"}) {
     ASSERT_TRUE(ids.contains(name));
     EXPECT_NE(ids.at(name), "") << name;
   }

@@ -12,6 +12,7 @@
 
 #include "alidade/base/sha256.h"
 #include "alidade/host/instruction_sets.h"
+#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -73,6 +74,7 @@ std::map<std::string, std::string> BuildIds() {
   };
   dl_iterate_phdr(add, &ids);
   ids["processor"] = InstructionSetNames(InstructionSetsOfProcessor());
+  ids["kernels"] = BestVectorKernels().name;
   return ids;
 }
 

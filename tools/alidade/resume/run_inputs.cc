@@ -136,7 +136,8 @@ Facts FactsIn(const Json& json) {
   facts["plugin paths"] = Join(json.at("plugin_paths").get<std::vector<std::string>>(), ":");
   facts["config"] = json.at("config").at("sha256").get<std::string>();
   for (const auto& [name, id] : json.at("build").items()) {
-    facts[(name == "processor" ? "" : "build of ") + name] = id.get<std::string>();
+    const bool of_machine = name == "processor" || name == "kernels";
+    facts[(of_machine ? "" : "build of ") + name] = id.get<std::string>();
   }
   for (const char* const kind : {"plugin", "data"}) {
     for (const Json& one : json.at(kind == std::string("data") ? "data" : "plugins")) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/sweep/finished_runs.h"
 
+#include <cerrno>
 #include <fstream>
 #include <utility>
 
@@ -18,6 +19,7 @@ FinishedRuns::FinishedRuns(OutputFolder& folder, const std::vector<std::filesyst
 
 void FinishedRuns::Read(const std::filesystem::path& file) {
   std::ifstream stream(file);
+  if (!stream && errno != ENOENT) FailIo(file.string(), "read", errno);
   Place place{file.string(), 0, 0};
   SharedNames names;
   for (std::string line; std::getline(stream, line);) {
@@ -32,6 +34,7 @@ void FinishedRuns::Read(const std::filesystem::path& file) {
     read->run.ShareNames(names);
     known_.try_emplace({read->value, seed}, Known{std::move(read->run), place});
   }
+  if (stream.bad()) FailIo(file.string(), "read", EIO);
 }
 
 const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uint64_t seed) const {

@@ -88,8 +88,9 @@ TEST_F(SweepCli, SharesMakeTheWhole) {
 
 TEST_F(SweepCli, RefusesWhatIsNoShare) {
   // 4294967297 is 1 in 32 bits.
-  for (const std::string shard : {"4294967297/4294967297", "1/99999999999999999999", "01/1", "1/01", "1/", "/2",
-                                  "1", "", "0/2", "3/2", "1/2/3", "1/2x", " 1/2", "-1/2"}) {
+  for (const std::string shard :
+       {"4294967297/4294967297", "1/99999999999999999999", "01/1", "1/01", "1/", "/2", "1", "",
+        "0/2", "3/2", "1/2/3", "1/2x", " 1/2", "-1/2"}) {
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--shard=" + shard});
     EXPECT_EQ(sweep.code, 2) << shard;
   }

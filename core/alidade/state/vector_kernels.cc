@@ -628,10 +628,9 @@ struct Loops {
   }
 
   /// L of A = L L', kColumns square; of A the lower triangle is read. False where a pivot is not
-  /// positive, or has no finite reciprocal.
+  /// finite and positive.
   [[gnu::always_inline]] static bool FactoriseOwn(const double* a, long lda, double* l) {
     constexpr int kHeight = kColumns / kLanes;
-    constexpr double kLeast = std::numeric_limits<double>::min();
     Vector x[kColumns][kHeight];
 #pragma GCC unroll 8
     for (int c = 0; c < kColumns; ++c) {
@@ -641,19 +640,18 @@ struct Loops {
 #pragma GCC unroll 8
     for (int j = 0; j < kColumns; ++j) {
       const double pivot = x[j][j / kLanes][j % kLanes];
-      if (!(pivot >= kLeast && pivot <= 1.0 / kLeast)) return false;
-      // The next pivot waits for this division alone, not for the root.
-      const double reciprocal = 1.0 / pivot;
+      if (!(pivot > 0.0 && pivot <= std::numeric_limits<double>::max())) return false;
+      const double root = std::sqrt(pivot), reciprocal = 1.0 / root;
+#pragma GCC unroll 8
+      for (int v = 0; v < kHeight; ++v) x[j][v] *= reciprocal;
+      x[j][j / kLanes][j % kLanes] = root;
+#pragma GCC unroll 8
+      for (int v = 0; v < kHeight; ++v) Store(l + j * kColumns + v * kLanes, x[j][v]);
 #pragma GCC unroll 8
       for (int c = j + 1; c < kColumns; ++c) {
-        const double factor = x[j][c / kLanes][c % kLanes] * reciprocal;
+        const double factor = x[j][c / kLanes][c % kLanes];
 #pragma GCC unroll 8
         for (int v = 0; v < kHeight; ++v) x[c][v] -= x[j][v] * factor;
-      }
-      const double root = std::sqrt(pivot);
-#pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) {
-        Store(l + j * kColumns + v * kLanes, x[j][v] * (root * reciprocal));
       }
     }
     return true;

@@ -30,7 +30,7 @@ struct VectorKernels {
                   double* y, long ldy);
 
   /// Puts L of a symmetric S = L L', m x m by columns, in place of its lower triangle; false unless
-  /// that is finite and positive definite, with pivots between 2^-1022 and 2^1022.
+  /// that is finite and positive definite.
   bool (*factorise)(long m, double* s, long lds);
 
   long panel_rows;  ///< the height of the panels of what follows

@@ -144,5 +144,25 @@ TEST(FinishedRuns, ALineThatWasCutIsNoneAndAnyOtherIsRefused) {
   }
 }
 
+TEST(FinishedRuns, NoneIsFinishedWhereThereIsNoFileButNotWhereItCannotBeRead) {
+  const testing::TemporaryFolder temporary;
+  for (const char* name : {"none", "folder", "loop"}) {
+    std::filesystem::create_directory(temporary / name);
+  }
+  std::filesystem::create_directory(temporary / "folder/finished_runs.jsonl");
+  std::filesystem::create_symlink("finished_runs.jsonl", temporary / "loop/finished_runs.jsonl");
+  OutputFolder folder(temporary / "out", false);
+  EXPECT_EQ(FinishedRuns(folder, {temporary / "none"}).size(), 0u);
+  for (const char* name : {"folder", "loop"}) {
+    OutputFolder other(temporary / "other", false);
+    try {
+      const FinishedRuns runs(other, {temporary / name});
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kIo) << error.what();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace alidade::internal

@@ -9,7 +9,6 @@
 #include "alidade/bundle/bundle_folder.h"
 #include "command.h"
 #include "console.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -137,9 +136,7 @@ ExitCode CodeOf(BundleEnd end) {
 ExitCode RunBundle(const BundleArguments& arguments) {
   KeepInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
                                 arguments.tracks.start.string()});
-  ReportCrashes();
   const PluginHost host(Absolute(arguments.plugin_paths));
-  const Watchdog watchdog;
   StopOnSignals();
   std::optional<BundleFolder> folder;
   if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);
@@ -166,7 +163,6 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
   const BundleResult result = AdjustBundle(sensor, file.problem, options);
   progress.Clear();
-  FinishOnSignals();
   const double after = BundleRms(sensor, file.problem);
 
   std::string text = Describe(file, left_out) + '\n';

@@ -139,7 +139,6 @@ ExitCode Check(const CheckArguments& arguments) {
     for (const fs::path& path : PluginPaths(*config)) places.push_back(fs::absolute(path));
   }
   for (const fs::path& path : Absolute(arguments.plugin_paths)) places.push_back(path);
-  ReportCrashes();
   const PluginHost host(places);
   const auto entries = FindModels(host, arguments.plugin, arguments.model);
   const bool failed = config ? AnyFails(host, entries, *config, arguments.options)

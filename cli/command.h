@@ -11,6 +11,7 @@
 
 #include "alidade/config/config.h"
 #include "alidade/host/plugin_host.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/run/run.h"
 
 /// The commands of the program. Each one reads its arguments, calls core and prints.
@@ -48,6 +49,11 @@ struct Input {
   PluginHost Host(const Config& config) const;
   /// Of the usual places those alone that `config`, or one of `others`, may need.
   PluginHost HostFor(const Config& config, const std::vector<Config>& others = {}) const;
+  /// The text of inputs.json for a command with these arguments, as internal::CommandInputs has
+  /// them; `runs` are the configs of its runs, `plugins` those that they use.
+  std::string InputsText(const Config& config, const std::vector<std::string>& arguments,
+                         const std::vector<Config>& runs,
+                         const internal::PluginHashes& plugins) const;
 };
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
@@ -65,14 +71,14 @@ std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& path
 std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most);
 std::function<std::string(const std::string&)> IsNumber(double least, double most);
 
-/// Says that a sweep was stopped.
-void TellStopped(std::size_t done, std::int64_t runs);
+/// Reports that a sweep was stopped, and `more`.
+void TellStopped(std::size_t done, std::int64_t runs, const std::string& more = "");
 
 /// Absolute, links followed as far as they can be: the same for two names of one file.
 std::filesystem::path Resolved(const std::string& path);
 
-/// Refuses an output that is, or holds, what the command reads: --force would remove it. Paths may
-/// be empty. Error: kCannotCreate.
+/// Refuses an output that, with its `.partial`, is or holds what the command reads: --force would
+/// remove it. Paths may be empty. Error: kCannotCreate.
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
 
 /// Where output goes, and where it would if nothing were there.
@@ -81,7 +87,8 @@ struct Output {
 };
 /// Named is `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name of the
 /// config: of its folder where it is called config.yaml, else of the file. If nothing is given, and
-/// that exists without `force`, the folder is the first of NAME-2, NAME-3, ... that does not.
+/// that or its `.partial` exists without `force`, the folder is the first of NAME-2, NAME-3, ... of
+/// which neither does.
 /// Errors: kCannotCreate where `given` is runs/ itself, or it would replace the config or what that
 /// reads; kNotTrusted, kBadConfig.
 Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,

@@ -11,12 +11,10 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/record/recorder.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/processors.h"
 #include "command.h"
 #include "console.h"
-#include "resume.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -39,7 +37,6 @@ struct CompareArguments {
   std::vector<std::string> of;  ///< a config, or folders
   std::string folder;
   std::optional<std::uint64_t> seed;
-  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
   SweepOptions sweep;
   CompareOptions options;
   bool all = false;
@@ -140,13 +137,12 @@ class Forecast {
 };
 
 ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compared,
-                    const PluginHost& host, const fs::path& folder, Watchdog& watchdog) {
+                    const PluginHost& host, const fs::path& folder) {
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
   record.covariances = true;
   record.plugins = internal::HashesOf(internal::PluginsNamed({compared.config}, host));
   Recorder recorder(record, compared.config);
-  TellIfCrashed(recorder.partial());
   RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -157,17 +153,15 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
     progress.Show(done, total);
   };
   options.stop = StopRequested;
-  const RunResult result = WithWhatIsKept(
-      recorder, [&] { return watchdog.Run(compared.experiment, options, &recorder); });
+  const RunResult result = Run(compared.experiment, options);
   progress.Clear();
-  FinishOnSignals();
   CompareOptions of_run = arguments.options;
   of_run.filter = compared.filter;
   Comparison comparison;
   try {
     comparison = comparer.Finish(result, of_run);
   } catch (const Error&) {  // the run is kept, with its own reason where it has one
-    WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
+    recorder.Finish(result);
     if (result.status == RunStatus::kOk) throw;
     if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
     if (result.status == RunStatus::kStopped) PrintNote(result.reason);
@@ -181,10 +175,8 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
     }
   }
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
-  WithWhatIsKept(recorder, [&] {
-    AddFiles(recorder, comparison);
-    recorder.Finish(result);
-  });
+  AddFiles(recorder, comparison);
+  recorder.Finish(result);
   Report(comparison, arguments, folder);
   if (result.status == RunStatus::kStopped) {
     PrintNote(result.reason);
@@ -196,7 +188,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
 }
 
 ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExperiment& compared,
-                          const PluginHost& host, const fs::path& folder, Watchdog& watchdog) {
+                          const PluginHost& host, const fs::path& folder) {
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.sweep;
   if (arguments.seed) options.first_seed = *arguments.seed;
@@ -207,9 +199,6 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
     progress.Show(done, total);
   };
   options.stop = StopRequested;
-  options.run = [&](Experiment& experiment, const RunOptions& given) {
-    return watchdog.Run(experiment, given);
-  };
   SweepFolder out(folder, arguments.force);
   ComparedSeeds seeds = CompareSeeds(compared, host, options, arguments.options);
   progress.Clear();
@@ -242,13 +231,11 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, input, arguments.force, "compare-");
   const PluginHost host = input.Host(config);
-  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
   if (!arguments.quiet) TellOutput(output);
-  return arguments.options.over_seeds
-             ? CompareOverSeeds(arguments, compared, host, output.folder, watchdog)
-             : CompareRun(arguments, compared, host, output.folder, watchdog);
+  return arguments.options.over_seeds ? CompareOverSeeds(arguments, compared, host, output.folder)
+                                      : CompareRun(arguments, compared, host, output.folder);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {
@@ -279,7 +266,7 @@ bool AreFolders(const std::vector<std::string>& of) {
 /// Of finished runs.
 void CheckOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
-                             "--allow-outside", "--figures", "--frame-timeout", "--budget"}) {
+                             "--allow-outside", "--figures", "--budget"}) {
     if (command.count(option) == 0) continue;
     throw CLI::ValidationError(option, "a finished run is not run again; expected a config");
   }
@@ -330,7 +317,6 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
             "folder; default of a config: its `output:`, or compare-NAME, in runs/; of folders: "
             "none is written");
   command.add_flag("--force", arguments.force, "replace the folder if it is there");
-  AddFrameTimeout(command, arguments.frame_timeout_s);
   command.add_flag("--all", arguments.all, "print all rows of the tables");
   command.add_flag("--json", arguments.json, "print all values as JSON");
   command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")

@@ -10,9 +10,8 @@
 
 namespace alidade::cli {
 
-/// Makes the three standard descriptors safe to use: one that is closed becomes one that fails, so
-/// that no file of ours takes its number. A write to a closed pipe, or beyond the limit of a file,
-/// is an error, not a signal.
+/// A write to a closed pipe, or beyond the size limit of a file, becomes an error instead of a
+/// signal that ends the process.
 void PrepareConsole();
 
 /// Writes to standard output, every byte checked. Error: kIo.
@@ -47,18 +46,9 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// From now on a crash, or an exit of the process before FinishOnSignals(), says that it was inside
-/// a model or estimator; a crash then takes its course, an exit ends with kPlugin, as does a stop
-/// (SIGSTOP) that the process would send itself. To be called before plugins are loaded.
-void ReportCrashes();
-
-/// From now on these words end with the place of what was recorded, while `folder` is there.
-void TellIfCrashed(const std::string& folder);
-
-/// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.
+/// From now on SIGINT, SIGTERM and SIGHUP request the command to stop; a second one ends the
+/// process at once.
 void StopOnSignals();
 bool StopRequested();
-/// From now on a second signal ends nothing: what is done is written to the end.
-void FinishOnSignals();
 
 }  // namespace alidade::cli

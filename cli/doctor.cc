@@ -104,7 +104,6 @@ void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
 }
 
 void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
-  ReportCrashes();
   const PluginHost host(Absolute(paths), OnRefusal::kList);
   for (const std::string& place : host.searched()) diagnosis.Ok("searched " + place);
   for (const Refusal& refusal : host.refusals()) {

@@ -7,7 +7,6 @@
 
 #include "command.h"
 #include "console.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -18,7 +17,6 @@ constexpr const char* kExplainFooter = R"(Example:
 ExitCode ExplainConfig(const Input& input) {
   const Config config = input.Load();
   const PluginHost host = input.Host(config);
-  const Watchdog watchdog;
   Print(Explain(config, BuildExperiment(config, host)));
   return ExitCode::kOk;
 }

@@ -7,6 +7,8 @@
 #include <new>
 #include <set>
 
+#include "alidade/base/output_folder.h"
+#include "alidade/host/plugin_file.h"
 #include "command.h"
 #include "console.h"
 
@@ -145,20 +147,28 @@ std::vector<fs::path> PlacesOf(const Input& input, const Config& loaded) {
 
 }  // namespace
 
-PluginHost Input::Host(const Config& loaded) const {
-  ReportCrashes();
-  return PluginHost(PlacesOf(*this, loaded));
-}
+PluginHost Input::Host(const Config& loaded) const { return PluginHost(PlacesOf(*this, loaded)); }
 
 PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& others) const {
-  ReportCrashes();
   std::set<std::string> words = WordsOf(loaded);
   for (const Config& other : others) words.merge(WordsOf(other));
   return PluginHost(PlacesOf(*this, loaded), OnRefusal::kThrow, words);
 }
 
-void TellStopped(std::size_t done, std::int64_t runs) {
-  PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs");
+std::string Input::InputsText(const Config& loaded, const std::vector<std::string>& arguments,
+                              const std::vector<Config>& runs,
+                              const internal::PluginHashes& plugins) const {
+  internal::CommandInputs command{arguments, {}, internal::PluginFoldersOfEnvironment()};
+  for (const fs::path& path : Absolute(plugin_paths)) {
+    if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())
+      command.plugin_paths.push_back(path);
+  }
+  return internal::InputsJson(command, loaded, runs, plugins);
+}
+
+void TellStopped(std::size_t done, std::int64_t runs, const std::string& more) {
+  PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs" +
+            more);
 }
 
 fs::path Resolved(const std::string& path) {
@@ -170,11 +180,13 @@ fs::path Resolved(const std::string& path) {
 
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs) {
   if (output.empty()) return;
-  const fs::path taken = Resolved(output);
+  const fs::path taken = Resolved(output), partial = internal::PartialOf(taken);
+  const auto lies_in = [](const fs::path& path, const fs::path& folder) {
+    return std::ranges::mismatch(folder, path).in1 == folder.end();
+  };
   for (const std::string& input : inputs) {
     const fs::path path = input.empty() ? fs::path() : Resolved(input);
-    if (std::mismatch(taken.begin(), taken.end(), path.begin(), path.end()).first != taken.end())
-      continue;
+    if (!lies_in(path, taken) && !lies_in(path, partial)) continue;
     throw Error(ExitCode::kCannotCreate, ErrorLine(Place{output}, {},
                                                    std::string(path == taken ? "is" : "holds") +
                                                        " the input '" + input + "'",
@@ -203,11 +215,12 @@ fs::path NamedFolder(const std::string& given, const Config& config, const Input
   return fs::path(kRuns) / (prefix + NameOf(input.config));
 }
 
-/// `folder`, or the first of FOLDER-2, FOLDER-3, ... that does not exist.
+/// `folder`, or the first of FOLDER-2, FOLDER-3, ... that neither exists nor is being written.
 fs::path FreeFolder(const fs::path& folder) {
   const auto is_there = [](const fs::path& path) {
     std::error_code error;
-    return fs::exists(fs::symlink_status(path, error));
+    return fs::exists(fs::symlink_status(path, error)) ||
+           fs::exists(fs::symlink_status(internal::PartialOf(path), error));
   };
   fs::path free = folder;
   for (int n = 2; is_there(free); ++n) free = folder.string() + '-' + std::to_string(n);
@@ -226,9 +239,11 @@ Output OutputFolder(const std::string& given, const Config& config, const Input&
 
 void TellOutput(const Output& output) {
   if (output.folder == output.named) return;
-  const std::string named = output.named.string();
-  PrintNote(named + " exists: the output is " + output.folder.string() + " (--force replaces " +
-            named + ')');
+  std::error_code error;
+  const bool is_there = fs::exists(fs::symlink_status(output.named, error));
+  const fs::path taken = is_there ? output.named : internal::PartialOf(output.named);
+  PrintNote(taken.string() + " exists: the output is " + output.folder.string() +
+            " (--force replaces " + taken.string() + ')');
 }
 
 }  // namespace alidade::cli

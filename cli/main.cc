@@ -216,7 +216,5 @@ int main(int argc, char** argv) {
   // below a fatal error. What the solver reports is in its results. A value set by the user stays.
   setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
-  const alidade::ExitCode code = alidade::cli::Guarded(argc, argv);
-  alidade::cli::FinishOnSignals();
-  return static_cast<int>(code);
+  return static_cast<int>(alidade::cli::Guarded(argc, argv));
 }

@@ -6,7 +6,6 @@
 #include "alidade/inspect/plugin_listing.h"
 #include "command.h"
 #include "console.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -37,9 +36,7 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
   command.footer(kPluginsFooter);
   command.callback([&action, arguments, listing, on_refusal] {
     action = [arguments, listing, on_refusal] {
-      ReportCrashes();
       const PluginHost host(Absolute(arguments->paths), on_refusal);
-      const Watchdog watchdog;
       Print(listing(host, *arguments));
       return ExitCode::kOk;
     };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 
 #include <stdlib.h>
 
@@ -82,7 +82,6 @@ ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& fol
     folders += (folders.empty() ? "" : ":") + path.string();
   }
   ::setenv("ALIDADE_PLUGIN_PATH", folders.c_str(), 1);
-  words.insert(words.end(), {"--frame-timeout", "none"});
   return execute(words);
 }
 

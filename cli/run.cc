@@ -12,14 +12,11 @@
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/run/metric_rows.h"
-#include "alidade/sweep/sweep_config.h"
 #include "command.h"
 #include "console.h"
-#include "resume.h"
 #include "video_name.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -29,13 +26,11 @@ constexpr const char* kRunFooter = R"(Examples:
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
-  alidade run config.yaml -o runs/b --resume       after a crash, a full disk, a signal
   alidade run images.yaml --save-video run.avi     what a person sees: features, gates, the estimate
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
-Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
-figures are drawn it leaves out the rest of them. --resume computes all frames again, and compares
-their rows with what is there.)";
+DIR is DIR.partial until the run ends. Ctrl-C finishes the frame, writes all that is done and ends
+with exit code 75; twice: at once. While figures are drawn it leaves out the rest of them.)";
 
 struct RunArguments {
   std::string command;  ///< the whole line
@@ -43,9 +38,8 @@ struct RunArguments {
   std::string folder;
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
-  bool follow = false, resume = false, view = false;
+  bool follow = false, view = false;
   std::string video;
-  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
 };
 
 /// Events of one estimator and one kind.
@@ -137,8 +131,7 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
   record.covariances = arguments.covariances;
   record.plugins = internal::HashesOf(internal::PluginsNamed({config}, host));
   record.inputs =
-      InputsText(arguments.input, config, ArgumentsOf(arguments), {config}, record.plugins);
-  record.resume = arguments.resume;
+      arguments.input.InputsText(config, ArgumentsOf(arguments), {config}, record.plugins);
   return record;
 }
 
@@ -146,23 +139,12 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
-  const std::filesystem::path& folder = output.folder;
-  if (arguments.resume)
-    internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
   const PluginHost host = arguments.input.HostFor(config);
-  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
-  const Recorder::Options record = RecordOf(arguments, config, folder, host);
-  if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
-    return ExitCode::kOk;
-  Recorder recorder(record, config);
-  TellIfCrashed(recorder.partial());
+  Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
   if (!arguments.quiet) TellOutput(output);
-  if (record.resume && !arguments.quiet) {
-    TellResumed(folder, recorder.resumed(), "its frames are computed again, and compared");
-  }
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -172,15 +154,12 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (viewer) options.observers.push_back(viewer.get());
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result =
-      WithWhatIsKept(recorder, [&] { return watchdog.Run(experiment, options, &recorder); });
+  const RunResult result = Run(experiment, options);
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
-  FinishOnSignals();
-  WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
+  recorder.Finish(result);
   if (viewer) viewer->Close();
-  if (!arguments.quiet) TellKept(recorder.resumed(), folder);
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
@@ -201,7 +180,6 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
             "run folder; default: the config's `output:`, or its name, in runs/");
   AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
-  AddResume(command, arguments->resume);
   command.add_flag("--all", arguments->all, "print all rows of the table, not ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
@@ -213,7 +191,6 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
       ->option_text("FILE")
       ->check(IsAvi);
   command.add_flag("--view", arguments->view, "shows the same in a window while it runs");
-  AddFrameTimeout(command, arguments->frame_timeout_s);
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");

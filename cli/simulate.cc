@@ -8,7 +8,6 @@
 #include "command.h"
 #include "console.h"
 #include "video_name.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -45,7 +44,6 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
       OutputFolder(arguments.folder, config, arguments.input, arguments.force, "data-");
   const std::filesystem::path& path = output.folder;
   const PluginHost host = arguments.input.HostFor(config);
-  const Watchdog watchdog;
   StopOnSignals();
   const SimulateResult result =
       Simulate(config, host, path, arguments.force, StopRequested, arguments.images);

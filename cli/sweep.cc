@@ -5,17 +5,14 @@
 #include <CLI/Formatter.hpp>
 #include <charconv>
 #include <memory>
-#include <mutex>
 #include <utility>
 
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep_config.h"
 #include "command.h"
 #include "console.h"
-#include "resume.h"
 #include "sweep_report.h"
-#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -29,8 +26,8 @@ constexpr const char* kSweepFooter = R"(Examples:
 
 The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The
 number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
-signal, with what was complete written. --resume makes the runs that are not finished; `alidade
-merge` puts shards together.)";
+signal. Until all runs are finished the folder is FOLDER.partial; a sweep that was stopped or killed
+leaves it, and --resume makes the runs that it lacks. `alidade merge` puts shards together.)";
 
 struct SweepArguments {
   Input input;
@@ -38,7 +35,6 @@ struct SweepArguments {
   std::string vary;
   SweepOptions options;
   bool force = false, quiet = false, resume = false;
-  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
 };
 
 void ReadShard(const std::string& text, SweepOptions& options) {
@@ -69,46 +65,53 @@ struct Task {
   const SweepArguments& arguments;
   const Config& config;
   const PluginHost& host;
-  const SweepOptions& options;
   const std::filesystem::path& path;
   const std::string& inputs;  ///< the text of inputs.json
   Progress& progress;
 };
 
-SweepFolder::Options FolderOf(const Task& task) {
-  return {task.path, task.arguments.force, task.inputs, task.arguments.resume,
-          task.options.shard.has_value()};
-}
-
-/// The options of a sweep into `folder`; says what it takes from there.
-SweepOptions OptionsInto(SweepFolder& folder, const Task& task) {
-  TellIfCrashed(folder.partial());
-  SweepOptions options = task.options;
-  options.finished = folder.finished();
-  if (task.arguments.resume && !task.arguments.quiet) {
-    TellResumed(task.path, folder.resumed(),
-                std::to_string(options.finished->size()) + " runs are finished");
+/// The folder of the sweep, and the runs of it that are finished already.
+std::unique_ptr<SweepFolder> OpenFolder(const Task& task, SweepOptions& options) {
+  const SweepArguments& arguments = task.arguments;
+  auto folder = std::make_unique<SweepFolder>(
+      SweepFolder::Options{task.path, arguments.force, task.inputs, arguments.resume,
+                           options.shard.has_value()},
+      task.config);
+  options.finished = folder->finished();
+  if (const std::size_t count = options.finished->size(); count > 0 && !arguments.quiet) {
+    PrintNote("resuming " + folder->files().partial().string() + ": " + std::to_string(count) +
+              " runs are finished");
   }
-  return options;
+  return folder;
 }
 
-ExitCode SweepSeeds(const Task& task) {
-  SweepFolder folder(FolderOf(task), task.config);
-  const SweepOptions options = OptionsInto(folder, task);
-  const SweepResult result =
-      WithWhatIsKept(folder, [&] { return Sweep(task.config, task.host, options); });
+ExitCode SweepSeeds(const Task& task, SweepOptions options) {
+  const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
+  const SweepResult result = Sweep(task.config, task.host, options);
   task.progress.Clear();
-  return FinishSweep(folder, task.path, result, task.config, task.arguments.quiet);
+  return FinishSweep(*folder, task.path, result, task.config, task.arguments.quiet);
 }
 
-ExitCode SweepValues(const Task& task) {
+ExitCode SweepValues(const Task& task, SweepOptions options) {
   const Variation variation = Variation::FromText(task.arguments.vary);
-  SweepFolder folder(FolderOf(task), task.config);
-  const SweepOptions options = OptionsInto(folder, task);
-  const VariedSweep sweep =
-      WithWhatIsKept(folder, [&] { return SweepOver(task.config, task.host, options, variation); });
+  const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
+  const VariedSweep sweep = SweepOver(task.config, task.host, options, variation);
   task.progress.Clear();
-  return FinishSweep(folder, task.path, sweep, task.config, task.arguments.quiet);
+  return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.quiet);
+}
+
+/// Of --resume: whether `folder` is a finished sweep of this config and these inputs. Error:
+/// kCannotCreate if it was made from others.
+bool IsFinished(const std::filesystem::path& folder, const Config& config,
+                const std::string& inputs) {
+  if (!std::filesystem::exists(folder / internal::kInputsFile)) return false;
+  const std::string difference =
+      internal::DifferenceOf(internal::ReadMadeFrom(folder),
+                             (folder / internal::kInputsFile).string(), {config.ToYaml(), inputs});
+  if (difference.empty()) return true;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{folder.string()}, {}, "was made from other inputs: " + difference) +
+                  "; to replace it, leave out --resume and add --force");
 }
 
 /// The config of the runs, or one for each value that is varied, but for those that cannot be set:
@@ -148,23 +151,24 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const std::filesystem::path& path = output.folder;
   const std::vector<Config> configs = ConfigsOf(arguments, config);
   const PluginHost host = arguments.input.HostFor(config, configs);
-  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
-  const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), configs,
-                                        internal::HashesOf(internal::PluginsNamed(configs, host)));
-  if (arguments.resume && IsFinished(path, config, inputs, arguments.force, arguments.quiet))
+  const std::string inputs =
+      arguments.input.InputsText(config, ArgumentsOf(arguments), configs,
+                                 internal::HashesOf(internal::PluginsNamed(configs, host)));
+  if (arguments.resume && IsFinished(path, config, inputs)) {
+    if (!arguments.quiet) PrintNote(path.string() + " is finished: nothing to resume");
     return std::filesystem::exists(path / "failures.csv") ? ExitCode::kFound : ExitCode::kOk;
+  }
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
-  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
-  options.stop = StopRequested;
-  std::once_flag told;  // with the first run that could be built
-  options.run = [&](Experiment& experiment, const RunOptions& given) {
-    if (!arguments.quiet) std::call_once(told, TellOutput, output);
-    return watchdog.Run(experiment, given);
+  bool told = arguments.quiet;
+  options.progress = [&](std::int64_t done, std::int64_t total) {
+    if (!std::exchange(told, true)) TellOutput(output);  // the config is right
+    progress.Show(done, total);
   };
-  const Task task{arguments, config, host, options, path, inputs, progress};
-  return arguments.vary.empty() ? SweepSeeds(task) : SweepValues(task);
+  options.stop = StopRequested;
+  const Task task{arguments, config, host, path, inputs, progress};
+  return arguments.vary.empty() ? SweepSeeds(task, options) : SweepValues(task, options);
 }
 
 }  // namespace
@@ -201,8 +205,12 @@ void AddSweep(CLI::App& program, Action& action) {
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
-  AddResume(command, arguments->resume);
-  AddFrameTimeout(command, arguments->frame_timeout_s);
+  command
+      .add_flag("--resume", arguments->resume,
+                "continue the sweep that left the folder of -o with .partial added: its finished "
+                "runs are not made again")
+      ->needs(command.get_option("--output"))
+      ->excludes(command.get_option("--force"));
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kSweepFooter);
   command.callback([&action, arguments] {

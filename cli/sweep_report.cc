@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sweep_report.h"
 
+#include "alidade/base/output_folder.h"
 #include "console.h"
-#include "resume.h"
 
 namespace alidade::cli {
 namespace {
+
+constexpr const char* kResume = "; --resume continues it";
 
 /// Tells of the runs that failed, the first few in full, each after `where`; true where there are
 /// any.
@@ -40,12 +42,12 @@ ExitCode CodeOf(bool stopped, bool failed) {
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, bool quiet) {
   const bool failed = ReportFailures(result, "");
-  if (result.stopped) TellStopped(result.done.size(), result.runs);
+  if (result.stopped) TellStopped(result.done.size(), result.runs, kResume);
   const std::vector<SweepSummary> summaries = Summarise(result);
-  WithWhatIsKept(folder, [&] { folder.Write(result, summaries, config); });
+  folder.Write(result, summaries, config);
   if (!quiet) {
-    TellKept(folder.resumed(), path);
-    TellWritten(path, SweepTable(result, summaries), {"table.md", "sweep.json", "runs.csv"});
+    TellWritten(result.stopped ? internal::PartialOf(path) : path, SweepTable(result, summaries),
+                {"table.md", "sweep.json", "runs.csv"});
   }
   return CodeOf(result.stopped, failed);
 }
@@ -61,16 +63,15 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     done += sweep.results[v].done.size();
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
-  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);
-  const std::string note =
-      WithWhatIsKept(folder, [&] { return folder.Write(sweep, config, StopRequested); });
+  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs, kResume);
+  const std::string note = folder.Write(sweep, config, StopRequested);
   if (!quiet) {
-    TellKept(folder.resumed(), path);
+    const std::filesystem::path written = sweep.stopped() ? internal::PartialOf(path) : path;
     std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
     if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
     const std::string reprojection = "figures/reprojection.svg";
-    if (std::filesystem::exists(path / reprojection)) names.insert(names.begin(), reprojection);
-    TellWritten(path, SweepTable(sweep), names);
+    if (std::filesystem::exists(written / reprojection)) names.insert(names.begin(), reprojection);
+    TellWritten(written, SweepTable(sweep), names);
   }
   if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
   return CodeOf(sweep.stopped(), failed);

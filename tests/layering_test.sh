@@ -36,7 +36,7 @@ if [[ ${1:-} == --self-test ]]; then
   self_test=true
   shift
 fi
-rooms="model base config state host system filter run evaluate bundle inspect resume record sweep compare"
+rooms="model base config state host system filter run evaluate bundle inspect replay record sweep compare"
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 

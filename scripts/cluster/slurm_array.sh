@@ -9,8 +9,8 @@
 #
 #   scripts/cluster/slurm_array.sh --cpus-per-task=4 -- 16 runs/big config.yaml --runs 10000
 #
-# Shards and logs go to OUT.shards. A task that was stopped, killed or requeued goes on where it
-# was: to finish what is not finished, submit the same again. ALIDADE names the program; default:
+# Shards and logs go to OUT.shards. A task that was stopped, killed or requeued keeps its finished
+# runs: to finish the others, submit the same again. ALIDADE names the program; default:
 # alidade.
 set -euo pipefail
 alidade=${ALIDADE:-alidade}

@@ -86,9 +86,9 @@ TEST_F(MergeCli, KeepsRunsThatFailed) {
 
 TEST_F(MergeCli, RefusesShardsThatAreMissingOrComeTwice) {
   SweepAll();
-  ExpectRefused({"s1", "s3"}, "error: a shard is missing: 2/3");
+  ExpectRefused({"s1", "s3"}, "error: shards are missing: 2/3");
   ExpectRefused({"s2"}, "error: shards are missing: 1/3, 3/3");
-  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: is shard 2/3 again, as s2 is");
+  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: is shard 2/3, which comes twice");
   ExpectRefused({"s1", "s2", "s4"}, "s4/inputs.json: cannot be read", 66);
   EXPECT_EQ(Merge({}).code, 2);
   EXPECT_EQ(Call({"merge", "s1"}).code, 2) << "no --output";
@@ -144,16 +144,16 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "run", "--no-figures"}).code, 0);
   ExpectRefused({"run", "s1"}, "run/inputs.json: is not that of a shard");
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
-  const std::string runs = Read("s2/shard_runs.jsonl"), summary = Read("s2/sweep.json");
+  const std::string runs = Read("s2/finished_runs.jsonl"), summary = Read("s2/sweep.json");
   // Cut in its last line, a line that is not there, one too many.
-  Write("s2/shard_runs.jsonl", runs.substr(0, runs.size() - 9));
-  ExpectRefused({"s1", "s2"}, "s2/shard_runs.jsonl:4: is not the run of seed 11");
-  Write("s2/shard_runs.jsonl", runs.substr(runs.find('\n') + 1));
-  ExpectRefused({"s1", "s2"}, "s2/shard_runs.jsonl:1: is not the run of seed 8");
-  Write("s2/shard_runs.jsonl", runs + runs);
-  ExpectRefused({"s1", "s2"}, "s2/shard_runs.jsonl:4: is one line too many");
-  fs::remove(folder_ / "s2/shard_runs.jsonl");
-  ExpectRefused({"s1", "s2"}, "s2/shard_runs.jsonl: cannot be read", 66);
+  Write("s2/finished_runs.jsonl", runs.substr(0, runs.size() - 9));
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is not the run of seed 11");
+  Write("s2/finished_runs.jsonl", runs.substr(runs.find('\n') + 1));
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:1: is not the run of seed 8");
+  Write("s2/finished_runs.jsonl", runs + runs);
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is one line too many");
+  fs::remove(folder_ / "s2/finished_runs.jsonl");
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl: cannot be read", 66);
   std::string stopped = summary;
   stopped.replace(stopped.find("\"ok\""), 4, "\"stopped\"");
   Write("s2/sweep.json", stopped);
@@ -171,17 +171,18 @@ TEST_F(MergeCli, ReplacesItsFolderOnlyByForceAndNeverAShard) {
 // A shard that is stopped and resumed is the same as one that was not.
 TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   runs_ = "40";
-  const Arguments longer = {"--set", "source.duration_s=20"};
+  const Arguments longer = {"--set", "source.duration_s=100"};
   SweepAll(longer);
   Arguments again = {"sweep",   config_, "--runs", runs_,   "--first-seed",
-                     "5",       "-o",    "s4",     "--set", "source.duration_s=20",
+                     "5",       "-o",    "s4",     "--set", "source.duration_s=100",
                      "--shard", "2/3",   "--jobs", "1",     "--resume"};
   const pid_t process = Start(again);
-  const std::string path = ".s4.partial-" + std::to_string(process) + "/finished_runs.jsonl";
+  const std::string path = "s4.partial/finished_runs.jsonl";
   ASSERT_TRUE(Eventually([&] { return Contains(Read(path), "\n"); }));
   ::kill(process, SIGTERM);
   ASSERT_EQ(Wait(process).code, 75) << Read("stderr");
-  ExpectRefused({"s1", "s3", "s4"}, "s4: was stopped before its end");
+  ExpectRefused({"s1", "s3", "s4.partial"}, "s4.partial: was stopped before its end");
+  ExpectRefused({"s1", "s3", "s4"}, "error: s4: is not finished: it is s4.partial");
   ASSERT_EQ(Call(again).code, 0) << Read("stderr");
   EXPECT_EQ(Merge({"s1", "s3", "s4"}).code, 0) << Read("stderr");
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");

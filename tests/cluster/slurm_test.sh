@@ -98,14 +98,14 @@ diff -r "$work/first_whole" "$work/first" || fail "the merged shards are others"
 # Cancelled while both shards are running: what is finished is kept, nothing is merged.
 runs=(--runs 800 --set source.duration_s=60)
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
-has_begun() { compgen -G "$work/second.shards/.$1.partial-*/.keep"; }
+has_begun() { test -s "$work/second.shards/$1.partial/finished_runs.jsonl"; }
 eventually has_begun 1
 eventually has_begun 2
 scancel --name=sweep
 eventually has_ended
 [[ ! -e $work/second ]] || fail "it was merged without a shard"
-grep -q '"status": "stopped"' "$work/second.shards/2/sweep.json" || fail "a shard was lost"
-grep -q 'second.shards/[12].* was stopped before its end' "$work/second.shards/merge.log" ||
+grep -q '"status": "stopped"' "$work/second.shards/2.partial/sweep.json" || fail "a shard was lost"
+grep -q 'second.shards/[12]: is not finished' "$work/second.shards/merge.log" ||
   fail "the merge does not name the shard"
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
 eventually test -e "$work/second"

@@ -237,8 +237,7 @@ TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
     Write(file, config[0] == 't' ? rows : tracks);
     const pid_t run = Start({"run", config, "--no-figures", "--force", "-o", "out"});
-    const std::string partial = ".out.partial-" + std::to_string(run) + "/ekf/estimates.csv";
-    EXPECT_TRUE(Eventually([&] { return Exists(partial); }));
+    EXPECT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
     std::ofstream(folder_ / file, std::ios::app) << "# one more\n";
     const Outcome outcome = Wait(run);
     EXPECT_EQ(outcome.code, 74) << outcome.err;

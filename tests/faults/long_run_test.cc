@@ -2,7 +2,7 @@
 //
 // What a run holds in memory does not grow with its length. The configs are those of
 // bench/long_run.
-#include <sys/ioctl.h>
+#include <algorithm>
 
 #include "support/program.h"
 #include "support/sanitized.h"
@@ -102,23 +102,18 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     ASSERT_EQ(::write(pipe, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
   };
   feed(0);
-  const pid_t run = Start({"run", kBench + "stream.yaml", "--no-figures", "-o", "out", "--set",
-                           "source.path=" + (folder_ / "pipe").string()});
-  const std::string partial = ".out.partial-" + std::to_string(run) + "/ekf/estimates.csv";
-  ASSERT_TRUE(Eventually([&] { return Exists(partial); }));
+  const pid_t run = Start({"run", kBench + "stream.yaml", "--no-figures", "--follow", "-o", "out",
+                           "--set", "source.path=" + (folder_ / "pipe").string()});
   constexpr int kFrames = 30;
   for (int k = 1; k <= kFrames; ++k) {
     feed(k);
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ASSERT_TRUE(Eventually([&] {
+      const std::string estimates = Read("stdout");
+      return std::ranges::count(estimates, '\n') >= k;
+    }));
   }
-  EXPECT_TRUE(Eventually([&] {
-    int left = -1;
-    return ::ioctl(pipe, FIONREAD, &left) == 0 && left == 0;
-  }));
   ::kill(run, SIGINT);
-  // A signal just before it waits for data is seen with the next row.
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  feed(kFrames + 1);
+  feed(kFrames + 1);  // a signal just before it waits for data is seen with the next row
   const testing::Outcome stopped = Wait(run);
   EXPECT_EQ(stopped.code, 75) << stopped.err;
   EXPECT_GE(Json("out/run.json").root().At("frames").Number(), kFrames);

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <csignal>
 #include <memory>
 
 #include "alidade/model/plugin.h"
@@ -30,23 +29,6 @@ struct Ratio : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>, alidade::Vec<1>
   }
 };
 
-/// z = x, and the end of the process beyond x = 50.
-struct CrashesFarAway : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
-  static constexpr std::array kRoles{alidade::Quantity{"x"}};
-  static constexpr alidade::Quantity kMeasurement{"z"};
-  explicit CrashesFarAway(alidade::Params&) {}
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    if (x[0] > T(50.0)) std::raise(SIGSEGV);
-    z[0] = x[0];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    l[0] = T(0.1);
-  }
-};
-
 template <class Model>
 void Emplace(double sigma, AlidadeInstance* instance) {
   using Holder = alidade::detail::Holder<Model>;
@@ -69,5 +51,4 @@ void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(Ratio, "ratio", "a / b", ""),
-               ALIDADE_SENSOR(CrashesFarAway, "crashes_far_away", "", ""),
                ALIDADE_SENSOR_BY(MakePixels, "pixels", "pixels of a landmark", ""))

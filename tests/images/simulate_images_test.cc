@@ -162,7 +162,7 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   EXPECT_EQ(outside.code, 77) << outside.err;
   EXPECT_TRUE(Contains(outside.err,
                        "--images: '../images' leaves its folder; expected a path "
-                       "inside 'data/'"))
+                       "inside the output folder"))
       << outside.err;
   EXPECT_EQ(Simulate(kScene, {"--video", "/tmp/v.avi"}).code, 77);
   Write("table.yaml", testing::kTableConfig);

@@ -99,8 +99,8 @@ class ProgramTest : public ::testing::Test {
   Config Json(const std::string& name) const { return Config::FromText(Read(name), name); }
   bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
 
-  /// Starts `alidade ARGUMENTS...`, its output going to files; `out` "" closes standard output. A
-  /// shell runs `before_`, which may set limits and redirect, first.
+  /// Starts `alidade ARGUMENTS...`, its output going to files. A shell runs `before_`, which may
+  /// set limits and redirect, first.
   pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
     arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
     if (!before_.empty()) {
@@ -116,11 +116,7 @@ class ProgramTest : public ::testing::Test {
     constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC;
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "stderr", kFlags, 0600);
-    if (out.empty()) {
-      posix_spawn_file_actions_addclose(&actions, STDOUT_FILENO);
-    } else {
-      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), kFlags, 0600);
-    }
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), kFlags, 0600);
     pid_t pid = -1;
     const int error = ::posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 #include "support/program.h"
 
 /// What a run folder holds, to be compared with another.

@@ -5,89 +5,54 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "alidade/base/output_file.h"
 
 namespace alidade::internal {
 
-/// A folder that is there in full or not at all: it grows as `.NAME.partial-PID` next to its place,
-/// and takes its name in Commit(). What is worth keeping of one that is never committed is
-/// `NAME.failed-PID` in the end. It is locked meanwhile, so that nobody else writes to that name,
-/// and so that what a killed process left can be told from what a living one is writing. A marker
-/// file tells the hidden folders of this class from those of others, which it never touches.
+/// A folder `NAME` that exists only if it is complete: its files are written to `NAME.partial` next
+/// to it, which Commit() renames. Its `files.txt` lists what was written, and nothing else is ever
+/// replaced.
 class OutputFolder {
  public:
-  /// Creates the partial folder, and the folders above it where they are missing. A link to a
-  /// folder stands for that folder. Then removes the marked folders of dead processes, or renames
-  /// those that are worth keeping, and puts back what one of them was replacing; an error leaves
-  /// them as they are. Errors: kCannotCreate where `target` exists without `force`, holds anything
-  /// that its own `files.txt` does not list, or is being written by another process; kIo.
-  OutputFolder(const std::filesystem::path& target, bool force);
-  /// Removes what was not committed, with the folders above it that were made for it; or calls it
-  /// failed().
+  /// Creates `NAME.partial`, and the folders above it. If `target` is a link to a folder, NAME is
+  /// that folder. With `force`, an existing `NAME.partial` is replaced now and NAME in Commit();
+  /// with `resume`, an existing `NAME.partial` stays as it is. Errors: kCannotCreate if one of them
+  /// exists otherwise, or holds a file that its `files.txt` does not list; kIo.
+  OutputFolder(const std::filesystem::path& target, bool force, bool resume = false);
+  /// Removes `NAME.partial` unless it was committed or Keep() was called.
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Opens a new file; `name` may lie in a sub-folder, which is made. Errors: kCannotCreate, kIo.
+  /// Lists a file that something else writes, or a folder, whose name ends in `/`, with all that it
+  /// will hold. Creates the folders above it and returns its path. Errors: kCannotCreate, kIo.
+  std::filesystem::path Add(const std::string& name) const;
+  /// Opens a new file, or one to be replaced. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
+  /// Opens a file at its end. Errors: kCannotCreate, kIo.
+  std::unique_ptr<OutputFile> Append(const std::string& name) const;
+  /// Errors: kCannotCreate, kIo.
   void Write(const std::string& name, std::string_view text) const;
-  /// Removes a file or sub-folder, where it is there.
+  /// Removes a file or folder, if it exists.
   void Remove(const std::string& name) const;
-  /// From now on what is in it is worth keeping, if it is not committed. Errors: kCannotCreate,
-  /// kIo.
-  void Keep();
-  /// It is not any more.
-  void Forget();
-  bool kept() const { return keep_; }
-  /// Where it then will be; "" where nothing is.
-  std::filesystem::path failed() const;
-  /// Gives it the name failed() at once, as it is; false where that cannot be done. Of another
-  /// thread than the one that writes, which must not go on.
-  bool Abandon() const;
-  /// Where the files are for now.
+  /// From now on `NAME.partial` stays even if it is not committed: it has results.
+  void Keep() { keep_ = true; }
+  /// `NAME.partial`
   const std::filesystem::path& partial() const { return partial_; }
-  /// The path of `name` as messages give it: in the folder's place.
-  std::string Shown(const std::string& name) const { return (shown_ / name).string(); }
-  /// Lists all that was written in `files.txt`, syncs it and moves it to its place; an old folder
-  /// goes. The file `scratch`, of use to what is not committed alone, is not listed and goes last;
-  /// "": there is none. Errors: kCannotCreate, kIo.
-  void Commit(const std::string& scratch = {});
+  /// Lists all files in `files.txt` and renames the folder; an existing NAME is removed before.
+  /// Errors: kCannotCreate, kIo, and `NAME.partial` stays.
+  void Commit();
 
  private:
-  /// Marked folders of dead processes.
-  struct Leftovers {
-    std::vector<std::filesystem::path> folders;
-    std::filesystem::path lost;  ///< in one of them: what stood at the target; "": nothing did
-  };
+  /// Refuses to replace NAME.
+  void CheckTarget() const;
 
-  void Discard();
-  Leftovers FindLeftovers() const;
-  void CleanUp(const Leftovers& leftovers) const;
-  /// Refuses to replace what is at the target, or `lost`, which was.
-  void CheckTarget(const std::filesystem::path& lost) const;
-  /// Moves the old folder into a marked one, and returns that.
-  std::filesystem::path MoveAway() const;
-  void MakeParents();
-  std::filesystem::path Sibling(const char* kind) const;
-  /// The files and folders in it, at any depth, but for its marks and `scratch`.
-  std::vector<std::string> Contents(const std::string& scratch) const;
-  /// Writes the list of `names`, and syncs them with it.
-  void ListAndSync(std::vector<std::string> names) const;
-
-  std::filesystem::path shown_;   ///< as given
-  std::filesystem::path target_;  ///< absolute, behind links
-  std::filesystem::path partial_;
-  std::vector<std::filesystem::path> made_;  ///< parents, the outermost first
+  std::filesystem::path target_, partial_;
   bool force_, keep_ = false;
-  int lock_ = -1;  ///< of the partial folder
 };
 
-/// The folders `NAME.failed-PID` that runs to `target` left next to it, by name.
-std::vector<std::filesystem::path> FailedFolders(const std::filesystem::path& target);
-
-/// Removes the marks of a process that died right after `folder` had taken its name.
-void RemoveMarks(const std::filesystem::path& folder);
+/// The place of a folder until it is complete: `NAME.partial`.
+std::filesystem::path PartialOf(const std::filesystem::path& target);
 
 }  // namespace alidade::internal

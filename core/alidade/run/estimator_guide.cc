@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <optional>
-#include <utility>
 
 #include "alidade/filter/filter.h"
-#include "alidade/run/running_estimator.h"
 
 namespace alidade::internal {
 
@@ -17,8 +15,7 @@ const SensorBinding* GuidingSensor(const System& system, std::string_view stream
   return found == system.sensors.end() ? nullptr : &*found;
 }
 
-EstimatorGuide::EstimatorGuide(Experiment& experiment, std::function<void(bool)> busy)
-    : experiment_(experiment), busy_(std::move(busy)) {
+EstimatorGuide::EstimatorGuide(Experiment& experiment) : experiment_(experiment) {
   if (experiment.guide != nullptr) experiment.source->LendGuide(this);
 }
 
@@ -38,7 +35,6 @@ std::vector<Expected> EstimatorGuide::Expect(int stream, Timestamp timestamp,
   const std::string& name = experiment_.source->streams().at(static_cast<std::size_t>(stream)).name;
   const SensorBinding* const sensor = GuidingSensor(filter.system(), name);
   if (sensor == nullptr) return all;
-  const BusyWhile works(busy_);  // it calls models
   const std::vector<std::optional<Prediction>> each =
       filter.ExpectEach(sensor->name, timestamp, landmarks);
   for (std::size_t i = 0; i < each.size(); ++i) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <string_view>
 #include <vector>
 
@@ -18,8 +17,7 @@ const SensorBinding* GuidingSensor(const System& system, std::string_view stream
 /// none guides.
 class EstimatorGuide : public Guide {
  public:
-  /// `busy` as RunOptions has it.
-  EstimatorGuide(Experiment& experiment, std::function<void(bool)> busy);
+  explicit EstimatorGuide(Experiment& experiment);
   ~EstimatorGuide() override;
   EstimatorGuide(const EstimatorGuide&) = delete;
   EstimatorGuide& operator=(const EstimatorGuide&) = delete;
@@ -29,7 +27,6 @@ class EstimatorGuide : public Guide {
 
  private:
   Experiment& experiment_;
-  std::function<void(bool)> busy_;
 };
 
 }  // namespace alidade::internal

@@ -12,7 +12,6 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/run/accepted_data.h"
-#include "alidade/run/running_estimator.h"
 
 namespace alidade::internal {
 namespace {
@@ -33,11 +32,8 @@ std::string In(const Place& place) {
 
 }  // namespace
 
-FrameOrder::FrameOrder(Experiment& experiment, Check check, std::function<void(bool)> busy)
-    : experiment_(experiment),
-      check_(std::move(check)),
-      busy_(std::move(busy)),
-      guide_(experiment, busy_) {
+FrameOrder::FrameOrder(Experiment& experiment, Check check)
+    : experiment_(experiment), check_(std::move(check)), guide_(experiment) {
   if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
   for (const NamedEstimator& named : experiment.estimators) {
     Processed& before = released_.processed.emplace_back();
@@ -241,7 +237,6 @@ Frame FrameOrder::Accepted(const Held& held, int by) const {
 }
 
 Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {
-  const BusyWhile works(busy_);
   Processed processed;
   processed.report = estimator.Process(frame);
   processed.after = estimator.Clone();

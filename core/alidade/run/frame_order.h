@@ -29,9 +29,8 @@ class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
 
-  /// `check` takes each frame first; it throws for one that the estimators must not see. `busy` as
-  /// RunOptions has it.
-  FrameOrder(Experiment& experiment, Check check, std::function<void(bool)> busy);
+  /// `check` takes each frame first; it throws for one that the estimators must not see.
+  FrameOrder(Experiment& experiment, Check check);
   /// Takes back what the estimators were given beyond the frame that Next gave last.
   ~FrameOrder();
   FrameOrder(const FrameOrder&) = delete;
@@ -67,7 +66,6 @@ class FrameOrder {
 
   Experiment& experiment_;
   Check check_;
-  std::function<void(bool)> busy_;
   EstimatorGuide guide_;
   std::deque<Held> held_;  ///< by timestamp
   Held released_;          ///< the one that Next gave last, or what was before the first

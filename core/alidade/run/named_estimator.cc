@@ -10,7 +10,6 @@
 #include "alidade/filter/built_in.h"
 #include "alidade/filter/compression.h"
 #include "alidade/host/calibration.h"
-#include "alidade/host/foreign_call.h"
 #include "alidade/host/plugin_host.h"
 
 namespace alidade::internal {
@@ -285,7 +284,6 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator
   };
   if (plugin == nullptr) return made();
   const std::string file = plugin->plugin.string();
-  const NamedCall call("Create", "estimator", plugin->name, file);
   std::string why = "an exception of unknown type";
   try {
     return made();

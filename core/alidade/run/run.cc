@@ -64,11 +64,7 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
   const bool all = one.failed_sensors.empty();
   if (!all) rest = WithoutFailed(one, visible, source.streams());
   const auto started = Clock::now();
-  const auto process = [&]() -> const UpdateReport& {
-    const internal::BusyWhile works(options.busy);
-    return estimator.Process(all ? visible : rest);
-  };
-  const UpdateReport& report = passed ? passed->report : process();
+  const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
   if (!passed) {
     const double wall_s = SecondsSince(started);
     one.result.wall_s += wall_s;
@@ -142,17 +138,13 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
   internal::FrameCheck check(experiment, result.normalised);
-  internal::FrameOrder frames(
-      experiment, [&check](SourceFrame& frame) { check(frame); }, options.busy);
+  internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
   while (NextFrame(frames, running, result, seen.frame)) {
     check.FollowTruth(seen.frame);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
-    for (RunObserver* const observer : options.observers) {
-      const internal::BusyWhile works(options.busy);  // it may call models
-      observer->OnFrame(seen.frame);
-    }
+    for (RunObserver* const observer : options.observers) observer->OnFrame(seen.frame);
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
@@ -346,10 +338,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     }
   };
   guarded([&] {
-    {
-      const internal::BusyWhile works(options.busy);
-      running = BeginAll(experiment);
-    }
+    running = BeginAll(experiment);
     for (RunObserver* const observer : options.observers) observer->Begin(experiment);
     internal::LogExperiment(experiment);
     for (const Running& one : running) internal::LogEvents(one.named.name, one.result.events);

@@ -83,9 +83,6 @@ struct RunOptions {
   std::vector<RunObserver*> observers;  ///< given all that happens, in this order
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
   std::function<bool()> stop;                                ///< true: finish the frame and stop
-  /// Told true before an estimator works on its start or on a frame, or an observer on a frame,
-  /// false when it has.
-  std::function<void(bool)> busy = {};
 };
 
 /// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors

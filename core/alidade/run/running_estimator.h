@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,22 +10,6 @@
 #include "alidade/run/run.h"
 
 namespace alidade::internal {
-
-/// Tells RunOptions::busy that an estimator or an observer works, for as long as this lives.
-class BusyWhile {
- public:
-  explicit BusyWhile(const std::function<void(bool)>& busy) : busy_(busy) {
-    if (busy_) busy_(true);
-  }
-  ~BusyWhile() {
-    if (busy_) busy_(false);
-  }
-  BusyWhile(const BusyWhile&) = delete;
-  BusyWhile& operator=(const BusyWhile&) = delete;
-
- private:
-  const std::function<void(bool)>& busy_;
-};
 
 /// One estimator on its way through a run.
 struct Running {

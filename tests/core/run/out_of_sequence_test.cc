@@ -7,7 +7,7 @@
 #include <random>
 
 #include "alidade/inspect/explain.h"
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 #include "support/recording.h"
 
 namespace alidade::testing {

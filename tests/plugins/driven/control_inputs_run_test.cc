@@ -7,7 +7,7 @@
 
 #include "alidade/inspect/check.h"
 #include "alidade/inspect/explain.h"
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 #include "alidade/run/run.h"
 #include "plugins/host/host_fixture.h"
 #include "support/recording.h"

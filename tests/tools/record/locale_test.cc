@@ -3,7 +3,7 @@
 // FAULTS 98: a locale whose numbers have a comma changes nothing.
 #include <cstdio>
 
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 #include "alidade/sweep/sweep.h"
 #include "support/comma_locale.h"
 #include "support/recording.h"

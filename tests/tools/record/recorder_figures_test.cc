@@ -291,9 +291,8 @@ int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const
 TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
-  const fs::path half = folder / (".out.partial-");
   options.stop = [&] {  // once it sleeps
-    return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
+    return fs::exists(folder / "out.partial/figures/comparison.svg");
   };
   EXPECT_EQ(RecordSlowly(folder, options, "1 of 14 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});

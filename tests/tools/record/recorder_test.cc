@@ -8,8 +8,8 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/sha256.h"
 #include "alidade/record/report_html.h"
-#include "alidade/resume/replay.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/replay.h"
+#include "alidade/replay/run_inputs.h"
 #include "sensors/stereo_disparity.h"
 #include "support/recording.h"
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -43,30 +44,27 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   const testing::TemporaryFolder temporary;
   {
     OutputFolder first(temporary / "out", false);
-    FinishedRuns runs(first, {});
-    runs.Add(RunLine("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max())));
-    EXPECT_FALSE(first.failed().empty()) << "it is worth keeping";
+    FinishedRuns runs(first);
+    runs.Add("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max()));
   }
-  const std::vector<std::filesystem::path> before = FailedFolders(temporary / "out");
-  ASSERT_EQ(before.size(), 1u);
-  OutputFolder second(temporary / "out", false);
-  const FinishedRuns runs(second, before);
+  ASSERT_TRUE(std::filesystem::exists(temporary / "out.partial")) << "it is kept";
+  OutputFolder second(temporary / "out", false, true);
+  const FinishedRuns runs(second);
   EXPECT_EQ(runs.size(), 1u);
   EXPECT_EQ(runs.Find("x=1", 2), nullptr);
   EXPECT_EQ(runs.Find("", std::numeric_limits<std::uint64_t>::max()), nullptr);
-  const FinishedRuns::Known* const known =
-      runs.Find("x=1", std::numeric_limits<std::uint64_t>::max());
+  const SweepRun* const known = runs.Find("x=1", std::numeric_limits<std::uint64_t>::max());
   ASSERT_NE(known, nullptr);
   const SweepRun expected = MakeRun(std::numeric_limits<std::uint64_t>::max());
-  EXPECT_EQ(known->run.code, expected.code);
-  EXPECT_EQ(known->run.reason, expected.reason);
-  EXPECT_EQ(known->run.withheld, expected.withheld);
-  EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
-  ASSERT_EQ(known->run.reprojection.size(), 2u);
-  EXPECT_EQ(known->run.reprojection[0].rms[0], 1.0 / 3.0);
-  EXPECT_TRUE(std::isnan(known->run.reprojection[0].rms[1]));
-  ASSERT_EQ(known->run.estimators.size(), 1u);
-  const SweepEstimator &one = known->run.estimators[0], &was = expected.estimators[0];
+  EXPECT_EQ(known->code, expected.code);
+  EXPECT_EQ(known->reason, expected.reason);
+  EXPECT_EQ(known->withheld, expected.withheld);
+  EXPECT_EQ(RunLine("x=1", *known), RunLine("x=1", expected));
+  ASSERT_EQ(known->reprojection.size(), 2u);
+  EXPECT_EQ(known->reprojection[0].rms[0], 1.0 / 3.0);
+  EXPECT_TRUE(std::isnan(known->reprojection[0].rms[1]));
+  ASSERT_EQ(known->estimators.size(), 1u);
+  const SweepEstimator &one = known->estimators[0], &was = expected.estimators[0];
   EXPECT_EQ(one.name, was.name);
   EXPECT_TRUE(one.diverged && one.failed && !one.inconsistent);
   EXPECT_EQ(one.units.names(), was.units.names());
@@ -83,34 +81,30 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
       EXPECT_EQ(std::signbit(*one.metrics.Find(key)), std::signbit(value)) << key;
     }
   }
-  EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
+  EXPECT_EQ(RunLine("x=1", *known), RunLine("x=1", expected));
 }
 
 TEST(FinishedRuns, OfSeveralThreadsAreAllWritten) {
   const testing::TemporaryFolder temporary;
   OutputFolder folder(temporary / "out", false);
-  FinishedRuns runs(folder, {});
-  constexpr std::uint64_t kThreads = 4, kRuns = 3;
-  std::set<std::uint64_t> seeds;
-  std::ifstream stream(folder.partial() / "finished_runs.jsonl");
-  // Again and again, for the end of a round is where a line may be left behind.
-  for (std::uint64_t round = 0; round < 200; ++round) {
-    {
-      std::vector<std::jthread> threads;
-      for (std::uint64_t i = 0; i < kThreads; ++i) {
-        threads.emplace_back([&runs, first = (round * kThreads + i) * kRuns] {
-          for (std::uint64_t k = 0; k < kRuns; ++k) runs.Add(RunLine("", MakeRun(first + k)));
-        });
-      }
+  FinishedRuns runs(folder);
+  constexpr std::uint64_t kThreads = 4, kRuns = 500;
+  {
+    std::vector<std::jthread> threads;
+    for (std::uint64_t i = 0; i < kThreads; ++i) {
+      threads.emplace_back([&runs, i] {
+        for (std::uint64_t k = 0; k < kRuns; ++k) runs.Add("", MakeRun(i * kRuns + k));
+      });
     }
-    stream.clear();
-    for (std::string line; std::getline(stream, line);) {
-      const std::optional<LineOfRun> read = ReadRunLine(line);
-      ASSERT_TRUE(read) << line;
-      EXPECT_TRUE(seeds.insert(read->run.seed).second) << "twice: " << read->run.seed;
-    }
-    ASSERT_EQ(seeds.size(), (round + 1) * kThreads * kRuns);
   }
+  std::set<std::uint64_t> seeds;
+  std::ifstream stream(folder.partial() / kFinishedRuns);
+  for (std::string line; std::getline(stream, line);) {
+    const std::optional<LineOfRun> read = ReadRunLine(line);
+    ASSERT_TRUE(read) << line;
+    EXPECT_TRUE(seeds.insert(read->run.seed).second) << "twice: " << read->run.seed;
+  }
+  EXPECT_EQ(seeds.size(), kThreads * kRuns);
 }
 
 TEST(RunLine, OfARunThatFailedSaysSo) {
@@ -124,43 +118,28 @@ TEST(RunLine, OfARunThatFailedSaysSo) {
   EXPECT_FALSE(ReadRunLine(line.substr(0, 40)));
 }
 
-TEST(FinishedRuns, ALineThatWasCutIsNoneAndAnyOtherIsRefused) {
+TEST(FinishedRuns, ALineThatWasCutIsRemovedAndAnyOtherIsRefused) {
   const testing::TemporaryFolder temporary;
-  std::filesystem::create_directory(temporary / "left");
-  const std::string line = RunLine("", MakeRun(1));
-  std::ofstream(temporary / "left/finished_runs.jsonl") << line << line.substr(0, 40);
+  const std::string line = RunLine("", MakeRun(1)), next = RunLine("", MakeRun(2));
   OutputFolder folder(temporary / "out", false);
-  EXPECT_EQ(FinishedRuns(folder, {temporary / "left"}).size(), 1u);
-  std::ofstream(temporary / "left/finished_runs.jsonl") << line << "{\"seed\": \"one\"}\n";
-  OutputFolder other(temporary / "other", false);
+  folder.Write(kFinishedRuns, line + line.substr(0, 40));
+  {
+    FinishedRuns runs(folder);
+    EXPECT_EQ(runs.size(), 1u);
+    runs.Add("", MakeRun(2));
+  }
+  std::ifstream stream(folder.partial() / kFinishedRuns);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_EQ(text, line + next);
+  folder.Write(kFinishedRuns, line + "{\"seed\": \"one\"}\n");
   try {
-    const FinishedRuns runs(other, {temporary / "left"});
+    const FinishedRuns runs(folder);
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
-    EXPECT_TRUE(std::string(error.what())
-                    .starts_with((temporary / "left/finished_runs.jsonl").string() + ":2: "))
+    EXPECT_TRUE(
+        std::string(error.what()).starts_with((folder.partial() / kFinishedRuns).string() + ":2: "))
         << error.what();
-  }
-}
-
-TEST(FinishedRuns, NoneIsFinishedWhereThereIsNoFileButNotWhereItCannotBeRead) {
-  const testing::TemporaryFolder temporary;
-  for (const char* name : {"none", "folder", "loop"}) {
-    std::filesystem::create_directory(temporary / name);
-  }
-  std::filesystem::create_directory(temporary / "folder/finished_runs.jsonl");
-  std::filesystem::create_symlink("finished_runs.jsonl", temporary / "loop/finished_runs.jsonl");
-  OutputFolder folder(temporary / "out", false);
-  EXPECT_EQ(FinishedRuns(folder, {temporary / "none"}).size(), 0u);
-  for (const char* name : {"folder", "loop"}) {
-    OutputFolder other(temporary / "other", false);
-    try {
-      const FinishedRuns runs(other, {temporary / name});
-      ADD_FAILURE() << name;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kIo) << error.what();
-    }
   }
 }
 

@@ -12,6 +12,7 @@
 #include "alidade/base/read_file.h"
 #include "alidade/base/text_cell.h"
 #include "alidade/compare/json_node.h"
+#include "alidade/replay/replay.h"
 
 namespace alidade::internal {
 namespace {
@@ -242,6 +243,10 @@ ComparedRun ReadRun(const fs::path& folder) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{folder.string()}, {}, "is the folder of a sweep",
                           "folders of `alidade run`"));
+  }
+  if (RecordedStatus(folder) == "running") {
+    throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
+                                              "was not written to its end", "a finished run"));
   }
   const Json run_json = ReadJson(run_file), timing_json = ReadJson(timing_file);
   const JsonNode root(run_json, run_file.string()), timing(timing_json, timing_file.string());

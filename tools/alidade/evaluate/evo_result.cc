@@ -169,10 +169,9 @@ std::string AlignmentNpy(const Similarity& alignment) {
 void WriteWhole(const fs::path& file, const std::string& content) {
   const fs::path partial = fs::path(file) += ".partial-" + std::to_string(::getpid());
   try {
-    internal::OutputFile output(partial, file.string());
+    internal::OutputFile output(partial);
     output.Write(content);
     output.Close();
-    internal::Sync(partial, file.string());
     std::error_code error;
     fs::rename(partial, file, error);
     if (error) internal::FailCreate(file.string(), error.value());

@@ -395,7 +395,7 @@ std::vector<Plan> PlanFigures(const RecordedRun& run) {
 
 GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits) {
-  const std::filesystem::path figure = folder.partial() / "figures" / name;
+  const std::filesystem::path figure = folder.Add("figures/") / name;
   const GnuplotResult result = RunGnuplot(folder.partial(), arguments, limits);
   std::error_code ignored;
   if (result.end != GnuplotResult::End::kDrawn) {

@@ -75,7 +75,7 @@ std::string Complaint(const std::filesystem::path& log) {
 GnuplotResult RunGnuplot(const std::filesystem::path& folder,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits) {
   if (limits.stop && limits.stop()) return {End::kStopped, ""};
-  const std::filesystem::path log = folder / ".gnuplot.log";
+  const std::filesystem::path log = folder / "figures/.gnuplot.log";
   std::vector<std::string> words = {"gnuplot", "-d"};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<std::string> variables = Environment();
@@ -86,7 +86,7 @@ GnuplotResult RunGnuplot(const std::filesystem::path& folder,
   posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.filename().c_str(),
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "figures/.gnuplot.log",
                                    O_WRONLY | O_CREAT | O_TRUNC, 0666);
   pid_t child = 0;
   const int error =

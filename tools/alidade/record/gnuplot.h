@@ -21,8 +21,8 @@ struct GnuplotResult {
   std::string complaint;  ///< of kFailed
 };
 
-/// Runs gnuplot, found through PATH, in `folder`, without a shell and without the user's settings.
-/// It is killed where a limit is reached.
+/// Runs gnuplot, found through PATH, in `folder`, which has a folder `figures`, without a shell and
+/// without the user's settings. It is killed where a limit is reached.
 GnuplotResult RunGnuplot(const std::filesystem::path& folder,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
@@ -14,14 +12,12 @@
 
 namespace alidade::internal {
 
-/// A video that is there in full or not at all: it grows as `.NAME.partial-PID.avi` next to its
-/// place.
+/// A video that exists only if it is complete: it grows as `NAME.partial.avi` next to its place.
 class PartialFile {
  public:
   PartialFile(std::filesystem::path file, bool force)
       : file_(std::move(file)),
-        partial_(file_.parent_path() / ('.' + file_.stem().string() + ".partial-" +
-                                        std::to_string(::getpid()) + ".avi")) {
+        partial_(file_.parent_path() / (file_.stem().string() + ".partial.avi")) {
     std::error_code ignored;
     if (!force && std::filesystem::exists(file_, ignored)) {
       throw Error(ExitCode::kCannotCreate,

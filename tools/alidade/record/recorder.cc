@@ -8,7 +8,6 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 
 #include "alidade/base/json.h"
 #include "alidade/base/log.h"
@@ -24,9 +23,8 @@
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
 #include "alidade/record/timing_file.h"
-#include "alidade/resume/leftovers.h"
-#include "alidade/resume/replay.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/replay.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 
 namespace alidade {
@@ -41,12 +39,11 @@ struct Recorder::Impl {
   void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
-  /// Whether all that is in the leftovers is here too.
-  void CompareWithLeftovers(const RunResult& result);
+  /// Writes all files but run.json. Returns what kept the report from being written; null: it is.
+  std::exception_ptr WriteResults(const RunResult& result);
 
   Options options;
   internal::OutputFolder folder;
-  std::optional<internal::Leftovers> leftovers;
   internal::LogFile log{folder};
   const Config config;
   std::string title, config_text;
@@ -63,6 +60,8 @@ struct Recorder::Impl {
 };
 
 namespace {
+
+constexpr const char* kRunFile = "run.json";
 
 /// In timing.json, by FramePart.
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
@@ -84,28 +83,14 @@ std::string AsElement(const std::string& svg) {
 
 Recorder::Impl::Impl(const Options& given, const Config& read)
     : options(given),
-      folder(given.folder, given.force || given.resume),
+      folder(given.folder, given.force),
       config(read),
       title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
       config_text(config.ToYaml()) {
-  if (given.resume && !given.force) internal::CheckReplaceable(given.folder);
-  if (given.resume) leftovers.emplace(given.folder).CheckInputs(config_text, given.inputs);
   facts.plugins = given.plugins;
+  folder.Write(kRunFile, internal::UnfinishedRunJson("running", ""));
   folder.Write(internal::kResolvedConfig, config_text);
   if (!given.inputs.empty()) folder.Write(internal::kInputsFile, given.inputs);
-}
-
-void Recorder::Impl::CompareWithLeftovers(const RunResult& result) {
-  std::set<std::string> offline;
-  for (const auto& [name, estimator] : facts.estimators) {
-    if (estimator.smoothed) offline.insert(name);
-  }
-  const auto longer = leftovers->LongerThan(folder.partial(), offline);
-  if (!longer) return;
-  const std::string what = longer->string() + ": has more rows than this run";
-  if (result.status == RunStatus::kOk) throw Error(ExitCode::kFound, what);
-  throw Error(result.code, what + ", which came to " + std::to_string(result.frames) +
-                               " frames; it is kept, and this run is not");
 }
 
 internal::RecordedRun Recorder::Impl::CloseFiles() {
@@ -207,7 +192,7 @@ void Recorder::Begin(const Experiment& experiment) {
 
 void Recorder::OnFrame(const SourceFrame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
-  if (!impl_->folder.kept()) impl_->folder.Keep();
+  impl_->folder.Keep();
   impl_->source->Add(frame);
   impl_->data->Add(frame);
   impl_->timing->Add(frame);
@@ -228,17 +213,16 @@ void Recorder::AddFile(const std::string& name, std::string_view text) {
   impl_->folder.Write(name, text);
 }
 
-void Recorder::Finish(const RunResult& result) {
-  const std::string timing = impl_->TimingJson(result);
-  internal::RecordedRun recorded = impl_->CloseFiles();
-  for (const auto& files : impl_->estimators) {
+std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
+  const std::string timing_json = TimingJson(result);
+  internal::RecordedRun recorded = CloseFiles();
+  for (const auto& files : estimators) {
     const internal::RecordedEstimator& closed = files->recorded();
-    impl_->facts.estimators.at(closed.name).rows = closed.estimate_rows;
+    facts.estimators.at(closed.name).rows = closed.estimate_rows;
   }
-  const internal::OutputFolder& folder = impl_->folder;
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     const EstimatorResult& one = result.estimators[e];
-    impl_->WriteEvents(one);
+    WriteEvents(one);
     if (!one.landmarks) continue;
     const std::vector<LandmarkEstimate> map = internal::WholeMap(one);
     internal::WriteLandmarks(folder, one.name, map);
@@ -246,43 +230,38 @@ void Recorder::Finish(const RunResult& result) {
     if (e >= recorded.estimators.size()) continue;
     recorded.estimators[e].map = internal::DescribeMap(map);
   }
-  if (impl_->data) {
-    impl_->facts.measurements_sha256 = impl_->data->measurements();
-    impl_->facts.truth_sha256 = impl_->data->truth();
+  if (data) {
+    facts.measurements_sha256 = data->measurements();
+    facts.truth_sha256 = data->truth();
   }
-  folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
-  folder.Write("timing.json", timing);
-  std::exception_ptr without_report;
+  folder.Write("timing.json", timing_json);
   try {
-    impl_->WriteReport(result, recorded);
+    WriteReport(result, recorded);
   } catch (const Error&) {
-    without_report = std::current_exception();
     folder.Remove("report.html");
     folder.Remove("figures");
+    return std::current_exception();
   }
-  if (impl_->leftovers) {
-    try {
-      impl_->CompareWithLeftovers(result);
-    } catch (const Error&) {
-      impl_->folder.Forget();
-      throw;
-    }
-  }
-  impl_->log.Close();
-  impl_->folder.Commit();
-  if (impl_->leftovers) impl_->leftovers->Remove();
-  if (without_report) std::rethrow_exception(without_report);
-  if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
+  return nullptr;
 }
 
-std::filesystem::path Recorder::failed() const { return impl_->folder.failed(); }
-bool Recorder::Abandon() const { return impl_->folder.Abandon(); }
-const std::filesystem::path& Recorder::partial() const { return impl_->folder.partial(); }
-
-const std::vector<std::filesystem::path>& Recorder::resumed() const {
-  static const std::vector<std::filesystem::path> none;
-  return impl_->leftovers ? impl_->leftovers->folders() : none;
+void Recorder::Finish(const RunResult& result) {
+  std::exception_ptr without_report;
+  try {
+    without_report = impl_->WriteResults(result);
+    impl_->log.Close();
+    impl_->folder.Write(kRunFile, internal::RunJson(result, impl_->facts));
+  } catch (const Error& error) {
+    try {
+      impl_->folder.Write(kRunFile, internal::UnfinishedRunJson("failed", error.what()));
+    } catch (const Error&) {  // the disk may be full
+    }
+    throw;
+  }
+  impl_->folder.Commit();
+  if (without_report) std::rethrow_exception(without_report);
+  if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
 
 const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }

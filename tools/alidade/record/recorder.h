@@ -13,11 +13,11 @@
 
 namespace alidade {
 
-/// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder next to it, is
-/// synced, and takes its name at the end, also where the run failed: `run.json` then says why. Once
-/// there are frames, nothing of it is lost: where it cannot be finished (a full disk, a crash) the
-/// temporary folder becomes `FOLDER.failed-PID`, rows as complete as they were a second before.
-/// Every write is checked. Errors: kCannotCreate, kIo with the path, and what was kept.
+/// Writes a run folder (docs/run_folder.md). It grows as `FOLDER.partial`, with `run.json` saying
+/// `running` from the beginning, and takes its name at the end, also if the run failed: `run.json`
+/// then says why. If it cannot be finished (a full disk, a killed process), `FOLDER.partial` stays
+/// with the rows so far, once there are frames. Every write is checked. Errors: kCannotCreate, kIo
+/// with the path.
 class Recorder : public RunObserver {
  public:
   struct Options {
@@ -31,11 +31,8 @@ class Recorder : public RunObserver {
     std::string inputs = {};          ///< the text of inputs.json; "": there is none
     /// What run.json says of plugins: file name -> SHA-256, for each file.
     std::multimap<std::string, std::string> plugins = {};
-    /// Continues what unfinished runs left here: see `alidade run --resume` in docs/cli.md.
-    bool resume = false;
   };
-  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force` and
-  /// is no unfinished run to be resumed, or one that was made from other inputs.
+  /// Creates `FOLDER.partial`. Error: kCannotCreate if it or `folder` exists, without `force`.
   Recorder(const Options& options, const Config& config);
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
@@ -49,20 +46,10 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames. A
-  /// figure or report that cannot be written is an error once the rest has its name. A run that
-  /// resumes others has to have their rows: it fails with kFound where these differ, and with its
-  /// own code where it ended before their last; they are then kept in its stead.
+  /// Writes comparison.csv, timing.json, figures, report.html and run.json, and renames the folder.
+  /// If a figure or the report cannot be written, the folder is complete without them, and that is
+  /// an error.
   void Finish(const RunResult& result);
-  /// Where it will be kept, not finished; "" where there is nothing to keep, or it is finished.
-  std::filesystem::path failed() const;
-  /// Gives what was recorded that name at once; false where that cannot be done. Of another thread
-  /// than that of the run, which must not go on.
-  bool Abandon() const;
-  /// The temporary folder.
-  const std::filesystem::path& partial() const;
-  /// The folders of the unfinished runs that this one resumes.
-  const std::vector<std::filesystem::path>& resumed() const;
 
   /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
   const std::vector<std::string>& highlights() const;

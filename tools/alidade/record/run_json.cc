@@ -66,6 +66,11 @@ EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment
           0};
 }
 
+std::string UnfinishedRunJson(const std::string& status, const std::string& reason) {
+  return JsonText(
+      {{"status", status}, {"reason", reason}, {"versions", {{"alidade", ALIDADE_VERSION}}}});
+}
+
 std::string RunJson(const RunResult& result, const RunFacts& facts) {
   Json json = {{"status", ToString(result.status)},
                {"reason", result.reason},

@@ -33,6 +33,9 @@ struct RunFacts {
 
 EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment);
 
+/// The text of `run.json` of a run that is not finished: `running` or `failed`, with the reason.
+std::string UnfinishedRunJson(const std::string& status, const std::string& reason);
+
 /// The text of `run.json`: keys as in docs/run_folder.md, which other programs read.
 std::string RunJson(const RunResult& result, const RunFacts& facts);
 

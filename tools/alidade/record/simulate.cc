@@ -160,20 +160,18 @@ class ImageFiles {
       const std::string side = writers_.size() == 1 ? "" : view == 0 ? "left" : "right";
       const auto add = [&](ImageArguments::Form form, const std::filesystem::path& path,
                            const std::string& name) {
-        writers_[view].push_back(OpenImageWriter({form, path, folder.Shown(name), width, height}));
+        writers_[view].push_back(OpenImageWriter({form, path, path.string(), width, height}));
         names_.push_back(name);
       };
       if (!names.video.empty()) {
-        std::filesystem::path path = Inside(folder, names.video, "--video");
-        if (!side.empty()) path.replace_filename(path.stem().string() + "_" + side + ".avi");
-        MakeFolder(path.parent_path(), folder.Shown(names.video));
-        const std::filesystem::path shown = std::filesystem::path(names.video).parent_path();
-        add(ImageArguments::Form::kVideo, path, (shown / path.filename()).string());
+        std::filesystem::path name = Inside(names.video, "--video");
+        if (!side.empty()) name.replace_filename(name.stem().string() + "_" + side + ".avi");
+        add(ImageArguments::Form::kVideo, folder.Add(name), name);
       }
       if (!names.folder.empty()) {
-        const std::filesystem::path path = Inside(folder, names.folder, "--images") / side;
-        MakeFolder(path, folder.Shown(names.folder));
-        add(ImageArguments::Form::kImages, path, names.folder + (side.empty() ? "" : '/' + side));
+        std::filesystem::path name = Inside(names.folder, "--images");
+        if (!side.empty()) name /= side;
+        add(ImageArguments::Form::kImages, folder.Add(name / ""), name);
       }
     }
   }
@@ -199,20 +197,14 @@ class ImageFiles {
   }
 
  private:
-  /// The folder is new: there is no link in it.
-  static std::filesystem::path Inside(const OutputFolder& folder, const std::string& name,
-                                      const char* option) {
+  /// `name` as a path that stays in its folder. That is new, and so has no link in it.
+  static std::filesystem::path Inside(const std::string& name, const char* option) {
     const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
     if (path.is_absolute() || *path.begin() == "..") {
       throw Error(ExitCode::kNotTrusted, ErrorLine({}, option, "'" + name + "' leaves its folder",
-                                                   "a path inside '" + folder.Shown("") + "'"));
+                                                   "a path inside the output folder"));
     }
-    return folder.partial() / name;
-  }
-  static void MakeFolder(const std::filesystem::path& path, const std::string& shown) {
-    std::error_code error;
-    std::filesystem::create_directories(path, error);
-    if (error) internal::FailCreate(shown, error.value());
+    return path;
   }
   void FindPixels(const Frame& frame) {
     pixels_.clear();

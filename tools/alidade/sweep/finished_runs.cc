@@ -1,61 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/sweep/finished_runs.h"
 
-#include <cerrno>
+#include <filesystem>
 #include <fstream>
-#include <utility>
+#include <system_error>
 
 #include "alidade/sweep/run_line.h"
 
 namespace alidade::internal {
 
-FinishedRuns::FinishedRuns(OutputFolder& folder, const std::vector<std::filesystem::path>& before)
-    : folder_(folder) {
-  for (const std::filesystem::path& one : before) Read(one / kFinishedRuns);
-  file_ = folder.Create(kFinishedRuns);
-  for (const auto& [key, known] : known_) file_->Write(RunLine(key.first, known.run));
-  file_->Flush();
-}
-
-void FinishedRuns::Read(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream && errno != ENOENT) FailIo(file.string(), "read", errno);
+FinishedRuns::FinishedRuns(OutputFolder& folder) : folder_(folder) {
+  const std::filesystem::path file = folder.partial() / kFinishedRuns;
+  std::ifstream stream(file, std::ios::binary);
   Place place{file.string(), 0, 0};
   SharedNames names;
-  for (std::string line; std::getline(stream, line);) {
-    if (stream.eof()) return;  // cut short
+  std::uintmax_t whole = 0;  // bytes of the lines that have their end
+  for (std::string line; std::getline(stream, line) && !stream.eof();) {
     ++place.line;
+    whole += line.size() + 1;
     std::optional<LineOfRun> read = ReadRunLine(line);
     if (!read) {
-      throw Error(ExitCode::kBadData, ErrorLine(place, {}, "is not what a sweep writes",
-                                                "a run as JSON; leave out --resume"));
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(place, {}, "is not a line that a sweep writes", "a run as JSON"));
     }
     const std::uint64_t seed = read->run.seed;
     read->run.ShareNames(names);
-    known_.try_emplace({read->value, seed}, Known{std::move(read->run), place});
+    known_.try_emplace({read->value, seed}, std::move(read->run));
   }
-  if (stream.bad()) FailIo(file.string(), "read", EIO);
+  std::error_code error;
+  if (stream.is_open()) std::filesystem::resize_file(file, whole, error);
+  if (error) FailIo(file.string(), "write", error.value());
+  file_ = folder.Append(kFinishedRuns);
 }
 
-const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uint64_t seed) const {
+const SweepRun* FinishedRuns::Find(const std::string& value, std::uint64_t seed) const {
   const auto found = known_.find({value, seed});
   return found == known_.end() ? nullptr : &found->second;
 }
 
-void FinishedRuns::Add(std::string line) {
-  std::unique_lock lock(mutex_);
-  waiting_.push_back(std::move(line));
-  if (writing_) return;
-  writing_ = true;
-  while (!waiting_.empty()) {
-    const std::vector<std::string> lines = std::exchange(waiting_, {});
-    lock.unlock();
-    if (!folder_.kept()) folder_.Keep();
-    for (const std::string& one : lines) file_->Write(one);
-    file_->Flush();  // the next may take hours
-    lock.lock();
-  }
-  writing_ = false;
+void FinishedRuns::Add(const std::string& value, const SweepRun& run) {
+  const std::string line = RunLine(value, run);
+  const std::lock_guard lock(mutex_);
+  folder_.Keep();
+  file_->Write(line);
+  file_->Flush();  // the next run may take hours
 }
 
 }  // namespace alidade::internal

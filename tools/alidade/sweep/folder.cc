@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <system_error>
 #include <unordered_map>
 
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
 #include "alidade/base/output_folder.h"
-#include "alidade/resume/leftovers.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
-#include "alidade/sweep/shards.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/table.h"
 #include "alidade/sweep/vary_files.h"
@@ -28,42 +28,7 @@ using internal::CsvFile;
 using internal::Json;
 using internal::OutputFolder;
 
-struct SweepFolder::Impl {
-  Impl(const Options& options, const Config& config);
-  Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
-  /// Unless it is there already.
-  void WriteConfig(const Config& config) const;
-  void Commit(bool stopped);
-
-  OutputFolder folder;
-  bool shard = false;
-  std::optional<internal::Leftovers> leftovers;
-  std::optional<internal::FinishedRuns> finished;
-};
-
-SweepFolder::Impl::Impl(const Options& options, const Config& config)
-    : folder(options.folder, options.force || options.resume), shard(options.shard) {
-  std::vector<std::filesystem::path> before;
-  if (options.resume) {
-    if (!options.force) internal::CheckReplaceable(options.folder);
-    leftovers.emplace(options.folder).CheckInputs(config.ToYaml(), options.inputs);
-    before = leftovers->folders();
-  }
-  if (options.inputs.empty()) return;
-  folder.Write(internal::kResolvedConfig, config.ToYaml());
-  folder.Write(internal::kInputsFile, options.inputs);
-  finished.emplace(folder, before);
-}
-
-void SweepFolder::Impl::WriteConfig(const Config& config) const {
-  if (!finished) folder.Write(internal::kResolvedConfig, config.ToYaml());
-}
-
-void SweepFolder::Impl::Commit(bool stopped) {
-  if (finished) finished->Close();
-  folder.Commit(finished && !stopped ? internal::kFinishedRuns : "");
-  if (leftovers) leftovers->Remove();
-}
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -229,18 +194,70 @@ void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::st
   csv.Close();
 }
 
-/// All runs of a shard, by value and seed, for MergeShards().
+/// Replaces the runs in the order in which they ended by all of them, by value and seed.
 void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
-  const auto file = folder.Create(internal::kShardRuns);
+  const std::string sorted = std::string(internal::kFinishedRuns) + ".sorted";
+  const auto file = folder.Create(sorted);
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) file->Write(internal::RunLine(part.value, run));
   }
   file->Close();
+  std::error_code error;
+  fs::rename(folder.partial() / sorted, folder.partial() / internal::kFinishedRuns, error);
+  if (error) internal::FailIo((folder.partial() / sorted).string(), "rename", error.value());
+}
+
+/// Refuses to continue a sweep of another config or other inputs than `now`.
+void CheckInputs(const fs::path& partial, const internal::MadeFrom& now) {
+  const std::string difference = internal::DifferenceOf(
+      internal::ReadMadeFrom(partial), (partial / internal::kInputsFile).string(), now);
+  if (difference.empty()) return;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{partial.string()}, {}, "was made from other inputs: " + difference) +
+                  "; to start anew, remove it, or replace it by --force without --resume");
+}
+
+/// Removes what a sweep that was stopped has written of its results.
+void RemoveResults(const OutputFolder& folder) {
+  const std::set<std::string> kept = {internal::kResolvedConfig, internal::kInputsFile,
+                                      internal::kFinishedRuns, "files.txt"};
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder.partial())) {
+    names.insert(entry.path().filename().string());
+  }
+  for (const std::string& name : names) {
+    if (!kept.contains(name)) folder.Remove(name);
+  }
 }
 
 }  // namespace
 
-SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
+struct SweepFolder::Impl {
+  Impl(const Options& options, const Config& config);
+  Impl(const fs::path& path, bool force) : folder(path, force) {}
+  /// The end of every Write().
+  void Complete(const Parts& parts, bool stopped, const Config& config);
+
+  OutputFolder folder;
+  bool shard = false;
+  std::optional<internal::FinishedRuns> finished;
+};
+
+SweepFolder::Impl::Impl(const Options& options, const Config& config)
+    : folder(options.folder, options.force, options.resume), shard(options.shard) {
+  const std::string text = config.ToYaml();
+  if (fs::exists(folder.partial() / internal::kInputsFile)) {
+    CheckInputs(folder.partial(), {text, options.inputs});
+    RemoveResults(folder);
+  } else {
+    folder.Write(internal::kResolvedConfig, text);
+    folder.Write(internal::kInputsFile, options.inputs);
+  }
+  folder.Write("sweep.json", internal::JsonText({{"status", "running"}}));
+  finished.emplace(folder);
+}
+
+SweepFolder::SweepFolder(const fs::path& folder, bool force)
     : impl_(std::make_unique<Impl>(folder, force)) {}
 
 SweepFolder::SweepFolder(const Options& options, const Config& config)
@@ -252,48 +269,48 @@ internal::FinishedRuns* SweepFolder::finished() {
   return impl_->finished ? &*impl_->finished : nullptr;
 }
 
-const std::vector<std::filesystem::path>& SweepFolder::resumed() const {
-  static const std::vector<std::filesystem::path> none;
-  return impl_->leftovers ? impl_->leftovers->folders() : none;
-}
-
-std::filesystem::path SweepFolder::failed() const { return impl_->folder.failed(); }
-const std::filesystem::path& SweepFolder::partial() const { return impl_->folder.partial(); }
-
 const internal::OutputFolder& SweepFolder::files() const { return impl_->folder; }
 
 void SweepFolder::AddFile(const std::string& name, const std::string& text) {
   impl_->folder.Write(name, text);
 }
 
+void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config& config) {
+  if (finished) {
+    finished->Close();
+    folder.Keep();
+    if (stopped) return;
+    shard ? WriteShardRuns(folder, parts) : folder.Remove(internal::kFinishedRuns);
+  } else {
+    folder.Write(internal::kResolvedConfig, config.ToYaml());
+  }
+  folder.Commit();
+}
+
 void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                         const Config& config) {
   const OutputFolder& folder = impl_->folder;
-  impl_->WriteConfig(config);
   folder.Write("sweep.json", SweepJson(result, summaries));
   const Parts parts = {{&result, ""}};
   WriteRuns(folder, parts, "");
   WriteFailures(folder, parts, "");
-  if (impl_->shard && !result.stopped) WriteShardRuns(folder, parts);
   folder.Write("table.md", internal::SweepMarkdown(result, summaries));
-  impl_->Commit(result.stopped);
+  impl_->Complete(parts, result.stopped, config);
 }
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
   const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
-  impl_->WriteConfig(config);
   folder.Write("sweep.json", SweepJson(sweep));
   internal::WriteSweepCsv(folder, sweep);
   WriteRuns(folder, parts, sweep.variation.key);
   WriteFailures(folder, parts, sweep.variation.key);
-  if (impl_->shard && !sweep.stopped()) WriteShardRuns(folder, parts);
   folder.Write("table.md", internal::VariedMarkdown(sweep));
   internal::WriteReprojection(folder, sweep);
   std::string note = internal::DrawVariation(folder, sweep, stop);
   if (note.empty()) note = internal::DrawReprojection(folder, sweep, stop);
-  impl_->Commit(sweep.stopped());
+  impl_->Complete(parts, sweep.stopped(), config);
   return note;
 }
 

@@ -8,11 +8,12 @@
 #include <system_error>
 
 #include "alidade/base/json.h"
+#include "alidade/base/output_folder.h"
 #include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
-#include "alidade/resume/leftovers.h"
-#include "alidade/resume/replay.h"
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/replay.h"
+#include "alidade/replay/run_inputs.h"
+#include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/run_line.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -61,6 +62,10 @@ std::string TextOf(const Shard& shard) {
 }
 
 ShardFolder ReadShardFolder(const fs::path& folder) {
+  if (!fs::exists(folder) && fs::exists(PartialOf(folder))) {
+    FailData(folder, "is not finished: it is " + PartialOf(folder).string(),
+             "a folder that its sweep has completed");
+  }
   const RecordedInputs recorded = ReadReplayable(folder);
   const std::string text = ValueOf(recorded.command.arguments, "--shard");
   const fs::path inputs = folder / kInputsFile;
@@ -75,8 +80,8 @@ ShardFolder ReadShardFolder(const fs::path& folder) {
     FailData(inputs, "has the shard '" + text + "' of " + std::to_string(runs) + " runs",
              "i/n with 1 <= i <= n, and a run for each shard");
   }
-  one.made_from = {TextOf(folder / kResolvedConfig),
-                   WithoutOption(TextOf(inputs), "--shard", text)};
+  one.made_from = ReadMadeFrom(folder);
+  one.made_from.inputs = WithoutOption(one.made_from.inputs, "--shard", text);
   return one;
 }
 
@@ -95,39 +100,33 @@ void CheckSameSweep(const ShardFolder& first, const ShardFolder& one) {
            "the shards of one sweep");
 }
 
-/// By their numbers. Refuses shards that come twice or are missing.
+/// Sorts the shards by index. Refuses shards that come twice or are missing.
 void Order(std::vector<ShardFolder>& shards) {
   std::ranges::stable_sort(shards, {}, [](const ShardFolder& one) { return one.shard.index; });
-  const auto twice = std::ranges::adjacent_find(
-      shards, {}, [](const ShardFolder& one) { return one.shard.index; });
-  if (twice != shards.end()) {
-    FailData((twice + 1)->folder,
-             "is shard " + TextOf(twice->shard) + " again, as " + twice->folder.string() + " is",
-             "each shard once");
+  std::vector<std::string> missing;
+  int index = 0;
+  for (const ShardFolder& one : shards) {
+    if (one.shard.index == index) {
+      FailData(one.folder, "is shard " + TextOf(one.shard) + ", which comes twice",
+               "each shard once");
+    }
+    while (++index < one.shard.index) missing.push_back(TextOf(Shard{index, one.shard.of}));
   }
   const int of = shards.front().shard.of;
-  std::vector<std::string> missing;
-  auto next = shards.begin();
-  for (int i = 1; i <= of; ++i) {
-    if (next != shards.end() && next->shard.index == i) {
-      ++next;
-    } else {
-      missing.push_back(TextOf(Shard{i, of}));
-    }
-  }
+  while (++index <= of) missing.push_back(TextOf(Shard{index, of}));
   if (missing.empty()) return;
   constexpr std::size_t kShown = 10;
   const std::size_t count = missing.size();
   if (count > kShown) missing.resize(kShown);
   throw Error(ExitCode::kBadData,
-              (count == 1 ? "a shard is missing: " : "shards are missing: ") + Join(missing, ", ") +
+              "shards are missing: " + Join(missing, ", ") +
                   (count > kShown ? " and " + std::to_string(count - kShown) + " more" : ""));
 }
 
 /// Adds the runs of a shard to `results`, which are by value; all share `names`.
 void AddRuns(const ShardFolder& one, const SeedRange& seeds, const std::vector<std::string>& values,
              SharedNames& names, std::vector<SweepResult>& results) {
-  const fs::path file = one.folder / kShardRuns;
+  const fs::path file = one.folder / kFinishedRuns;
   std::ifstream stream(file);
   if (!stream)
     throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read"));

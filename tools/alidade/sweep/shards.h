@@ -12,9 +12,6 @@
 /// The shards of one sweep, put together.
 namespace alidade::internal {
 
-/// In the folder of a shard: all of its runs, the RunLine() of each.
-constexpr const char* kShardRuns = "shard_runs.jsonl";
-
 /// A sweep, as one process would have made it.
 struct MergedSweep {
   Config config;

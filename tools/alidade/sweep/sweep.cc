@@ -10,12 +10,9 @@
 #include <thread>
 
 #include "alidade/base/log.h"
-#include "alidade/base/signal_stack.h"
-#include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/processors.h"
 #include "alidade/sweep/reprojection.h"
-#include "alidade/sweep/run_line.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {
@@ -41,21 +38,6 @@ class Queue {
     }
   }
 
-  /// Makes the first run that was finished before once more. Error: kFound where it is another.
-  void CheckFinished() {
-    for (std::int64_t index = 0; index < runs_; ++index) {
-      const auto seed = first_seed_ + static_cast<std::uint64_t>(index);
-      const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
-      if (known == nullptr) continue;
-      const SweepRun again = RunSeed(config_, seed);
-      if (again.status == RunStatus::kStopped) return;
-      const std::string was = internal::RunLine(options_.value, known->run);
-      if (again.status == RunStatus::kOk && internal::RunLine(options_.value, again) == was) return;
-      internal::FailOtherResults(
-          known->place, "the run of seed " + std::to_string(seed) + " gives other results now");
-    }
-  }
-
   /// The finished ones, by seed.
   std::vector<SweepRun> Take() {
     if (thrown_) std::rethrow_exception(thrown_);
@@ -72,23 +54,19 @@ class Queue {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
     const std::uint64_t seed = first_seed_ + static_cast<std::uint64_t>(index);
-    const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
+    const SweepRun* const known =
+        options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
     if (known == nullptr && Stopped()) return true;
-    SweepRun run = known != nullptr ? known->run : RunSeed(config, seed);
+    SweepRun run = known != nullptr ? *known : RunSeed(config, seed);
     if (run.status == RunStatus::kStopped) return true;
     if (known == nullptr && options_.finished != nullptr && run.status == RunStatus::kOk) {
-      options_.finished->Add(internal::RunLine(options_.value, run));
+      options_.finished->Add(options_.value, run);
     }
     const std::lock_guard lock(mutex_);
     run.ShareNames(names_);
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
-  }
-
-  /// Null: it was not.
-  const internal::FinishedRuns::Known* FinishedBefore(std::uint64_t seed) const {
-    return options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
   }
 
   /// For one thread: asking marks keys as read.
@@ -181,17 +159,13 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   result.first_seed = seeds.first;
 
   Queue queue(config, host, options, result.first_seed, result.runs);
-  queue.CheckFinished();
   const std::int64_t jobs = options.jobs > 0 ? options.jobs : UsableProcessors();
   const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
   {
     std::vector<std::jthread> threads;
     for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
       try {
-        threads.emplace_back([&queue] {
-          const internal::SignalStack stack;
-          queue.Work();
-        });
+        threads.emplace_back([&queue] { queue.Work(); });
       } catch (const std::system_error&) {
         break;  // no more threads are to be had; these do
       }

@@ -37,8 +37,8 @@ struct SweepOptions {
   std::function<RunResult(Experiment&, const RunOptions&)> run;
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
   std::function<bool()> stop;                                ///< true: drop unfinished runs
-  /// SweepFolder::finished(): runs that are in it are not made again, but for the first; the others
-  /// are added. Null: all are made.
+  /// SweepFolder::finished(): runs that are in it are not made again, the others are added to it.
+  /// Null: all are made.
   internal::FinishedRuns* finished = nullptr;
   std::string value = {};  ///< of the varied key, in `finished`
 };
@@ -104,8 +104,8 @@ struct SweepResult {
 /// Runs `config` once for each seed (key `source.seed`), in memory, each run built afresh from its
 /// own copy of the config. Results do not depend on the number of threads. A run in which an
 /// estimator diverges goes on also under `on_divergence: fail`. What ends one run, ends that one
-/// only. Errors: those of BuildExperiment, before the first run; kFound where the first run that
-/// was finished before does not give the same again; kIo where a finished run cannot be written.
+/// only. Errors: those of BuildExperiment, before the first run; kIo if a finished run cannot be
+/// written.
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
 
 /// Keys of the config, and the values that all of them take one after the other.
@@ -156,22 +156,22 @@ std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary
 std::string SweepTable(const VariedSweep& sweep);
 
 /// The folder of a sweep (docs/cli.md): sweep.json, runs.csv, table.md, config.resolved.yaml, and
-/// failures.csv where a run failed; of a varied one sweep.csv and a figure too; of a shard
-/// shard_runs.jsonl, which MergeShards() reads. It is there in full or not at all.
+/// failures.csv if a run failed; of a varied one sweep.csv and a figure too; of a shard
+/// finished_runs.jsonl, which MergeShards() reads. Until all runs are finished it is
+/// `FOLDER.partial`, whose finished_runs.jsonl has those that are.
 class SweepFolder {
  public:
   struct Options {
     std::filesystem::path folder;
     bool force = false;
-    std::string inputs = {};  ///< the text of inputs.json; "": there is none
-    /// Continues what unfinished sweeps left here: see `alidade sweep --resume` in docs/cli.md.
-    bool resume = false;
-    bool shard = false;  ///< the sweep is a shard
+    std::string inputs;   ///< the text of inputs.json
+    bool resume = false;  ///< continue the sweep that left `FOLDER.partial`, if that exists
+    bool shard = false;   ///< the sweep is a shard
   };
-  /// Takes the name. Errors: kCannotCreate where it exists without `force` and is no unfinished
-  /// sweep to be resumed, or one that was made from another config or other inputs; kIo.
+  /// Errors: those of OutputFolder; kCannotCreate if the sweep to be resumed was made from another
+  /// config or other inputs.
   SweepFolder(const Options& options, const Config& config);
-  /// Likewise, without inputs: finished runs are not kept before all are.
+  /// Likewise, without inputs: nothing is kept before all runs are finished or it is stopped.
   SweepFolder(const std::filesystem::path& folder, bool force);
   ~SweepFolder();
   SweepFolder(const SweepFolder&) = delete;
@@ -179,20 +179,16 @@ class SweepFolder {
 
   /// For SweepOptions; null: there is no inputs.json.
   internal::FinishedRuns* finished();
-  /// The folders of unfinished sweeps that this one resumes.
-  const std::vector<std::filesystem::path>& resumed() const;
-  /// Where the finished runs are kept if it is not written; "": nowhere.
-  std::filesystem::path failed() const;
-  /// The temporary folder.
-  const std::filesystem::path& partial() const;
   /// For files that it has besides.
   const internal::OutputFolder& files() const;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);
-  /// `summaries` are those of Summarise(result). Errors: kCannotCreate, kIo.
+  /// Writes all files and renames the folder; but with inputs, a sweep that was stopped stays in
+  /// `FOLDER.partial`. `summaries` are those of Summarise(result). Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
              const Config& config);
-  /// Returns why there is no figure, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.
+  /// Likewise. Returns why there is no figure, or "". `stop` ends the drawing. Errors:
+  /// kCannotCreate, kIo.
   std::string Write(const VariedSweep& sweep, const Config& config,
                     const std::function<bool()>& stop = {});
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/compare_rows.h"
+#include "alidade/replay/compare_rows.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -53,11 +53,10 @@ std::string RowDifference::Text() const {
   return "now '" + now + "', was '" + before + '\'';
 }
 
-RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_row) {
+RowComparison CompareRows(std::istream& before, std::istream& now) {
   RowComparison comparison;
   for (std::string was, is;; ++comparison.rows) {
     comparison.before_goes_on = NextRow(before, was);
-    if (last_row == LastRow::kWhereWhole && !was.ends_with('\n')) comparison.before_goes_on = false;
     comparison.now_goes_on = NextRow(now, is);
     if (!comparison.before_goes_on || !comparison.now_goes_on) return comparison;
     if (was == is) continue;
@@ -66,10 +65,9 @@ RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_
   }
 }
 
-RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now,
-                          LastRow last_row) {
+RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now) {
   std::ifstream was = Opened(before), is = Opened(now);
-  const RowComparison comparison = CompareRows(was, is, last_row);
+  const RowComparison comparison = CompareRows(was, is);
   if (was.bad()) FailIo(before.string(), "read", EIO);
   if (is.bad()) FailIo(now.string(), "read", EIO);
   return comparison;

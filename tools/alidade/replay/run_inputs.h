@@ -60,4 +60,14 @@ std::string WithoutOption(std::string text, const std::string& option, const std
 std::vector<std::string> InputDifferences(const std::string& before, const std::string& file,
                                           const std::string& now);
 
+/// The texts of the two files that say what a folder was made from.
+struct MadeFrom {
+  std::string config, inputs;
+};
+/// Those of `folder`. Errors: kInputMissing, kIo.
+MadeFrom ReadMadeFrom(const std::filesystem::path& folder);
+/// What differs between the two, on one line; "" if nothing does. `file` is the inputs.json of
+/// `before`. Error: kBadData.
+std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now);
+
 }  // namespace alidade::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/compare_rows.h"
+#include "alidade/replay/compare_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -12,10 +12,9 @@
 namespace alidade::internal {
 namespace {
 
-RowComparison Compare(const std::string& before, const std::string& now,
-                      LastRow last_row = LastRow::kCounts) {
+RowComparison Compare(const std::string& before, const std::string& now) {
   std::istringstream was(before), is(now);
-  return CompareRows(was, is, last_row);
+  return CompareRows(was, is);
 }
 
 TEST(CompareRows, FindsTheFirstCellThatDiffers) {
@@ -52,29 +51,24 @@ TEST(CompareRows, SaysWhichGoesOn) {
   EXPECT_FALSE(same.difference || same.before_goes_on || same.now_goes_on);
 }
 
-TEST(CompareRows, ARowWithoutItsLineEndCountsOrWasCut) {
+TEST(CompareRows, ARowWithoutItsLineEndCounts) {
   const auto end = Compare("1\n2", "1\n2\n").difference;
   ASSERT_TRUE(end);
   EXPECT_EQ(end->Text(), "line end");
   EXPECT_EQ(Compare("1,\n", "1,").difference->Text(), "line end");
   EXPECT_EQ(Compare("12\n", "1").difference->Text(), "now '1', was '12'");
   EXPECT_TRUE(Compare("1\n2", "1\n23\n").difference);
-  const RowComparison cut = Compare("1\n2", "1\n23\n", LastRow::kWhereWhole);
-  EXPECT_FALSE(cut.difference);
-  EXPECT_FALSE(cut.before_goes_on);
-  EXPECT_TRUE(cut.now_goes_on);
-  EXPECT_FALSE(Compare("1\n2", "1\n", LastRow::kWhereWhole).before_goes_on);
 }
 
 TEST(CompareRows, AFileThatIsNotThereHasNoRowsAndOneThatCannotBeReadIsAnError) {
   const testing::TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.csv";
   std::ofstream(file) << "1\n";
-  const RowComparison missing = CompareRows(file, folder / "b.csv", LastRow::kCounts);
+  const RowComparison missing = CompareRows(file, folder / "b.csv");
   EXPECT_TRUE(missing.before_goes_on);
   EXPECT_FALSE(missing.difference);
   try {
-    CompareRows(folder.path(), file, LastRow::kCounts);
+    CompareRows(folder.path(), file);
     ADD_FAILURE() << "a folder has no rows";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kIo);

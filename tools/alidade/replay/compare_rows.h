@@ -27,12 +27,8 @@ struct RowComparison {
   bool now_goes_on = false;
 };
 
-/// A last row of `before` without a line end: one like any other, or one that was cut.
-enum class LastRow { kCounts, kWhereWhole };
-
-RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_row);
+RowComparison CompareRows(std::istream& before, std::istream& now);
 /// A file that is not there has no rows. Error: kIo where one cannot be read.
-RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now,
-                          LastRow last_row);
+RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now);
 
 }  // namespace alidade::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/replay.h"
+#include "alidade/replay/replay.h"
 
 #include <algorithm>
 #include <array>
@@ -12,20 +12,20 @@
 #include "alidade/base/json.h"
 #include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
-#include "alidade/resume/compare_rows.h"
-#include "alidade/resume/leftovers.h"
+#include "alidade/replay/compare_rows.h"
 
 namespace alidade::internal {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string ReadInputsText(const fs::path& file) {
-  return ReadFile(file, [&](ExitCode code, int error) {
-    throw Error(code, ErrorLine(Place{file.string()}, {},
-                                "cannot be read: " + std::generic_category().message(error),
-                                "the folder of an `alidade run` or `alidade sweep`"));
-  });
+/// `status` of a file of JSON; "" if it cannot be read or has none.
+std::string StatusIn(const fs::path& file) {
+  const std::string text = ReadFile(file, [](ExitCode, int) {});
+  if (text.empty()) return "";
+  const Json json = ParseJson(text, file.string());
+  const auto status = json.is_object() ? json.find("status") : json.end();
+  return status != json.end() && status->is_string() ? status->get<std::string>() : "";
 }
 
 /// What `files.txt` of a folder lists, as far as these are files.
@@ -41,9 +41,14 @@ std::set<std::string> ListedFiles(const fs::path& folder) {
 
 }  // namespace
 
+std::string RecordedStatus(const fs::path& folder) {
+  const std::string run = StatusIn(folder / "run.json");
+  return run.empty() ? StatusIn(folder / "sweep.json") : run;
+}
+
 RecordedInputs ReadReplayable(const fs::path& folder) {
   const fs::path file = folder / kInputsFile;
-  const RecordedInputs inputs = ReadInputs(ReadInputsText(file), file.string());
+  const RecordedInputs inputs = ReadInputs(ReadMadeFrom(folder).inputs, file.string());
   const std::vector<std::string>& arguments = inputs.command.arguments;
   if (arguments.empty() || (arguments[0] != "run" && arguments[0] != "sweep")) {
     throw Error(ExitCode::kBadData, ErrorLine(Place{file.string()}, "arguments",
@@ -56,12 +61,11 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
                           "a run on files"));
   }
   const std::string status = RecordedStatus(folder);
-  if (status.empty() || status == "stopped") {
-    throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {},
-                          status.empty() ? "was not written to its end: no run.json or sweep.json"
-                                         : "was stopped before its end",
-                          "a run that came to it; --resume of the same command goes on"));
+  if (status.empty() || status == "running" || status == "stopped") {
+    throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
+                                              status == "stopped" ? "was stopped before its end"
+                                                                  : "was not written to its end",
+                                              "the folder of a run or sweep that is finished"));
   }
   return inputs;
 }
@@ -74,9 +78,8 @@ bool HasWallClock(std::string_view file) {
 
 ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
   ReplayResult result;
-  result.inputs =
-      InputDifferences(ReadInputsText(before / kInputsFile), (before / kInputsFile).string(),
-                       ReadInputsText(now / kInputsFile));
+  result.inputs = InputDifferences(ReadMadeFrom(before).inputs, (before / kInputsFile).string(),
+                                   ReadMadeFrom(now).inputs);
   std::set<std::string> made = ListedFiles(now);
   std::error_code ignored;
   for (const std::string& name : ListedFiles(before)) {
@@ -95,7 +98,7 @@ ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
       result.differences.push_back({name, 0, 0, "is not made now"});
       continue;
     }
-    const RowComparison rows = CompareRows(before / name, now / name, LastRow::kCounts);
+    const RowComparison rows = CompareRows(before / name, now / name);
     if (rows.difference) {
       result.differences.push_back(
           {name, rows.difference->line, rows.difference->column, rows.difference->Text()});

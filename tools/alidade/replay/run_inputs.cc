@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <system_error>
 
 #include "alidade/base/json.h"
 #include "alidade/base/output_file.h"
+#include "alidade/base/read_file.h"
 #include "alidade/base/sha256.h"
 #include "alidade/base/words.h"
-#include "alidade/resume/build_ids.h"
+#include "alidade/replay/build_ids.h"
+#include "alidade/replay/compare_rows.h"
 
 namespace alidade::internal {
 namespace {
@@ -238,6 +241,34 @@ std::vector<std::string> InputDifferences(const std::string& before, const std::
   }
   for (const auto& [name, value] : was) differences.push_back(name + ": missing now");
   return differences;
+}
+
+MadeFrom ReadMadeFrom(const fs::path& folder) {
+  const auto read = [&folder](const char* name) {
+    const fs::path file = folder / name;
+    return ReadFile(file, [&](ExitCode code, int error) {
+      throw Error(code, ErrorLine(Place{file.string()}, {},
+                                  "cannot be read: " + std::generic_category().message(error),
+                                  "the folder of an `alidade run` or `alidade sweep`"));
+    });
+  };
+  MadeFrom made;
+  made.inputs = read(kInputsFile);
+  made.config = read(kResolvedConfig);
+  return made;
+}
+
+std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now) {
+  std::vector<std::string> differences;
+  std::istringstream config_before(before.config), config_now(now.config);
+  if (const auto one = CompareRows(config_before, config_now).difference) {
+    differences.push_back(std::string(kResolvedConfig) + ':' + std::to_string(one->line) + ": " +
+                          one->Text());
+  }
+  for (const std::string& one : InputDifferences(before.inputs, file, now.inputs)) {
+    if (differences.empty() || !one.starts_with("config: ")) differences.push_back(one);
+  }
+  return Join(differences, "; ");
 }
 
 }  // namespace alidade::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/build_ids.h"
+#include "alidade/replay/build_ids.h"
 
 #include <elf.h>
 #include <link.h>

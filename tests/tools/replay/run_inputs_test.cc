@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
 
-#include "alidade/resume/build_ids.h"
+#include "alidade/replay/build_ids.h"
 #include "support/recording.h"
 #include "support/temporary_folder.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/resume/run_inputs.h"
+#include "alidade/replay/run_inputs.h"
 
 /// Whether a run folder and one that was made again from what it records are the same.
 namespace alidade::internal {
@@ -26,6 +26,9 @@ struct ReplayResult {
 
   bool equal() const { return inputs.empty() && differences.empty(); }
 };
+
+/// `status` in the run.json or sweep.json of a folder; "" if there is none. Error: kBadData.
+std::string RecordedStatus(const std::filesystem::path& folder);
 
 /// What `folder` was made from. Errors: kInputMissing where it has no inputs.json, or its data came
 /// from a pipe; kBadData where it is unfinished.

@@ -149,7 +149,11 @@ void StopOnSignals() {
   action.sa_handler = HandleStop;
   sigemptyset(&action.sa_mask);
   action.sa_flags = 0;  // a read that waits for data ends
-  for (const int stop : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(stop, &action, nullptr);
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hangup {};
+  ::sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);  // not under nohup
 }
 
 bool StopRequested() { return stop_requested; }

@@ -46,8 +46,8 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// From now on SIGINT, SIGTERM and SIGHUP request the command to stop; a second one ends the
-/// process at once.
+/// From now on SIGINT, SIGTERM and, unless it is ignored, SIGHUP request the command to stop; a
+/// second one ends the process at once.
 void StopOnSignals();
 bool StopRequested();
 

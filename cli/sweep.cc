@@ -207,8 +207,7 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command
       .add_flag("--resume", arguments->resume,
-                "continue the sweep that left the folder of -o with .partial added: its finished "
-                "runs are not made again")
+                "continue what an ended sweep left in FOLDER.partial: make the runs that it lacks")
       ->needs(command.get_option("--output"))
       ->excludes(command.get_option("--force"));
   command.add_flag("--quiet", arguments->quiet, "print errors only");

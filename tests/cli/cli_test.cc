@@ -316,6 +316,19 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
+// As under nohup. A second signal would end it at once.
+TEST_F(Cli, AHangUpThatIsIgnoredStopsNothing) {
+  before_ = "trap '' HUP";
+  const pid_t run = Start(
+      {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
+  ASSERT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
+  ::kill(run, SIGHUP);
+  ::kill(run, SIGTERM);
+  const Outcome stopped = Wait(run);
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
+}
+
 TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome list = Call({"plugins", "list"});
   EXPECT_EQ(list.code, 0);

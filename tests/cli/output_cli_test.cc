@@ -164,6 +164,12 @@ TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
+  // One that is not complete has its name too.
+  fs::create_directory(folder_ / "runs/left.partial");
+  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=left"}).err,
+            "runs/left.partial exists: the output is runs/left-2 (--force replaces "
+            "runs/left.partial)\n");
+  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/left"}).code, 73);
 }
 
 TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {

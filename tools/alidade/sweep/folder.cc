@@ -280,7 +280,11 @@ void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config&
     finished->Close();
     folder.Keep();
     if (stopped) return;
-    shard ? WriteShardRuns(folder, parts) : folder.Remove(internal::kFinishedRuns);
+    if (shard) {
+      WriteShardRuns(folder, parts);
+    } else {
+      folder.Remove(internal::kFinishedRuns);
+    }
   } else {
     folder.Write(internal::kResolvedConfig, config.ToYaml());
   }

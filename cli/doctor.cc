@@ -109,13 +109,6 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   for (const Refusal& refusal : host.refusals()) {
     diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));
   }
-  std::set<std::string> unoptimised;
-  for (const PluginEntry& entry : host.entries()) {
-    if (entry.unoptimised) unoptimised.insert(entry.plugin.string());
-  }
-  for (const std::string& file : unoptimised) {
-    diagnosis.Warn("plugin " + file + " was built without optimisation", kBuildOptimised);
-  }
   const auto count = [&](PluginEntry::Kind kind) {
     return static_cast<int>(std::ranges::count(host.entries(), kind, &PluginEntry::kind));
   };

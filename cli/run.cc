@@ -93,9 +93,6 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
                     const std::string& video) {
   std::string text = table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
-  if (const std::string note = UnoptimisedText(result.unoptimised); !note.empty()) {
-    text += '\n' + note + '\n';
-  }
   text += "\nwrote " + recorder.folder().string() + '\n';
   for (const std::string& path : recorder.highlights()) {
     text += "  " + (recorder.folder() / path).string() + '\n';

@@ -30,8 +30,8 @@ endfunction()
 
 # alidade_add_library(NAME SOURCES file... HEADERS file...)
 #
-# The shared library alidade::NAME of this folder, libalidade-NAME: exports the names of alidade
-# alone and leaves none undefined. HEADERS are those that are installed, relative to the folder.
+# The shared library alidade::NAME of this folder, libalidade-NAME, which exports the names that
+# exports.map lists. HEADERS are those that are installed, relative to the folder.
 function(alidade_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
   set(target alidade_${name})
@@ -42,12 +42,10 @@ function(alidade_add_library name)
     FILE_SET HEADERS BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR} FILES ${arg_HEADERS})
   set_target_properties(${target} PROPERTIES
     OUTPUT_NAME alidade-${name} EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION 0
-    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
     LINK_DEPENDS ${exports})
   alidade_warnings(${target})
   alidade_unity(${target} 12 4)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_options(${target} PRIVATE -Wl,--version-script=${exports})
-  alidade_no_undefined(${target})
   target_compile_definitions(${target} PRIVATE ALIDADE_VERSION="${PROJECT_VERSION}")
 endfunction()

@@ -1,18 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# Leaves no symbol of a library undefined. Of clang's sanitizers the program has the runtime alone.
-function(alidade_no_undefined target)
-  if(NOT (CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND CMAKE_CXX_FLAGS MATCHES "-fsanitize"))
-    target_link_options(${target} PRIVATE -Wl,-z,defs)
-  endif()
-endfunction()
-
 # alidade_add_plugin(NAME SOURCES file... [CPP] [FOLDER folder] [LIBRARIES target...])
 #
-# Builds a plugin that alidade loads at run time: hidden visibility, no undefined symbols, no
-# instruction-set flags. A C-ABI plugin (models) needs the headers alone; CPP (sources,
-# estimators) links alidade::core and loads only into the very build it was made with.
-# What lies in another FOLDER than `plugins` is not searched, but loaded when it is needed.
+# Builds a plugin that alidade loads at run time: hidden visibility, no instruction-set flags. A
+# C-ABI plugin (models) needs the headers alone; CPP (sources, estimators) links alidade::core and
+# loads only into an alidade of the same ABI number. A plugin in another FOLDER than `plugins` is
+# not searched, but loaded when it is needed.
 #
 # Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor CMAKE_CXX_FLAGS
 # chooses a level, the plugin is compiled with -O2.
@@ -25,9 +18,8 @@ function(alidade_add_plugin name)
   set_target_properties(${name} PROPERTIES
     PREFIX "" OUTPUT_NAME "alidade_${name}"
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
-    LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/alidade/${arg_FOLDER}
+    LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib/alidade/${arg_FOLDER}
     ALIDADE_FOLDER ${arg_FOLDER})
-  alidade_no_undefined(${name})
   if(NOT CMAKE_CXX_FLAGS MATCHES "(^| )-O")
     target_compile_options(${name} PRIVATE $<$<CONFIG:>:-O2>)
   endif()

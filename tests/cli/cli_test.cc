@@ -398,22 +398,6 @@ TEST_F(Cli, PluginsPrintsJson) {
   EXPECT_GE(list.root().At("list").Items().size(), 6u);
 }
 
-TEST_F(Cli, SaysWhichPluginsWereBuiltWithoutOptimisation) {
-  const std::string plugin = ALIDADE_BINARY_DIR "/tests/plugins/driven_unoptimised.so";
-  if (!fs::exists(plugin)) GTEST_SKIP() << "built for test_plugins";
-  const Outcome doctor = Call({"doctor", "--plugin-path", plugin});
-  EXPECT_EQ(doctor.code, 0) << doctor.out;
-  EXPECT_TRUE(Contains(doctor.out, "warn  plugin " + plugin +
-                                       " was built without optimisation\n      remedy: build it "
-                                       "with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release\n"))
-      << doctor.out;
-  const Outcome run = Call({"run", ALIDADE_SOURCE_DIR "/tests/plugins/driven/config.yaml",
-                            "--plugin-path", plugin, "--no-figures", "-o", "driven"});
-  EXPECT_EQ(run.code, 0) << run.err;
-  EXPECT_TRUE(Contains(run.out, "\nwall clock: built without optimisation, ")) << run.out;
-  EXPECT_TRUE(Contains(run.out, "driven_unoptimised.so")) << run.out;
-}
-
 TEST_F(Cli, DoctorFindsThisBuildHealthy) {
   const Outcome doctor = Call({"doctor"});
   EXPECT_EQ(doctor.code, 0) << doctor.out;

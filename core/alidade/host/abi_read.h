@@ -5,11 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <string>
 
 #include "alidade/model/plugin_abi.h"
 
-/// Reads structs of plugin_abi.h by its rules.
+/// Calls plugins and reads the structs of plugin_abi.h by its rules.
 namespace alidade::internal {
 
 /// A text that may be null.
@@ -56,6 +57,21 @@ template <class T>
 bool GoodStride(std::uint32_t stride) {
   constexpr std::uint32_t kMax = 1 << 16;
   return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
+}
+
+/// The text of the exception that `call` throws; "" if it returns. No call of the plugin ABI may
+/// throw, but the code behind it may be C++.
+template <class Call>
+std::string ThrownBy(const Call& call) {
+  try {
+    call();
+    return {};
+  } catch (const std::exception& e) {
+    const std::string text = ShownText(e.what());
+    return text.empty() ? "an exception without a text" : text;
+  } catch (...) {
+    return "an exception of unknown type";
+  }
 }
 
 }  // namespace alidade::internal

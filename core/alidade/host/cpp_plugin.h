@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
 #include <iterator>
 #include <memory>
 
-#include "alidade/host/headers_hash.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/host/source.h"
 #include "alidade/model/build_tag.h"
 
-/// Exports of C++ plugins, made against alidade::core, loaded only into the very build
-/// that they were made with.
+/// Exports of C++ plugins, which are made against alidade::core.
 namespace alidade {
 
 class ImageWriter;      // in alidade/record/images.h
@@ -20,23 +17,10 @@ struct BundleProblem;   // in alidade/bundle/bundle.h
 struct BundleOptions;   // likewise
 struct BundleResult;    // likewise
 
-/// All that must be equal between the host and a C++ plugin: version and headers, compiler, and
-/// what else changes the layout of classes.
-#define ALIDADE_STRINGISE_(x) #x
-#define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
-#if defined(_GLIBCXX_DEBUG)
-#define ALIDADE_BUILD_STL "debug-stl"
-#else
-#define ALIDADE_BUILD_STL "stl"
-#endif
-#define ALIDADE_BUILD_VERSION "0.1.0"  // of the project: plugin_host.cc checks it
-#define ALIDADE_BUILD_ID \
-  ALIDADE_BUILD_VERSION  \
-  " " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
-      __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL \
-  ALIDADE_STRINGISE(_GLIBCXX_USE_CXX11_ABI) " eigen" ALIDADE_STRINGISE(EIGEN_WORLD_VERSION) \
-  "." ALIDADE_STRINGISE(EIGEN_MAJOR_VERSION) "." ALIDADE_STRINGISE(EIGEN_MINOR_VERSION) \
-  "/" ALIDADE_STRINGISE(EIGEN_MAX_ALIGN_BYTES) " headers" ALIDADE_HEADERS_HASH
+/// The ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if
+/// its number is that of the library. Whoever changes the layout or the meaning of an installed
+/// class or function raises it.
+#define ALIDADE_CPP_ABI "1"
 
 struct SourceEntry {
   const char* name;
@@ -84,7 +68,7 @@ inline constexpr const char* kCppEntrySymbol = "alidade_cpp_plugin";
 
 /// Exports a table of this plugin; `...` are the members of CppPluginTable after the size.
 #define ALIDADE_CPP_PLUGIN_(...)                                                                 \
-  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_BUILD_ID)                                        \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_CPP_ABI)                                         \
   extern "C" __attribute__((visibility("default"))) const alidade::CppPluginTable*               \
   alidade_cpp_plugin() {                                                                         \
     static const alidade::CppPluginTable table = {sizeof(alidade::CppPluginTable), __VA_ARGS__}; \

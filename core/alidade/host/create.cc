@@ -9,7 +9,6 @@
 #include "alidade/base/words.h"
 #include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
-#include "alidade/host/foreign_call.h"
 #include "alidade/host/given_noise.h"
 #include "alidade/host/param_reader.h"
 #include "alidade/host/plugin_file.h"
@@ -44,7 +43,9 @@ class NewInstance {
     c_.struct_size = sizeof(AlidadeInstance);
   }
   ~NewInstance() {
-    if (c_.self != nullptr && c_.destroy != nullptr) internal::Destroy(c_, name_, plugin_);
+    if (c_.self != nullptr && c_.destroy != nullptr) {
+      internal::DestroyInstance(c_, name_, plugin_);
+    }
   }
   NewInstance(const NewInstance&) = delete;
   NewInstance& operator=(const NewInstance&) = delete;
@@ -52,10 +53,7 @@ class NewInstance {
   /// The code of `create`, that of an error where it threw.
   std::int32_t Create(const AlidadeEntry& entry, const AlidadeHost& host) {
     std::int32_t code = ALIDADE_ERROR;
-    thrown_ = internal::ThrownBy([&] {
-      const internal::NamedCall call("Create", "model", name_, plugin_);
-      code = entry.create(&host, &c_);
-    });
+    thrown_ = internal::ThrownBy([&] { code = entry.create(&host, &c_); });
     return code;
   }
   /// What `create` threw, or "".
@@ -122,10 +120,8 @@ auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mute
   ParamReader reader(node, Named(entry.kind, entry.name));
   Params params(&reader.host());
   decltype(create(params)) made;
-  const std::string plugin = entry.plugin.string();
   try {
     const auto lock = LockShortly(mutex);
-    const internal::NamedCall call("Create", internal::KindName(entry.kind), entry.name, plugin);
     made = create(params);
   } catch (const Error&) {
     reader.Check();
@@ -250,9 +246,7 @@ std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   }
   const bool is_source = entry.kind == PluginEntry::Kind::kSource;
   const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
-  const std::string plugin = entry.plugin.string();
   recorder.Run([&] {
-    const internal::NamedCall call("Create", internal::KindName(entry.kind), entry.name, plugin);
     Params params(&recorder.host());
     try {
       if (is_source) {

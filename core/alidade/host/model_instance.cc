@@ -11,9 +11,8 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
+#include "alidade/base/log.h"
 #include "alidade/host/abi_read.h"
-#include "alidade/host/foreign_call.h"
-#include "alidade/host/instances.h"
 
 namespace alidade {
 namespace {
@@ -180,6 +179,21 @@ struct FailedCall {
 /// The last of this thread, each of another slot; the last one is the latest.
 thread_local std::vector<FailedCall> failed_calls;
 
+/// The author's name of the function in that slot of an instance; null if it is none of its slots.
+const char* NameOfCall(const AlidadeInstance& c, const void* slot) {
+  if (c.sensor != nullptr) {
+    if (slot == &c.sensor->eval) return "Predict";
+    if (slot == &c.sensor->sqrt_noise) return "SqrtNoise";
+    if (slot == &c.sensor->valid) return "Valid";
+    if (slot == &c.sensor->initialise) return "Initialise";
+  }
+  if (c.motion != nullptr) {
+    if (slot == &c.motion->step) return "Step";
+    if (slot == &c.motion->sqrt_q) return "SqrtQ";
+  }
+  return nullptr;
+}
+
 /// Without memory for it, it is one that says nothing.
 void NoteFailure(const void* slot, std::optional<std::string> thrown) noexcept {
   constexpr std::size_t kMost = 64;
@@ -203,26 +217,31 @@ Status detail::Thrown(const void* slot) noexcept {
   return Status::kError;
 }
 
+void internal::DestroyInstance(const AlidadeInstance& instance, const std::string& name,
+                               const std::string& plugin) noexcept {
+  const std::string thrown = ThrownBy([&] { instance.destroy(instance.self); });
+  if (thrown.empty()) return;
+  Log(LogLevel::kWarning,
+      "Destroy of model '" + name + "' of plugin " + plugin + " threw: " + thrown);
+}
+
 ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin)
     : instance_(ReadPrefix(&instance)), name_(std::move(name)), plugin_(std::move(plugin)) {
   if (instance_.self == nullptr || instance_.destroy == nullptr) {
     Refuse("was created without an object or without a way to destroy it");
   }
   try {
-    const internal::NamedCall reading("Description", "model", name_, plugin_);
     if (!internal::AllZero(instance_.reserved)) Refuse(kReserved);
     ReadCalls();
     ReadDescription();
-    internal::AddInstance(*this);
   } catch (...) {
-    internal::Destroy(instance_, name_, plugin_);
+    internal::DestroyInstance(instance_, name_, plugin_);
     throw;
   }
 }
 
 ModelInstance::~ModelInstance() {
-  internal::DropInstance(*this);
-  internal::Destroy(instance_, name_, plugin_);
+  internal::DestroyInstance(instance_, name_, plugin_);
 }
 
 void ModelInstance::Refuse(const std::string& why) const {
@@ -384,19 +403,17 @@ Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& wha
 
 std::string ModelInstance::error_text() const {
   const auto of_this = [&](const FailedCall& call) {
-    return internal::NameOfCall(*this, call.slot) != nullptr;
+    return NameOfCall(instance_, call.slot) != nullptr;
   };
   const auto last = std::find_if(failed_calls.rbegin(), failed_calls.rend(), of_this);
   if (last != failed_calls.rend() && last->thrown) {
-    return std::string(internal::NameOfCall(*this, last->slot)) + " of model '" + name_ +
+    return std::string(NameOfCall(instance_, last->slot)) + " of model '" + name_ +
            "' of plugin " + plugin_ + " threw: " + *last->thrown;
   }
   if (instance_.error_text == nullptr) return "";
   std::string text;
-  const std::string failure = internal::ThrownBy([&] {
-    const internal::NamedCall call("error_text", "model", name_, plugin_);
-    text = ShownText(instance_.error_text(instance_.self));
-  });
+  const std::string failure =
+      internal::ThrownBy([&] { text = ShownText(instance_.error_text(instance_.self)); });
   return failure.empty()
              ? text
              : "error_text of model '" + name_ + "' of plugin " + plugin_ + " threw: " + failure;

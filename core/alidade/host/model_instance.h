@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/last_call.h"
 #include "alidade/model/plugin_abi.h"
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
@@ -32,7 +31,6 @@ inline Status ToStatus(std::int32_t code) {
 /// (bench_small_filter): for who then calls it again.
 template <bool kGuarded, class Call>
 [[gnu::always_inline]] inline Status CallModel(const void* slot, const Call& call) {
-  NoteCall(slot);
   if constexpr (!kGuarded) return ToStatus(call());
   try {
     const Status status = ToStatus(call());
@@ -57,6 +55,12 @@ inline Status CopyNoise(const std::vector<double>& root, double* l) {
   return Status::kOk;
 }
 }  // namespace detail
+
+namespace internal {
+/// Destroys the model of `instance`. An exception is a warning.
+void DestroyInstance(const AlidadeInstance& instance, const std::string& name,
+                     const std::string& plugin) noexcept;
+}  // namespace internal
 
 /// How a state that its sensor owns moves.
 enum class OwnedDynamics : std::uint32_t {

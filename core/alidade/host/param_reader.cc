@@ -263,16 +263,25 @@ std::optional<Node> FindBelow(Node& map, std::string& key) {
 
 }  // namespace
 
+AlidadeHost MakeHost(void* context) {
+  AlidadeHost host{};
+  host.struct_size = sizeof(host);
+  host.abi_major = ALIDADE_ABI_MAJOR;
+  host.abi_minor = ALIDADE_ABI_MINOR;
+  host.context = context;
+  return host;
+}
+
 ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation,
                          bool noise_given)
     : entry_(entry),
       owner_(std::move(owner)),
       representation_(std::move(representation)),
       noise_given_(noise_given),
-      host_(this) {
-  host_.c().read = &ParamReader::Read;
-  host_.c().read_text = &ParamReader::ReadText;
-  host_.c().fail = &ParamReader::Fail;
+      host_(MakeHost(this)) {
+  host_.read = &ParamReader::Read;
+  host_.read_text = &ParamReader::ReadText;
+  host_.fail = &ParamReader::Fail;
 }
 
 void ParamReader::Check() const {
@@ -289,8 +298,7 @@ void ParamReader::Check() const {
 
 std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double* values,
                                std::int32_t capacity) noexcept try {
-  auto* reader = LentHost::ReaderOf<ParamReader>(context);
-  if (reader == nullptr) return -1;
+  auto* reader = static_cast<ParamReader*>(context);
   try {
     const std::vector<double> read =
         reader->Values(reader->Expect([&] { return Checked(param, values, capacity); }));
@@ -301,14 +309,13 @@ std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double*
   }
   return -1;
 } catch (...) {
-  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
   return -1;
 }
 
 std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, char* text,
                                    std::int32_t capacity) noexcept try {
-  auto* reader = LentHost::ReaderOf<ParamReader>(context);
-  if (reader == nullptr) return -1;
+  auto* reader = static_cast<ParamReader*>(context);
   try {
     const AlidadeParam expected = reader->Expect([&] { return Checked(param, text, capacity); });
     return Put(reader->TextOf(expected), text);
@@ -317,13 +324,12 @@ std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, cha
   }
   return -1;
 } catch (...) {
-  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
   return -1;
 }
 
 void ParamReader::Fail(void* context, const char* key, const char* text) noexcept try {
-  auto* reader = LentHost::ReaderOf<ParamReader>(context);
-  if (reader == nullptr) return;
+  auto* reader = static_cast<ParamReader*>(context);
   if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // on the other side
   if (Text(key).empty()) {
     reader->failure_ = Text(text).empty() ? "it does not say why" : ShownText(text);
@@ -342,7 +348,7 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
   reader->errors_.push_back(
       ErrorLine(place, PathBelow(base.path(), ShownText(key)), ShownText(text)));
 } catch (...) {
-  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
 }
 
 /// The parameter; one that breaks the rules is an error of the plugin, at the entry.
@@ -463,16 +469,15 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
   throw ContractViolation("a key that is there is missing: " + key_in_map);
 }
 
-ParamRecorder::ParamRecorder() : host_(this), trials_(1) {
-  host_.c().read = &ParamRecorder::Read;
-  host_.c().read_text = &ParamRecorder::ReadText;
-  host_.c().fail = [](void*, const char*, const char*) {};
+ParamRecorder::ParamRecorder() : host_(MakeHost(this)), trials_(1) {
+  host_.read = &ParamRecorder::Read;
+  host_.read_text = &ParamRecorder::ReadText;
+  host_.fail = [](void*, const char*, const char*) {};
 }
 
 std::int32_t ParamRecorder::Read(void* context, const AlidadeParam* from, double* values,
                                  std::int32_t capacity) noexcept {
-  auto* recorder = LentHost::ReaderOf<ParamRecorder>(context);
-  if (recorder == nullptr) return -1;
+  auto* recorder = static_cast<ParamRecorder*>(context);
   Trial& trial = recorder->trials_.back();
   try {
     const AlidadeParam param = Checked(from, values, capacity);
@@ -491,8 +496,7 @@ std::int32_t ParamRecorder::Read(void* context, const AlidadeParam* from, double
 
 std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* from, char* text,
                                      std::int32_t capacity) noexcept {
-  auto* recorder = LentHost::ReaderOf<ParamRecorder>(context);
-  if (recorder == nullptr) return -1;
+  auto* recorder = static_cast<ParamRecorder*>(context);
   try {
     const AlidadeParam param = Checked(from, text, capacity);
     recorder->Note(param, 0);

@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/lent_host.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/model/plugin_abi.h"
 
 namespace alidade::internal {
+
+/// A host for one creation: its functions, which the caller sets, get `context`.
+AlidadeHost MakeHost(void* context);
 
 /// Lends a model the parameters of its config entry. A dotted key walks nested maps. What begins
 /// with `camera.` or `landmarks.` and is not in the entry is read from the map of that name at the
@@ -33,7 +35,7 @@ class ParamReader {
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
-  const AlidadeHost& host() const { return host_.c(); }
+  const AlidadeHost& host() const { return host_; }
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
   /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
@@ -63,7 +65,7 @@ class ParamReader {
   std::string owner_, representation_;
   bool noise_given_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
-  LentHost host_;
+  AlidadeHost host_{};
   std::unordered_set<std::string> keys_;  ///< that were asked for
   std::vector<std::string> errors_;
   std::string failure_;
@@ -77,7 +79,7 @@ class ParamRecorder {
   ParamRecorder(const ParamRecorder&) = delete;
   ParamRecorder& operator=(const ParamRecorder&) = delete;
 
-  const AlidadeHost& host() const { return host_.c(); }
+  const AlidadeHost& host() const { return host_; }
   /// Runs `create` once, then again for each other value of each choice, one at a time.
   template <class Create>
   void Run(const Create& create) {
@@ -113,7 +115,7 @@ class ParamRecorder {
   void Note(const AlidadeParam& param, int value);
   std::string When(const std::string& key) const;
 
-  LentHost host_;
+  AlidadeHost host_{};
   std::vector<Trial> trials_;
   bool out_of_memory_ = false;
 };

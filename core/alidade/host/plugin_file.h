@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -10,7 +9,7 @@
 #include "alidade/host/plugin_host.h"
 #include "alidade/model/plugin_abi.h"
 
-/// What PluginHost asks of a plugin file before and while opening it.
+/// Plugin files: what is checked before and while one is opened.
 namespace alidade {
 
 struct CppPluginTable;
@@ -25,40 +24,23 @@ struct OpenedPlugin {
   std::filesystem::path file;       ///< canonical
   const AlidadeTable* table;        ///< of a C-ABI plugin, else null
   const CppPluginTable* cpp_table;  ///< of a C++ plugin, else null
-  bool unoptimised;                 ///< by its build tag
 };
-
-/// The build id that a C++ plugin must have: that of this library.
-const char* HostBuildId();
 
 [[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
   throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
 }
 
-/// Where the plugins of this very build lie: `lib/alidade` next to this library, of the build tree
-/// or of the installation; "" where that cannot be told.
+/// The folder of the plugins of this build: `lib/alidade` next to this library, in the build tree
+/// or the installation; "" if it cannot be determined.
 std::filesystem::path FolderOfProgram();
 
-/// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
-/// C++ plugin of another build. Errors: kPlugin.
-void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
-
-/// The names of its entries that a file lists; none where it has no list, or not one that ends.
-std::optional<std::set<std::string>> ListedNames(const std::filesystem::path& file);
-
-/// Whether a plugin may offer an entry of one of these names: one that lists none of them does not.
+/// False if the plugin lists the names of its entries and none of `names` is among them. Such a
+/// plugin may stay closed.
 bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
 
-/// Examines the plugins as OpenPlugin does, and tries those that pass in one child process, one
-/// after the other. They are the result; none where any has a fault there, so that each has to be
-/// tried by itself.
-std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path>& files);
-
-/// Checks build tag, build and trust, tries the plugin in a child process, opens it and walks its
-/// table; of one that TryTogether has `tried` the last two alone. `canonical` is `file` behind its
-/// links. Errors: kPlugin, kNotTrusted.
-OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
-                        bool tried = false);
+/// Checks trust and build tag, opens the plugin and checks its table. `canonical` is `file` with
+/// its symbolic links resolved. Errors: kPlugin, kNotTrusted.
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
 /// A C++ plugin that is loaded only when it is needed.
 struct PluginOnDemand {

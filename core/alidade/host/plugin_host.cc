@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <optional>
 #include <set>
-#include <string_view>
 
 #include "alidade/base/log.h"
 #include "alidade/base/words.h"
@@ -23,9 +22,6 @@ using internal::KindName;
 using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
-
-static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
-              "cpp_plugin.h states another version than the project");
 
 std::optional<fs::path> UserFolder() {
   const fs::path data = Text(secure_getenv("XDG_DATA_HOME"));
@@ -57,7 +53,7 @@ std::vector<fs::path> internal::PluginFoldersOfEnvironment() {
 
 fs::path internal::FolderOfProgram() {
   Dl_info info{};
-  const auto* here = reinterpret_cast<const void*>(&HostBuildId);
+  const auto* here = reinterpret_cast<const void*>(&CheckTrusted);
   if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return {};
   std::error_code error;
   const fs::path library = fs::canonical(info.dli_fname, error);
@@ -92,7 +88,7 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   if (fs::is_directory(place, error)) {
     LoadFolder(place, required, origin == kGiven);
   } else if (there) {
-    LoadFile(place, required, false);
+    LoadFile(place, required);
   }
   std::string found = "not there";
   if (there) {
@@ -116,13 +112,12 @@ void PluginHost::LoadFolder(const fs::path& folder, bool required, bool whole) {
     if (required) Refuse(folder, error.message());
     refusals_.push_back({folder, error.message(), ExitCode::kPlugin});
   }
-  const std::set<fs::path> tried = internal::TryTogether(files);
-  for (const fs::path& file : files) LoadFile(file, required, tried.contains(file));
+  for (const fs::path& file : files) LoadFile(file, required);
 }
 
-void PluginHost::LoadFile(const fs::path& file, bool required, bool tried) {
+void PluginHost::LoadFile(const fs::path& file, bool required) {
   try {
-    Load(file, tried);
+    Load(file);
   } catch (const Error& e) {
     if (required) throw;
     const std::string prefix = file.string() + ": ";
@@ -135,7 +130,7 @@ void PluginHost::LoadFile(const fs::path& file, bool required, bool tried) {
   }
 }
 
-void PluginHost::Load(const fs::path& file, bool tried) {
+void PluginHost::Load(const fs::path& file) {
   if (!file.is_absolute()) CheckTrusted(file);
   std::error_code error;
   const fs::path canonical = fs::canonical(file, error);
@@ -144,7 +139,7 @@ void PluginHost::Load(const fs::path& file, bool tried) {
     return other->file == canonical || fs::equivalent(other->file, canonical, error);
   };
   if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical, tried)}));
+  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical)}));
   const std::size_t before = entries_.size();
   AddEntries(*loaded_.back());
   if (!IsLogged(LogLevel::kDebug)) return;
@@ -160,13 +155,12 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.cpp_table->source_count; ++i) {
       const SourceEntry& source = plugin.cpp_table->sources[i];
       entries_.push_back({PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "",
-                          plugin.file, 0, nullptr, plugin.unoptimised});
+                          plugin.file});
     }
     for (int i = 0; i < plugin.cpp_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.cpp_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.support, plugin.unoptimised,
-                          one.kind});
+                          Text(one.citation), "", plugin.file, 0, one.support, one.kind});
     }
     return;
   }
@@ -182,8 +176,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
       continue;
     }
     entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
-                        Text(entry.family), plugin.file, entry.thread_flags, nullptr,
-                        plugin.unoptimised});
+                        Text(entry.family), plugin.file, entry.thread_flags});
   }
 }
 

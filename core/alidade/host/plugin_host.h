@@ -55,7 +55,6 @@ struct PluginEntry {
   std::filesystem::path plugin;      ///< the file it came from
   unsigned thread_flags = 0;         ///< ALIDADE_THREAD_*; of a source or estimator 0
   const Support* support = nullptr;  ///< of an estimator: EstimatorEntry::support
-  bool unoptimised = false;          ///< the plugin was built without optimisation
   EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
 };
 
@@ -70,17 +69,17 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Finds, checks, loads and lends plugins. A file is opened only when its build tag, read from
-/// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
-/// have written it. Plugins are never unloaded. Creation is safe from several threads.
+/// Finds and loads plugins and creates their models. A file is opened only if CheckTrusted accepts
+/// it and its build tag, read from the bytes beforehand, fits this program. Plugins are never
+/// unloaded. Creation is safe from several threads.
 class PluginHost {
  public:
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
   /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
   /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
   /// `only`, if set, has every name that will be asked for: plugins elsewhere that list none of
-  /// them stay closed, which saves the time of trying and opening them. Then an error about a name
-  /// that is not found opens all, which is for one thread.
+  /// them stay closed, which saves the time of opening them. Then an error about a name that is not
+  /// found opens all, which is for one thread.
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
                       OnRefusal on_refusal = OnRefusal::kThrow,
                       const std::optional<std::set<std::string>>& only = {});
@@ -121,8 +120,8 @@ class PluginHost {
   struct Loaded;
   void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
   void LoadFolder(const std::filesystem::path& folder, bool required, bool whole);
-  void LoadFile(const std::filesystem::path& file, bool required, bool tried);
-  void Load(const std::filesystem::path& file, bool tried);
+  void LoadFile(const std::filesystem::path& file, bool required);
+  void Load(const std::filesystem::path& file);
   void AddEntries(const Loaded& plugin);
 
   const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;
@@ -142,21 +141,18 @@ class PluginHost {
   mutable std::recursive_mutex create_mutex_;  ///< a source may create models
 };
 
-/// The remedy for a plugin that was built without optimisation.
-inline constexpr const char* kBuildOptimised =
-    "build it with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release";
-
 /// Every place searched and what was found there, and every file refused with the reason.
 std::string PluginPlaces(const PluginHost& host);
 
-/// The build tag in the `.alidade` section of an ELF file, read from its bytes, every offset
-/// checked. Errors: kPlugin (not ELF, truncated, malformed, no build tag, another ABI).
+/// The build tag in the `.alidade` section of a plugin, read from its bytes. Errors: kPlugin (no
+/// build tag, a malformed one, another plugin ABI).
 AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 /// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
 /// above it owned by another than root, the caller or the owner of the running program; writable
-/// for group or world (sticky folders above excepted). Follows symlinks and checks what they pass.
-/// Errors: kNotTrusted.
+/// for the world (sticky folders above excepted) or for a group other than such a user's private
+/// one, which has the user's name and no other member. Follows symbolic links and checks each
+/// folder on the way. Errors: kNotTrusted.
 void CheckTrusted(const std::filesystem::path& file);
 
 }  // namespace alidade

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <grp.h>
 #include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -6,11 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <utility>
 #include <vector>
 
 #include "alidade/base/follow_links.h"
-#include "alidade/host/needed_libraries.h"
 #include "alidade/host/plugin_host.h"
 
 namespace alidade {
@@ -19,31 +18,20 @@ namespace {
 
 class TrustCheck {
  public:
-  /// Of `file`. A library that a plugin needs is `subject`'s, as `because` says, and may not be
-  /// there: then nobody else may put it there.
-  explicit TrustCheck(const fs::path& file) : TrustCheck(file, file, "", false) {}
-  TrustCheck(const fs::path& file, fs::path subject, std::string because, bool may_lack)
-      : file_(file),
-        subject_(std::move(subject)),
-        because_(std::move(because)),
-        may_lack_(may_lack) {
-    owners_ = {0, geteuid()};
+  explicit TrustCheck(const fs::path& file) : file_(file), owners_{0, geteuid()} {
     struct stat program;
     if (stat("/proc/self/exe", &program) == 0) owners_.push_back(program.st_uid);
   }
 
   /// Walks from / to the file, checking each folder, link and at last the file itself.
   void Run() {
-    bool lacks = false;
     const auto visit = [&](const fs::path& folder, const fs::path& entry, bool last) {
-      if (lacks) return;
-      std::error_code error;
-      lacks = may_lack_ && !fs::exists(fs::symlink_status(entry, error));
-      CheckFolder(folder, last || lacks);
-      if (!lacks) CheckOwner(entry, Status(entry));
+      const struct stat status = Status(folder);
+      CheckOwner(folder, status);
+      CheckMode(folder, status, !last);
+      CheckOwner(entry, Status(entry));
     };
     const fs::path end = internal::FollowLinks(file_, visit);
-    if (lacks) return;
     if (end.empty()) {
       Fail(file_, "behind a symbolic link that cannot be read, or more than 40 of them");
     }
@@ -52,9 +40,9 @@ class TrustCheck {
 
  private:
   [[noreturn]] void Fail(const fs::path& where, const std::string& why) const {
-    const std::string what = where == subject_ ? "it is " : "'" + where.string() + "' is ";
+    const std::string what = where == file_ ? "it is " : "'" + where.string() + "' is ";
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine({subject_.string()}, {}, "not trusted: " + because_ + what + why));
+                ErrorLine({file_.string()}, {}, "not trusted: " + what + why));
   }
   struct stat Status(const fs::path& path) const {
     struct stat status;
@@ -65,51 +53,44 @@ class TrustCheck {
     return status;
   }
   void CheckOwner(const fs::path& path, const struct stat& status) const {
-    if (std::find(owners_.begin(), owners_.end(), status.st_uid) != owners_.end()) return;
+    if (std::ranges::find(owners_, status.st_uid) != owners_.end()) return;
     const passwd* owner = getpwuid(status.st_uid);
     Fail(path, "owned by " +
                    (owner != nullptr ? std::string(owner->pw_name)
                                      : "user " + std::to_string(status.st_uid)) +
                    ", not by root, you or the owner of this program");
   }
+  /// Whether only one of the trusted users is in the group: it is that user's primary group, has
+  /// the user's name and no other member.
+  bool IsPrivateGroup(gid_t id) const {
+    const group* const found = getgrgid(id);
+    if (found == nullptr) return false;
+    const std::string name = found->gr_name;
+    for (char** member = found->gr_mem; *member != nullptr; ++member) {
+      if (name != *member) return false;
+    }
+    return std::ranges::any_of(owners_, [&](uid_t owner) {
+      const passwd* const user = getpwuid(owner);
+      return user != nullptr && user->pw_gid == id && name == user->pw_name;
+    });
+  }
   void CheckMode(const fs::path& path, const struct stat& status, bool sticky_allowed) const {
     if (sticky_allowed && (status.st_mode & S_ISVTX) != 0) return;
-    const char* who = (status.st_mode & S_IWOTH) != 0   ? "everyone"
-                      : (status.st_mode & S_IWGRP) != 0 ? "its group"
-                                                        : nullptr;
-    if (who != nullptr) {
-      Fail(path, std::string("writable for ") + who + "; chmod go-w " + path.string());
+    const char* writer = nullptr;
+    if ((status.st_mode & S_IWOTH) != 0) {
+      writer = "everyone";
+    } else if ((status.st_mode & S_IWGRP) != 0 && !IsPrivateGroup(status.st_gid)) {
+      writer = "its group";
     }
-  }
-  void CheckFolder(const fs::path& folder, bool holds_the_file) const {
-    const struct stat status = Status(folder);
-    CheckOwner(folder, status);
-    CheckMode(folder, status, !holds_the_file);
+    if (writer == nullptr) return;
+    Fail(path, std::string("writable for ") + writer + "; chmod go-w " + path.string());
   }
 
-  fs::path file_, subject_;
-  std::string because_;
-  bool may_lack_;
+  fs::path file_;
   std::vector<uid_t> owners_;
 };
 
 }  // namespace
-
-void internal::CheckTrustedNeed(const fs::path& plugin, const std::string& name,
-                                const fs::path& place) {
-  const std::string because = "it needs the library '" + name + "', and ";
-  if (!place.is_absolute()) {
-    // CMake ends the RUNPATH of a build tree with a colon: the current folder, mostly for nothing.
-    std::error_code error;
-    if (!fs::exists(place, error)) return;
-    throw Error(ExitCode::kNotTrusted,
-                ErrorLine({plugin.string()}, {},
-                          "not trusted: " + because + "takes it from the current folder, '" +
-                              place.string() + "'",
-                          "an absolute path or $ORIGIN in its RUNPATH"));
-  }
-  TrustCheck(place, plugin, because, true).Run();
-}
 
 void CheckTrusted(const fs::path& file) {
   if (!file.is_absolute()) {

@@ -122,15 +122,6 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
   f.abi_major = ALIDADE_ABI_MAJOR;
   f.abi_minor = ALIDADE_ABI_MINOR;
   f.kind = kind;
-#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
-  f.flags |= ALIDADE_BUILT_FAST_MATH;
-#endif
-#if defined(_GLIBCXX_DEBUG)
-  f.flags |= ALIDADE_BUILT_DEBUG_STL;
-#endif
-#if !defined(__OPTIMIZE__)
-  f.flags |= ALIDADE_BUILT_UNOPTIMISED;
-#endif
   f.isa = InstructionSetsTo256() | InstructionSetsBeyond256();
   f.cplusplus = static_cast<std::uint32_t>(__cplusplus);
   CopyText(__VERSION__, f.compiler);

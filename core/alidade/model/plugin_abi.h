@@ -83,7 +83,7 @@ typedef void (*AlidadeReservedCall)(void);
 
 enum { ALIDADE_PLUGIN_C_ABI = 1, ALIDADE_PLUGIN_CPP = 2 };
 
-/* Bits of AlidadeBuildTag.flags. */
+/* Bits of AlidadeBuildTag.flags, for information alone. */
 enum {
   ALIDADE_BUILT_UNOPTIMISED = 1,
   ALIDADE_BUILT_FAST_MATH = 1 << 16,
@@ -239,8 +239,8 @@ typedef struct AlidadeParam {
   void* reserved[4];
 } AlidadeParam;
 
-/* What the host lends while a model is created, to the thread that creates it. Afterwards reads
- * give -1. */
+/* The host's side of a creation, for the thread that creates the model. It is not to be used once
+ * `create` has returned. */
 typedef struct AlidadeHost {
   uint32_t struct_size;
   uint16_t abi_major, abi_minor;

@@ -182,28 +182,6 @@ void DeclareCommon(const Node& root) {
   if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
-/// The plugins that the source, the estimators and their models come from, as far as they were
-/// built without optimisation.
-std::set<std::string> UnoptimisedOf(const Experiment& experiment, const std::string& source,
-                                    const PluginHost& host) {
-  std::set<std::filesystem::path> models;
-  std::set<std::string> estimators;
-  for (const NamedEstimator& one : experiment.estimators) {
-    estimators.insert(one.type);
-    for (const auto& sensor : one.system.sensors) models.insert(sensor.model.instance().plugin());
-    for (const auto& motion : one.system.motions) models.insert(motion.model.instance().plugin());
-  }
-  std::set<std::string> files;
-  for (const PluginEntry& entry : host.entries()) {
-    const bool used = entry.kind == PluginEntry::Kind::kSource ? entry.name == source
-                      : entry.kind == PluginEntry::Kind::kEstimator
-                          ? estimators.contains(entry.name)
-                          : models.contains(entry.plugin);
-    if (used && entry.unoptimised) files.insert(entry.plugin.filename().string());
-  }
-  return files;
-}
-
 /// `evaluate.truth_sigma` of the config's root: for each truth of the source the standard deviation
 /// of its elements; empty where the key is not there. Errors: kBadConfig for a name that is no
 /// truth's, a number below 0, and under a `reference` that is no truth.
@@ -298,7 +276,6 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.truth_sigmas =
       ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
   CheckTruths(source, experiment, whole);
-  experiment.unoptimised = UnoptimisedOf(experiment, source.At("type").Text(), host);
   root.RejectUnread();
   return experiment;
 }

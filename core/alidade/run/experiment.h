@@ -77,8 +77,6 @@ struct Experiment {
   int reference = -1;             ///< index of the estimator that metrics compare with; -1: truth
   const Filter* guide = nullptr;  ///< the filter that guides the source; null: none
   std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
-  /// Files, without folder, of the plugins in use that were built without optimisation.
-  std::set<std::string> unoptimised;
 };
 
 /// The files and folders that a config's `plugins:` names, relative ones taken from its folder.

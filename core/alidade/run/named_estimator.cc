@@ -283,7 +283,6 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator
     return make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
   };
   if (plugin == nullptr) return made();
-  const std::string file = plugin->plugin.string();
   std::string why = "an exception of unknown type";
   try {
     return made();
@@ -296,7 +295,8 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator
   } catch (...) {
   }
   throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
-                                           "estimator '" + plugin->name + "' of plugin " + file +
+                                           "estimator '" + plugin->name + "' of plugin " +
+                                               plugin->plugin.string() +
                                                " failed while being created: " + why));
 }
 

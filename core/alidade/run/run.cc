@@ -310,15 +310,8 @@ const char* ToString(RunStatus status) {
   return "failed";
 }
 
-std::string UnoptimisedText(const std::set<std::string>& plugins) {
-  if (plugins.empty()) return "";
-  return "wall clock: built without optimisation, and so many times slower: " +
-         internal::Join({plugins.begin(), plugins.end()}) + "; " + kBuildOptimised;
-}
-
 RunResult Run(Experiment& experiment, const RunOptions& options) {
   RunResult result;
-  result.unoptimised = experiment.unoptimised;
   const int reference = experiment.reference;
   if (reference >= 0) {
     result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;

@@ -59,7 +59,6 @@ struct RunResult {
   std::string reference = "truth";  ///< what metrics compare with: truth, or an estimator's name
   std::string withheld;             ///< why there is no comparison with that estimator, or ""
   std::vector<EstimatorResult> estimators;
-  std::set<std::string> unoptimised;  ///< as of the experiment
 };
 
 /// Follows a run on its own thread. What it throws ends the run, and is its reason.
@@ -91,9 +90,6 @@ struct RunOptions {
 /// does a quaternion or direction that is not of unit length to 1e-3. All that, and whatever else
 /// goes wrong, is in the result; nothing is thrown.
 RunResult Run(Experiment& experiment, const RunOptions& options);
-
-/// What plugins built without optimisation mean for the wall clock; "" where there are none.
-std::string UnoptimisedText(const std::set<std::string>& plugins);
 
 /// A table of the estimators' main metrics, one column each, for a terminal; below it what they
 /// compare with, where that is not truth.

@@ -304,7 +304,6 @@ class OffsetSensor {
     const Status status = of.Shift(roles, false, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     const AlidadeInstance& c = of.sensor_.instance().c();
-    detail::NoteCall(&c.sensor->sqrt_noise);
     return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
   }
   static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
@@ -328,7 +327,6 @@ class OffsetSensor {
     }
     if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
     const AlidadeInstance& c = of.sensor_.instance().c();
-    detail::NoteCall(&c.sensor->initialise);
     const std::int32_t code =
         c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
                              derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A build tag of another ABI, of another processor or build, as BAD_BUILD_TAG says.
+// A build tag of another ABI, of another processor or of another C++ ABI number, as BAD_BUILD_TAG says.
 #include "alidade/model/plugin.h"
 #include "probe.h"
 
 #define OTHER_ABI 1
 #define OTHER_PROCESSOR 2
-#define OTHER_BUILD 3
+#define OTHER_CPP_ABI 3
 #define NEEDS_MINOR 4
 #define LATER_FLAG 5
 #define LATER_HINT 6
@@ -15,7 +15,7 @@ namespace {
 
 constexpr AlidadeBuildTag Spoiled() {
   AlidadeBuildTag f = alidade::detail::MakeBuildTag(
-      BAD_BUILD_TAG == OTHER_BUILD ? ALIDADE_PLUGIN_CPP : ALIDADE_PLUGIN_C_ABI, "0.0.9 other");
+      BAD_BUILD_TAG == OTHER_CPP_ABI ? ALIDADE_PLUGIN_CPP : ALIDADE_PLUGIN_C_ABI, "other");
   if (BAD_BUILD_TAG == OTHER_ABI) f.abi_major = 99;
   if (BAD_BUILD_TAG == OTHER_PROCESSOR) f.isa = ALIDADE_ISA_OTHER;
   if (BAD_BUILD_TAG == NEEDS_MINOR) f.needs_minor = f.abi_minor = 3;

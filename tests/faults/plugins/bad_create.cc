@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models that fail while they are created.
-#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -45,18 +44,6 @@ struct AsksMuch : Probe {
     }
   }
 };
-/// Keeps what it is lent, against the rules, and tries it in its next creation.
-struct KeepsHost : Probe {
-  explicit KeepsHost(alidade::Params& p) : Probe(p) {
-    static std::optional<alidade::Params> kept;
-    const bool first = !kept.has_value();
-    if (first) kept = p;
-    const double late = kept->Number("late", "", "", {}, 42.0);
-    if (!first) kept->Fail("late", "nobody hears this");
-    p.Fail("", first ? "first" : late == 42.0 ? "not answered" : "answered");
-  }
-};
-
 namespace {
 
 void MakeWrongKind(alidade::Params& p, AlidadeInstance* instance) {
@@ -152,4 +139,4 @@ ALIDADE_PLUGIN(
     ALIDADE_SENSOR(Forges, "forges", "", ""), ALIDADE_SENSOR(AsksMuch, "asks_much", "", ""),
     Reading<kEmptyRange>("empty_range"), Reading<kManyChoices>("many_choices"),
     Reading<kHalf>("half"), Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
-    ALIDADE_SENSOR(Titled, "titled", "", ""), ALIDADE_SENSOR(KeepsHost, "keeps_host", "", ""))
+    ALIDADE_SENSOR(Titled, "titled", "", ""))

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // One fault each, for tests/plugins/host/check_test.cc; and five models without fault.
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cfenv>
@@ -221,25 +219,11 @@ struct Misbehaves : Right {
     if (kWhat == 5) std::fesetround(FE_UPWARD);
     if (kWhat == 6) std::setlocale(LC_ALL, "C.UTF-8");
     if (kWhat == 7) static_cast<void>(!new std::string(1000, 'x'));
-    if (kWhat == 8) static_cast<void>(::chdir("/"));
-    if (kWhat == 9) static_cast<void>(::dup(0));
-    if (kWhat == 10) std::puts("hello");
-    if (kWhat == 11) LeaveDaemon();
-    if (kWhat == 12) ::_exit(0);
-    if (kWhat == 13) std::raise(SIGSTOP);
+    if (kWhat == 8) static_cast<void>(::dup(0));
+    if (kWhat == 9) std::puts("hello");
+    if (kWhat == 10) ::_exit(0);
+    if (kWhat == 11) std::raise(SIGSTOP);
     return Right::Predict(x, y, z);
-  }
-  /// Leaves a process that has left this one's group and session, with a name of its own.
-  static void LeaveDaemon() {
-    const pid_t child = ::fork();
-    if (child == 0) {
-      ::setsid();
-      if (::fork() > 0) ::_exit(0);
-      ::prctl(PR_SET_NAME, "alidade_daemon");
-      ::sleep(600);
-      ::_exit(0);
-    }
-    ::waitpid(child, nullptr, 0);
   }
   static void Eat() {
     for (std::vector<double*> all;;) all.push_back(new double[1 << 16]());
@@ -262,16 +246,6 @@ struct HangsInDestroy : Right {
     while (owner) ::pause();
   }
   bool owner = true;
-};
-/// Keeps what it is lent, against the rules.
-struct AsksLate : Right {
-  explicit AsksLate(Params& p) : params(p) {}
-  template <class T>
-  bool Predict(const T* x, const T* y, T* z) const {
-    params.Number("late", "", "", {}, 0.0);
-    return Right::Predict(x, y, z);
-  }
-  mutable Params params;
 };
 struct LosesItself : Right {
   explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
@@ -497,15 +471,13 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(ThrowsInt, "throws_int"), SENSOR(ThrowsInNoise, "throws_in_noise"),
                SENSOR(HangsInNoise, "hangs_in_noise"), SENSOR(ThrowsInDestroy, "throws_in_destroy"),
                SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
-               SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<12>, "exits_at_once"),
-               SENSOR(Misbehaves<13>, "stops_itself"), SENSOR(Misbehaves<3>, "hangs"),
+               SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<10>, "exits_at_once"),
+               SENSOR(Misbehaves<11>, "stops_itself"), SENSOR(Misbehaves<3>, "hangs"),
                SENSOR(Misbehaves<4>, "eats_memory"), SENSOR(Misbehaves<5>, "rounds_upward"),
                SENSOR(Misbehaves<6>, "sets_locale"), SENSOR(Misbehaves<7>, "leaks"),
-               SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
-               SENSOR(Misbehaves<10>, "prints"), SENSOR(Misbehaves<11>, "leaves_daemons"),
+               SENSOR(Misbehaves<8>, "leaks_files"), SENSOR(Misbehaves<9>, "prints"),
                SENSOR(LosesItself, "loses_itself"), SENSOR(CrashesInCreate, "crashes_in_create"),
                SENSOR(HangsInCreate, "hangs_in_create"), SENSOR(HangsInDestroy, "hangs_in_destroy"),
-               SENSOR(AsksLate, "asks_late"),
                ALIDADE_SENSOR_BY(MakeWildDescription, "wild_description", "", ""),
                RAW(PastTheEnd, "past_the_end"), RAW(WritesItsInput, "writes_its_input"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),

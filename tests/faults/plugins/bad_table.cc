@@ -18,10 +18,9 @@
 #define UNKNOWN_KIND 11
 #define RESERVED 12
 #define CONTROL_CHARACTER 13
-#define WILD_TEXT 14
-#define LATER_HINT 15
-#define THROWS 16
-#define UNKNOWN_THREAD_FLAGS 17
+#define LATER_HINT 14
+#define THROWS 15
+#define UNKNOWN_THREAD_FLAGS 16
 
 ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
 
@@ -41,7 +40,6 @@ extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_pl
   if (BAD_TABLE == LATER_HINT) table.flags = entries[1].flags = 1u << 3;
   if (BAD_TABLE == RESERVED) table.reserved[3] = &table;
   if (BAD_TABLE == CONTROL_CHARACTER) entries[1].doc = "red \033[31m";
-  if (BAD_TABLE == WILD_TEXT) entries[1].citation = reinterpret_cast<const char*>(8);
   if (BAD_TABLE == UNKNOWN_KIND) entries[1].kind = 9;
   if (BAD_TABLE == EMPTY) table.entry_count = 0;
   if (BAD_TABLE == THROWS) throw std::runtime_error("the dog ate it");

@@ -372,13 +372,6 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   for (const ComparedRun& run : runs) comparison.status = std::max(comparison.status, run.status);
   comparison.measurements_sha256 = runs.front().measurements_sha256;
   comparison.notes = NotesOf(candidates, references, truth);
-  std::set<std::string> unoptimised;
-  for (const ComparedRun& run : runs) {
-    unoptimised.insert(run.unoptimised.begin(), run.unoptimised.end());
-  }
-  if (const std::string note = UnoptimisedText(unoptimised); !note.empty()) {
-    comparison.notes.push_back(note);
-  }
   comparison.withheld = WhyWithheld(candidates, references, truth);
   comparison.reference = truth ? "truth" : "";
   for (std::size_t i = 0; i < candidates.size(); ++i) {

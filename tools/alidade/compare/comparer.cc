@@ -53,7 +53,6 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   run.reason = result.reason;
   run.reference = result.reference;
   run.frames = result.frames;
-  run.unoptimised = result.unoptimised;
   run.measurements_sha256 = impl_->data.measurements();
   run.truth_sha256 = impl_->data.truth();
   ALIDADE_EXPECTS(result.estimators.size() <= run.estimators.size());

@@ -258,9 +258,6 @@ ComparedRun ReadRun(const fs::path& folder) {
   if (!data) FailFile(run_file, 0, "does not say which data the run saw");
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
-  if (const auto plugins = timing.Find("unoptimised")) {
-    for (const std::string& plugin : plugins->Texts()) run.unoptimised.insert(plugin);
-  }
   for (const auto& [name, entry] : root.At("estimators").Entries()) {
     ComparedEntry& one = run.estimators.emplace_back();
     one.facts = ReadFacts(entry);

@@ -42,7 +42,6 @@ struct ComparedRun {
   std::string measurements_sha256, truth_sha256;
   std::int64_t frames = 0;
   std::vector<ComparedEntry> estimators;
-  std::set<std::string> unoptimised;  ///< RunResult::unoptimised
 };
 
 /// A run folder. Errors: kInputMissing where it is none, kBadData where its files do not fit

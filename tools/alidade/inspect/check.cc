@@ -53,7 +53,6 @@ std::string EndWords(const ChildEnd& end, const internal::Journal& journal, doub
   }
   std::string words = journal.call().empty() ? "the check" : journal.call();
   words += ' ' + end.text;
-  if (!journal.thrown().empty()) words += ": it threw " + journal.thrown();
   if (!journal.state().empty()) words += "; at " + journal.state();
   return words;
 }
@@ -73,7 +72,7 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
                                               : Encode(internal::Fail(e.what()));
     }
   };
-  const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, *journal, work);
+  const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);
   ended = !end.answered;
   Finding finding =
       end.answered ? Decode(end.text) : internal::Fail(EndWords(end, *journal, options.timeout_s));

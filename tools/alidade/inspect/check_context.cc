@@ -55,6 +55,7 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
   std::string thrown;  // of which the host warns alone
+  journal_.Enter("destroy");
   {
     const auto take = [&](LogLevel, std::string_view text) { thrown = text; };
     const LogSubscription warnings(LogLevel::kWarning, take);

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/child_process.h"
 #include "alidade/inspect/check.h"
+#include "alidade/inspect/child_process.h"
 #include "alidade/inspect/model_under_test.h"
 
 /// The checks that `alidade check` makes of a model, one function each.

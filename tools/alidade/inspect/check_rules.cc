@@ -2,13 +2,13 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cfenv>
+#include <clocale>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
 #include "alidade/base/number_text.h"
-#include "alidade/host/lent_host.h"
-#include "alidade/host/process_settings.h"
 #include "alidade/inspect/check_context.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -53,6 +53,22 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
     return f.is_noise ? "is out of domain where " + context.main().name + " is not" : "";
   }
   return "returned " + std::to_string(code) + ", which is not a status of its";
+}
+
+/// Settings of the process that decide how numbers are rounded and written.
+struct NumberSettings {
+  int rounding = std::fegetround();
+  std::string locale = std::setlocale(LC_ALL, nullptr);
+  locale_t thread_locale = uselocale(nullptr);
+};
+
+/// The setting that has changed, or "".
+std::string ChangeBetween(const NumberSettings& before, const NumberSettings& now) {
+  if (now.rounding != before.rounding) return "changed the rounding mode";
+  if (now.locale != before.locale || now.thread_locale != before.thread_locale) {
+    return "changed the locale from '" + before.locale + "' to '" + now.locale + "'";
+  }
+  return {};
 }
 
 /// Bytes on the heap.
@@ -162,12 +178,9 @@ Finding CheckBounds(Context& context) {
 }
 
 Finding CheckEnvironment(Context& context) {
-  const Surroundings before;
-  const std::int64_t late_calls = LentHost::LateCalls();
+  const NumberSettings before;
   const auto changed = [&](const std::string& call) {
-    std::string change = Surroundings().ChangeSince(before);
-    if (LentHost::LateCalls() != late_calls)
-      change = "asks the host, which is lent to create alone";
+    const std::string change = ChangeBetween(before, NumberSettings());
     return change.empty() ? change : call + ' ' + change;
   };
   std::unique_ptr<ModelUnderTest> other = context.Create();
@@ -180,7 +193,7 @@ Finding CheckEnvironment(Context& context) {
       return changed(f.name);
     });
   }
-  return Verdict(failure, "rounding, traps, locale, folder, signals and streams stay");
+  return Verdict(failure, "rounding mode and locale stay");
 }
 
 Finding CheckDeterministic(Context& context) {

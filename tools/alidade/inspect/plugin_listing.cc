@@ -91,8 +91,7 @@ Json JsonOf(const PluginEntry& entry) {
           {"family", entry.family},
           {"doc", entry.doc},
           {"citation", entry.citation},
-          {"file", entry.plugin.string()},
-          {"unoptimised", entry.unoptimised}};
+          {"file", entry.plugin.string()}};
 }
 
 Json JsonOf(const std::vector<ParamInfo>& schema) {
@@ -131,7 +130,7 @@ std::string PluginListJson(const PluginHost& host) {
   for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
   for (const EstimatorType& type : EstimatorTypes()) {
     json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0,
-                           &type.support, false, type.kind}));
+                           &type.support, type.kind}));
   }
   return internal::JsonText(json);
 }
@@ -147,9 +146,6 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
     text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
     if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
     text += "  plugin: " + entry->plugin.string() + '\n';
-    if (entry->unoptimised) {
-      text += std::string("  built without optimisation: ") + kBuildOptimised + '\n';
-    }
     text += '\n';
     const std::vector<std::string> lines = host.Describe(*entry);
     for (const std::string& line : lines) text += "  " + line + '\n';

@@ -10,7 +10,7 @@ namespace alidade {
 /// The models, sources and estimators on offer: name, kind, doc and, with `files`, the file.
 std::string PluginList(const PluginHost& host, bool files = false);
 /// The same, with files, as a JSON array of objects with `name`, `kind`, `family`, `doc`,
-/// `citation`, `file`, `unoptimised`.
+/// `citation`, `file`.
 std::string PluginListJson(const PluginHost& host);
 
 /// All there is to know of the entries called `name`: doc, citation, what they measure or move, and

@@ -137,7 +137,6 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
       entry["parts_s"][kPartNames[i]] = one.parts_s[i];
     }
   }
-  json["unoptimised"] = result.unoptimised;
   json["arrivals"] = {{"out_of_sequence", result.arrivals.out_of_sequence},
                       {"merged", result.arrivals.merged},
                       {"dropped", result.arrivals.dropped},

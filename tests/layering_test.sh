@@ -21,8 +21,8 @@
 #   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools,
 #             libarchive in those of tools, alone; of nlohmann-json the forward declarations also in
 #             core/alidade/base/json.h, which names the type for all, and the whole in its test;
-#             CLI11 in cli, OpenCV in image plugins and tests/images, and both in bench, alone; of
-#             Ceres only jet.h and rotation.h outside plugins/ceres and bench
+#             CLI11 in cli, OpenCV in image plugins and tests/images, and both in bench, alone;
+#             Ceres in plugins/ceres and bench
 #   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
 #   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
@@ -95,8 +95,8 @@ sources() {
     function foreign_to_library(path, bracket) {
       if (path ~ /^alidade\//)
         return !exists("core/" path) && !(folder == "tools" && exists("tools/" path))
-      if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
-      return path !~ /^ceres\//
+      if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
+      return 1
     }
     # The place of the room of `path`, "core/alidade/base/x.h" or "alidade/base/x.h", in the order.
     function floor_of(path) {
@@ -119,8 +119,7 @@ sources() {
         report("library", "only sources of tools include " path)
       if (path ~ /^CLI\// && folder != "cli" && folder != "bench")
         report("library", "only cli and bench include " path)
-      if (path ~ /^ceres\// && path !~ /^ceres\/(jet|rotation)\.h$/ &&
-          own_plugin != "ceres" && folder != "bench")
+      if (path ~ /^ceres\// && own_plugin != "ceres" && folder != "bench")
         report("library", "only plugins/ceres and bench include " path)
       if (path ~ /^opencv/ && own_plugin !~ /image/ && folder != "bench" &&
           FILENAME !~ /^(tests|plugins\/[a-z_]+)\/images\//)
@@ -384,7 +383,7 @@ allow tests/images/new.cc "$licence\n#include <opencv2/core.hpp>"
 allow bench/speed/new.cc "$licence\n#include <ceres/problem.h>\n#include \"plugins/ceres/bundle/sensor_cost.h\""
 allow bench/speed/new.cc "$licence\n#include <CLI/CLI.hpp>\n#include <opencv2/core.hpp>"
 allow cli/new.cc "$licence\n#include <CLI/CLI.hpp>\nint main() { std::cout << 1; }"
-allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"alidade/config/tree.h\"\n#include \"ceres/rotation.h\""
+allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"alidade/config/tree.h\""
 allow tests/plugins/new.cc "$licence\n#include \"plugins/csv/csv.h\""
 allow tests/faults/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-ffast-math)'
 allow tests/plugins/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-march=native)'

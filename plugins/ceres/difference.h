@@ -4,19 +4,20 @@
 #include <algorithm>
 
 #include "alidade/model/autodiff.h"
+#include "alidade/model/jet.h"
 
 namespace alidade::ceres_batch {
 
 /// d = z (-) h and, where j is not null, dd/dh (row-major) in the tangent at h.
 template <class G>
 void Difference(const double* z, const double* h, double* d, double* j) {
-  using Jet = ceres::Jet<double, G::kTangent>;
+  using Jet = alidade::Jet<double, G::kTangent>;
   Jet moved[G::kAmbient], difference[G::kTangent];
   alidade::detail::LiftOne<G>(h, 0, moved);
   G::Minus(z, moved, difference);
   for (int i = 0; i < G::kTangent; ++i) {
     d[i] = difference[i].a;
-    if (j != nullptr) std::copy_n(difference[i].v.data(), G::kTangent, j + i * G::kTangent);
+    if (j != nullptr) std::copy_n(difference[i].v, G::kTangent, j + i * G::kTangent);
   }
 }
 

@@ -141,7 +141,7 @@ TEST(StaticLandmarks, PointsThatAreKnownToSomeExtentAreBlocks) {
 template <int... I, class Filter, class Model>
 void SetFrom(const Measurement& seen, Filter& filter, const Model& sensor,
              std::integer_sequence<int, I...>) {
-  using Jet = ceres::Jet<double, 3>;
+  using Jet = alidade::Jet<double, 3>;
   const Jet position[] = {Jet(0.0), Jet(0.0), Jet(0.0)};
   const Jet orientation[] = {Jet(1.0), Jet(0.0), Jet(0.0), Jet(0.0)};
   const Jet pixel[] = {Jet(seen.values[0], 0), Jet(seen.values[1], 1)}, prior[] = {Jet(0.4, 2)};
@@ -151,7 +151,7 @@ void SetFrom(const Measurement& seen, Filter& filter, const Model& sensor,
   Eigen::Matrix<double, 6, 3> root;
   for (int k = 0; k < 6; ++k) {
     y[k] = landmark[k].a;
-    root.row(k) = landmark[k].v.cwiseProduct(Eigen::Vector3d(1.0, 1.0, 0.1)).transpose();
+    root.row(k) << landmark[k].v[0], landmark[k].v[1], 0.1 * landmark[k].v[2];
   }
   const Eigen::Matrix<double, 6, 6> p = root * root.transpose();
   ((seen.landmark == I ? filter.template Set<kFirstPoint + I>(y, p) : void()), ...);

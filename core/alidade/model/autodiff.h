@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/model/jet.h"
 #include "alidade/model/model_members.h"
 #include "alidade/model/status.h"
-#include "ceres/jet.h"
 
 /// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
 /// through (+) and (-), or by the author's analytic Jacobian where there is one. Plugins, the
@@ -175,7 +175,7 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
     return Status::kOk;
   }
   if constexpr (!kAnalytic) {
-    using Jet = ceres::Jet<double, Blocks::kTangent>;
+    using Jet = alidade::Jet<double, Blocks::kTangent>;
     Jet lifted[Blocks::kAmbient], value[Z::kAmbient];
     const Jet* x[Blocks::kCount];
     detail::Lift<Model>(roles, lifted, x);
@@ -252,7 +252,7 @@ Status StepJets(const Model& model, const double* const* x, const double* u, con
                 double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   using All = Blocks<Model>;
   constexpr typename All::Indices indices{};
-  using Jet = ceres::Jet<double, All::kTangent + Model::kNoise>;
+  using Jet = alidade::Jet<double, All::kTangent + Model::kNoise>;
   Jet lifted[All::kAmbient], value[All::kAmbient];
   Jet lifted_w[Model::kNoise + 1], lifted_u[Model::Input::kAmbient + 1];
   const Jet* block[All::kCount];
@@ -287,7 +287,7 @@ Status InputJets(const Model& model, const double* const* x, const double* u, co
   static_assert(All::kStatic && Model::kNoise != kDynamic,
                 "a model of dynamic size has no control input");
   constexpr typename All::Indices indices{};
-  using Jet = ceres::Jet<double, U::kTangent>;
+  using Jet = alidade::Jet<double, U::kTangent>;
   Jet lifted[All::kAmbient], value[All::kAmbient], lifted_w[Model::kNoise + 1];
   Jet lifted_u[U::kAmbient];
   const Jet* block[All::kCount];

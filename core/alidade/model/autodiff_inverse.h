@@ -78,7 +78,7 @@ Status InitialiseRole(const Model& model, const double* const* roles, const doub
   using Blocks = detail::Blocks<Model>;
   constexpr std::make_index_sequence<detail::OtherCount<Model>()> others{};
   constexpr int kRoles = Blocks::kTangent - Y::kTangent;
-  using Jet = ceres::Jet<double, kRoles + Z::kTangent + Model::kPrior>;
+  using Jet = alidade::Jet<double, kRoles + Z::kTangent + Model::kPrior>;
   if (Model::kPrior > 0 && prior == nullptr) return Status::kInvalid;
   Jet lifted[Blocks::kAmbient], dz[Z::kTangent], lifted_z[Z::kAmbient];
   Jet lifted_prior[Model::kPrior + 1], value[Y::kAmbient];

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "alidade/model/autodiff.h"
+#include "alidade/model/jet.h"
 #include "alidade/model/params.h"
 
 /// Representations of a landmark, a point of the world as it is written in the state. Every
@@ -184,7 +185,7 @@ Ray<double> RayOf(const double* const* blocks) {
 template <class Representation>
 Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   constexpr int n = detail::Blocks<Representation>::kTangent;
-  using Jet = ceres::Jet<double, n>;
+  using Jet = alidade::Jet<double, n>;
   Jet y[detail::Blocks<Representation>::kAmbient], lifted[3];
   const Jet* pointers[detail::Blocks<Representation>::kCount];
   detail::Lift<Representation>(blocks, y, pointers);

@@ -14,7 +14,7 @@
 #include "alidade/model/params.h"
 
 /// What the author of a model writes: a struct on one of the two bases below, templated on the
-/// scalar, pure. It needs this header and Eigen, C++17, and works without the plugin machinery.
+/// scalar, pure. It needs this header and C++17, and works without the plugin machinery.
 namespace alidade {
 
 /// A named quantity: a role, a measurement, a control input.

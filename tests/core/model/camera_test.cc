@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ceres/jet.h"
+#include "alidade/model/jet.h"
 #include "support/model_maker.h"
 
 namespace alidade {
@@ -92,8 +92,8 @@ TEST(Camera, UnprojectIsTheInverseOverTheImage) {
   }
 }
 
-using Jet2 = ceres::Jet<double, 2>;
-using Jet3 = ceres::Jet<double, 3>;
+using Jet2 = Jet<double, 2>;
+using Jet3 = Jet<double, 3>;
 
 TEST(Camera, DerivativesOfProjectAgreeWithDifferences) {
   constexpr double kStep = 1e-5;

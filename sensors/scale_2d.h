@@ -61,10 +61,7 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
     const T s = inverse_distance[0] * depth[0];
     l[0] = constant_sigma > 0.0 ? T(constant_sigma) : relative_sigma * s * s * s;
   }
-  template <class T>
-  bool Valid(const T* inverse_scale) const {
-    return inverse_scale[0] > T(0.0);
-  }
+  bool Valid(const double* inverse_scale) const { return inverse_scale[0] > 0.0; }
   template <class T>
   bool Initialise(const T* depth, const T* inverse_scale, T* inverse_distance) const {
     if (!(depth[0] > T(0.0))) return false;

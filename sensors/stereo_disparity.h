@@ -54,10 +54,7 @@ struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
   void SqrtNoise(const T*, T* l) const {
     l[0] = T(sigma_px);
   }
-  template <class T>
-  bool Valid(const T* disparity) const {
-    return disparity[0] > T(0.0) && disparity[0] <= T(max_px);
-  }
+  bool Valid(const double* disparity) const { return disparity[0] > 0.0 && disparity[0] <= max_px; }
   template <class T>
   bool Initialise(const T* disparity, T* depth) const {
     if (!(disparity[0] > T(0.0))) return false;

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "alidade/model/static_ekf_arithmetic.h"
+#include "alidade/model/static_ekf.h"
 #include "alidade/run/run.h"
 #include "motion_models/constant.h"
 #include "motion_models/quaternion_pose.h"

@@ -8,11 +8,7 @@
 #include "alidade/base/log.h"
 #include "alidade/filter/iekf.h"
 #include "alidade/filter/square_root_ekf.h"
-#include "alidade/filter/static_ekf_array.h"
 #include "alidade/filter/ukf.h"
-#include "motion_models/constant.h"
-#include "motion_models/constant_velocity.h"
-#include "sensors/stereo_disparity.h"
 #include "support/driven.h"
 #include "support/landmark_models.h"
 #include "support/sanitized.h"
@@ -55,28 +51,6 @@ TEST(ControlInput, TakesNoAllocation) {
   const long before = allocations;
   for (std::size_t k = 20; k < frames.size(); ++k) ekf.Process(frames[k]);
   EXPECT_EQ(allocations - before, 0);
-}
-
-TEST(StaticEkfArray, TakesNoAllocation) {
-  StaticEkfArray<ConstantVelocity<1, false>, Constant<1>> filters(
-      13, ConstantVelocity<1, false>(1.0), Constant<1>(1));
-  for (int i = 0; i < filters.size(); ++i) {
-    filters.Set<0>(i, i == 3 ? -0.3 : 0.3, 0.1);  // beyond the domain: stepped one by one
-    filters.Set<2>(i, 3.3, 0.5);
-  }
-  const StereoDisparity stereo(400.0, 0.065, 1.0);
-  const std::vector<double> disparity(13, 85.0), dt_s(13, 0.033);
-  std::vector<StaticOutcome> outcomes(13);
-  const ArrayUpdate<StereoDisparity, 0> update{stereo, disparity.data(), 10.0, nullptr,
-                                               outcomes.data()};
-  const long before = allocations;
-  for (int k = 0; k < 20; ++k) {
-    filters.Step(0.033, update);
-    filters.Step(dt_s.data(), update);
-  }
-  EXPECT_EQ(allocations - before, 0);
-  EXPECT_EQ(outcomes[2], StaticOutcome::kAccepted);
-  EXPECT_EQ(outcomes[3], StaticOutcome::kOutOfDomain);
 }
 
 TEST(Log, TakesNoAllocationWithoutASink) {

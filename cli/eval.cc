@@ -33,9 +33,7 @@ struct EvalArguments {
   EvaluateOptions options;
   bool se3 = false, scale = false, origin = false;
   double max_diff_s = 0.01, offset_s = 0.0;
-  std::string save_absolute, save_relative;
   Form form = Form::kText;
-  bool force = false;
 };
 
 /// An option takes the name of one of `values`.
@@ -123,13 +121,6 @@ std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
     const std::vector<TrajectoryFile> more = EstimatesAt(path);
     files.insert(files.end(), more.begin(), more.end());
   }
-  const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
-  if ((!absolute.empty() || !relative.empty()) && files.size() > 1) {
-    throw Error(ExitCode::kUsage, "--save-results: " + std::to_string(files.size()) +
-                                      " estimates; expected one, as a result of evo has one");
-  }
-  if (!absolute.empty()) CheckEvoResult(absolute, arguments.force);
-  if (!relative.empty()) CheckEvoResult(relative, arguments.force);
   return files;
 }
 
@@ -160,22 +151,7 @@ ExitCode RunEval(const EvalArguments& arguments) {
     }
   }
   MakeUnique(evaluations);
-  std::exception_ptr unprinted;
-  try {
-    Print(Text(evaluations, arguments.form));
-  } catch (const Error&) {
-    unprinted = std::current_exception();  // the files below are written all the same
-  }
-  // First those that there may be none of.
-  if (!arguments.save_relative.empty()) {
-    SaveEvoResult(evaluations.front(), SavedErrors::kRelative, arguments.save_relative,
-                  arguments.force);
-  }
-  if (!arguments.save_absolute.empty()) {
-    SaveEvoResult(evaluations.front(), SavedErrors::kAbsolute, arguments.save_absolute,
-                  arguments.force);
-  }
-  if (unprinted) std::rethrow_exception(unprinted);
+  Print(Text(evaluations, arguments.form));
   return code;
 }
 
@@ -190,11 +166,6 @@ void CheckTogether(const EvalArguments& arguments) {
       (chosen == Alignment::kNone || chosen == Alignment::kOrigin)) {
     throw CLI::ValidationError("--n-to-align: " + std::string(ToString(chosen)) +
                                " aligns no N poses; expected -a, -s or --align-mode too");
-  }
-  const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
-  if (!absolute.empty() && !relative.empty() && Resolved(absolute) == Resolved(relative)) {
-    throw CLI::ValidationError("--save-relative: " + relative +
-                               " is what --save-results writes; expected another file");
   }
 }
 
@@ -274,15 +245,6 @@ void AddForms(CLI::App& command, EvalArguments& a) {
   CLI::Option* latex = add("--latex", Form::kLatex, "print a table of LaTeX");
   json->excludes(markdown)->excludes(latex);
   markdown->excludes(latex);
-  command
-      .add_option("--save-results", a.save_absolute,
-                  "write the absolute errors of the first -r for evo_res")
-      ->option_text("ZIP")
-      ->check(IsNamed);
-  command.add_option("--save-relative", a.save_relative, "write the relative errors, likewise")
-      ->option_text("ZIP")
-      ->check(IsNamed);
-  command.add_flag("--force", a.force, "replace ZIP if it is there");
   command.add_flag("--quiet")->description("no warnings");
 }
 

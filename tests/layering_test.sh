@@ -18,11 +18,10 @@
 #             tests/fuzz, which test the class behind the export; bench includes the costs of
 #             plugins/ceres
 #   upward    what lies below does not include cli, bench, tests or examples
-#   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools,
-#             libarchive in those of tools, alone; of nlohmann-json the forward declarations also in
-#             core/alidade/base/json.h, which names the type for all, and the whole in its test;
-#             CLI11 in cli, OpenCV in image plugins and tests/images, and both in bench, alone;
-#             Ceres in plugins/ceres and bench
+#   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools alone;
+#             of nlohmann-json the forward declarations also in core/alidade/base/json.h, which
+#             names the type for all, and the whole in its test; CLI11 in cli, OpenCV in
+#             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone
 #   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
 #   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
@@ -115,8 +114,6 @@ sources() {
           !(path == "nlohmann/json_fwd.hpp" && FILENAME == "core/alidade/base/json.h") &&
           !(path == "nlohmann/json.hpp" && FILENAME == "tests/core/base/json_test.cc"))
         report("library", "only sources of core and tools include " path)
-      if (path ~ /^archive/ && FILENAME !~ /^tools\/.*\.cc$/)
-        report("library", "only sources of tools include " path)
       if (path ~ /^CLI\// && folder != "cli" && folder != "bench")
         report("library", "only cli and bench include " path)
       if (path ~ /^ceres\// && own_plugin != "ceres" && folder != "bench")
@@ -333,7 +330,6 @@ done
 for file in core/alidade/run/new.cc plugins/csv/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
 done
-plant library core/alidade/run/new.cc "$licence\n#include <archive.h>"
 plant library core/alidade/run/new.cc "$licence\n#include <ceres/problem.h>"
 plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
 plant library core/alidade/run/new.cc "$licence\n#include <opencv2/core.hpp>"

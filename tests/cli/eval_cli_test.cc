@@ -121,10 +121,6 @@ TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
   const Node one = json.root().At("evaluations").Items().front();
   EXPECT_EQ(one.At("align_poses").Integer(0, 100), 20);
   EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
-  for (const char* save : {"--save_results", "--save-results"}) {
-    EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", save, "a_b.zip", "--force"}).code, 0);
-    EXPECT_TRUE(Exists("a_b.zip"));
-  }
 }
 
 /// Worked by hand: t = 0, 1, 2, 3 at x = 0, 1, 2, 3 against t = 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The
@@ -209,31 +205,12 @@ TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
       << none.err;
 }
 
-TEST_F(EvalCli, SeveralEstimatesAreOneTableAndSaveNoSingleResult) {
+TEST_F(EvalCli, SeveralEstimatesAreOneTable) {
   const Outcome table = Call({"eval", "truth.tum", "truth.tum", "mono.tum", "-a", "--markdown"});
   EXPECT_EQ(table.code, 0);
   EXPECT_TRUE(Contains(table.out, "| truth | se3 | 1.000000 | 31 of 31 | 0.01 | 0.000000 |"))
       << table.out;
   EXPECT_TRUE(Contains(table.out, "| mono | se3 |")) << table.out;
-  const Outcome two =
-      Call({"eval", "truth.tum", "truth.tum", "mono.tum", "--save_results", "a.zip"});
-  EXPECT_EQ(two.code, 2);
-  EXPECT_FALSE(Exists("a.zip"));
-  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}).code, 0);
-  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}).code, 73);
-  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip", "--force",
-                  "--save_relative", "r.zip"})
-                .code,
-            0);
-  EXPECT_TRUE(Exists("r.zip"));
-}
-
-TEST_F(EvalCli, ResultsAreSavedWhereNobodyTakesTheTable) {
-  const Outcome unread =
-      Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}, "/dev/full");
-  EXPECT_EQ(unread.code, 74);
-  EXPECT_TRUE(Contains(unread.err, "error: <stdout>: cannot write: ")) << unread.err;
-  EXPECT_TRUE(Exists("a.zip"));
 }
 
 TEST_F(EvalCli, WithoutPairsTheOtherFiguresStand) {
@@ -244,11 +221,6 @@ TEST_F(EvalCli, WithoutPairsTheOtherFiguresStand) {
             "--delta, or a larger --delta-tol\n");
   EXPECT_TRUE(Contains(outcome.out, "ATE trans_part [m]")) << outcome.out;
   EXPECT_FALSE(Contains(outcome.out, "RPE")) << outcome.out;
-  const Outcome saved = Call({"eval", "truth.tum", "mono.tum", "-as", "-d", "30", "-u", "m",
-                              "--save_results", "a.zip", "--save_relative", "r.zip"});
-  EXPECT_EQ(saved.code, 65);
-  EXPECT_TRUE(Contains(saved.err, "error: mono.tum: no relative errors; expected ")) << saved.err;
-  EXPECT_FALSE(Exists("a.zip"));
 }
 
 TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
@@ -307,38 +279,6 @@ TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
     EXPECT_EQ(first.code, 2) << mode;
     EXPECT_TRUE(first.err.starts_with("error: --n-to-align: " + std::string(mode))) << first.err;
   }
-}
-
-TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
-  const std::string before = Read("truth.tum");
-  const Outcome over =
-      Call({"eval", "truth.tum", "mono.tum", "--save_results", "truth.tum", "--force"});
-  EXPECT_EQ(over.code, 73);
-  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is not a zip; expected another name"))
-      << over.err;
-  EXPECT_EQ(Read("truth.tum"), before);
-  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
-  const Outcome pipe = Call({"eval", "truth.tum", "mono.tum", "--save_results", "pipe", "--force"});
-  EXPECT_EQ(pipe.code, 73);
-  EXPECT_TRUE(pipe.err.starts_with("error: pipe: is not a regular file")) << pipe.err;
-}
-
-TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {
-  const Outcome same = Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip",
-                             "--save_relative", "./a.zip", "--force"});
-  EXPECT_EQ(same.code, 2);
-  EXPECT_TRUE(
-      same.err.starts_with("error: --save-relative: ./a.zip is what --save-results writes; "
-                           "expected another file\n"))
-      << same.err;
-  EXPECT_FALSE(Exists("a.zip"));
-  Write("r.zip", "mine");
-  const Outcome there = Call(
-      {"eval", "truth.tum", "mono.tum", "--save_results", "a.zip", "--save_relative", "r.zip"});
-  EXPECT_EQ(there.code, 73);
-  EXPECT_TRUE(Contains(there.err, "r.zip: is there already")) << there.err;
-  EXPECT_EQ(there.out, "");
-  EXPECT_FALSE(Exists("a.zip"));
 }
 
 TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {

@@ -3,11 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
-#include <map>
-
 #include "alidade/config/config.h"
-#include "support/recording.h"
 #include "support/trajectories.h"
 
 namespace alidade {
@@ -120,123 +116,6 @@ TEST(EvaluationReport, JsonHasAllOfIt) {
   EXPECT_EQ(one.At("nees_position").At("dof").Integer(0, 3), 3);
   EXPECT_EQ(one.At("nis").At("pixels").At("autocorrelation").Number(), 0.01);
   EXPECT_EQ(one.At("warnings").Items().front().Text(), "w");
-}
-
-/// Stored, not compressed, entries of a zip by their names, as its central directory has them.
-std::map<std::string, std::string> Unzip(const std::string& zip) {
-  const auto number = [&](std::size_t at, int bytes) {
-    std::size_t value = 0;
-    for (int i = bytes - 1; i >= 0; --i) {
-      value = 256 * value + static_cast<unsigned char>(zip.at(at + static_cast<std::size_t>(i)));
-    }
-    return value;
-  };
-  const std::size_t end = zip.rfind("PK\x05\x06");
-  std::map<std::string, std::string> entries;
-  std::size_t at = number(end + 16, 4);
-  for (std::size_t left = number(end + 10, 2); left > 0; --left) {
-    EXPECT_EQ(zip.substr(at, 4), "PK\x01\x02");
-    EXPECT_EQ(number(at + 10, 2), 0u) << "compressed";
-    const std::size_t size = number(at + 24, 4), name = number(at + 28, 2);
-    const std::size_t local = number(at + 42, 4);
-    const std::size_t data = local + 30 + number(local + 26, 2) + number(local + 28, 2);
-    entries[zip.substr(at + 46, name)] = zip.substr(data, size);
-    at += 46 + name + number(at + 30, 2) + number(at + 32, 2);
-  }
-  return entries;
-}
-
-/// The numbers of a file of numpy, and the shape in its header.
-std::pair<std::string, std::vector<double>> Numbers(const std::string& npy) {
-  EXPECT_EQ(npy.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));
-  const std::size_t header =
-      static_cast<unsigned char>(npy[8]) + 256u * static_cast<unsigned char>(npy[9]);
-  EXPECT_EQ((10 + header) % 64, 0u);
-  EXPECT_EQ(npy[9 + header], '\n');
-  const std::string text = npy.substr(10, header);
-  EXPECT_TRUE(text.starts_with("{'descr': '<f8', 'fortran_order': False, 'shape': ")) << text;
-  std::vector<double> values((npy.size() - 10 - header) / sizeof(double));
-  std::memcpy(values.data(), npy.data() + 10 + header, values.size() * sizeof(double));
-  const std::size_t from = text.find("'shape': ") + 9;
-  return {text.substr(from, text.find(')') + 1 - from), values};
-}
-
-TEST(SaveEvoResult, IsAZipAsEvoWritesIt) {
-  const testing::TemporaryFolder folder;
-  const Evaluation evaluation = Moved(Alignment::kSe3, "ekf");
-  SaveEvoResult(evaluation, SavedErrors::kAbsolute, folder / "ate.zip", false);
-  const std::string zip = testing::Read(folder / "ate.zip");
-  const std::map<std::string, std::string> entries = Unzip(zip);
-  std::vector<std::string> names;
-  for (const auto& [name, content] : entries) names.push_back(name);
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"alignment_transformation_sim3.npy", "distances.npy",
-                                      "distances_from_start.npy", "error_array.npy", "info.json",
-                                      "seconds_from_start.npy", "stats.json", "timestamps.npy"}));
-  const Config info = Config::FromText(entries.at("info.json"), "info.json");
-  EXPECT_EQ(info.root().At("title").Text(),
-            "APE w.r.t. translation part (m)\n(with SE(3) Umeyama alignment)");
-  EXPECT_EQ(info.root().At("label").Text(), "APE (m)");
-  EXPECT_EQ(info.root().At("est_name").Text(), "ekf");
-  EXPECT_EQ(info.root().At("ref_name").Text(), "curve.tum");
-  const Config stats = Config::FromText(entries.at("stats.json"), "stats.json");
-  EXPECT_EQ(stats.root().At("rmse").Number(), evaluation.absolute[0].statistics.rmse);
-  for (const char* name : {"mean", "median", "std", "min", "max", "sse"}) {
-    EXPECT_TRUE(stats.root().Find(name)) << name;
-  }
-  EXPECT_EQ(Numbers(entries.at("error_array.npy")),
-            std::pair(std::string("(30,)"), evaluation.absolute[0].errors));
-  const auto [shape, times] = Numbers(entries.at("timestamps.npy"));
-  EXPECT_NEAR(times[29], 102.9, 1e-9);
-  EXPECT_NEAR(Numbers(entries.at("seconds_from_start.npy")).second[29], 2.9, 1e-9);
-  EXPECT_NEAR(Numbers(entries.at("distances_from_start.npy")).second[29],
-              evaluation.reference.Length(0, 29), 1e-12);
-  const auto [square, matrix] = Numbers(entries.at("alignment_transformation_sim3.npy"));
-  EXPECT_EQ(square, "(4, 4)");
-  EXPECT_NEAR(matrix[3], -0.05, 1e-12);
-  EXPECT_EQ(matrix[15], 1.0);
-
-  // The same result is the same bytes; another one does not replace it unasked.
-  SaveEvoResult(evaluation, SavedErrors::kAbsolute, folder / "again.zip", false);
-  EXPECT_EQ(testing::Read(folder / "again.zip"), zip);
-  EXPECT_THROW(SaveEvoResult(evaluation, SavedErrors::kRelative, folder / "ate.zip", false), Error);
-  SaveEvoResult(evaluation, SavedErrors::kRelative, folder / "ate.zip", true);
-  const auto relative = Unzip(testing::Read(folder / "ate.zip"));
-  EXPECT_EQ(Numbers(relative.at("error_array.npy")),
-            std::pair(std::string("(29,)"), evaluation.relative[0].errors));
-  EXPECT_NEAR(Numbers(relative.at("seconds_from_start.npy")).second[0], 0.1, 1e-9);
-  EXPECT_NE(relative.at("info.json").find("for delta = 1 (frames) using consecutive pairs"),
-            std::string::npos);
-}
-
-TEST(SaveEvoResult, DistancesAreThoseOfThePosesWhateverTheirOrder) {
-  const testing::TemporaryFolder folder;
-  Trajectory turning = Curve(6);
-  const double angles_deg[] = {0.0, 10.0, 20.0, 30.0, 5.0, 20.0};
-  for (std::size_t i = 0; i < 6; ++i) {
-    turning.orientations[i] =
-        Eigen::AngleAxisd(angles_deg[i] * 3.14159265358979323846 / 180.0, Vector3d::UnitX());
-  }
-  EvaluateOptions options;
-  options.alignment = Alignment::kSe3;
-  options.align_poses = 5;
-  options.pairs = {20.0, DeltaUnit::kDegrees, true, 0.01};
-  const Evaluation evaluation = Evaluate(turning, turning, options);
-  ASSERT_EQ(evaluation.pairs, (std::vector<std::pair<int, int>>{{0, 2}, {0, 5}, {1, 3}}));
-  SaveEvoResult(evaluation, SavedErrors::kRelative, folder / "r.zip", false);
-  const auto entries = Unzip(testing::Read(folder / "r.zip"));
-  const std::vector<double> reference = Numbers(entries.at("distances_from_start.npy")).second;
-  const std::vector<double> estimate = Numbers(entries.at("distances.npy")).second;
-  ASSERT_EQ(reference.size(), evaluation.pairs.size());
-  ASSERT_EQ(estimate.size(), evaluation.pairs.size());
-  for (std::size_t k = 0; k < evaluation.pairs.size(); ++k) {
-    const int end = evaluation.pairs[k].second;
-    EXPECT_NEAR(reference[k], evaluation.reference.Length(0, end), 1e-12) << k;
-    EXPECT_NEAR(estimate[k], evaluation.estimate.Length(0, end), 1e-12) << k;
-  }
-  EXPECT_NE(entries.at("info.json").find("Umeyama alignment) (aligned poses: 5)"),
-            std::string::npos)
-      << entries.at("info.json");
 }
 
 }  // namespace

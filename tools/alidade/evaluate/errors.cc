@@ -56,6 +56,24 @@ ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate,
           AngleOf(turn(reference).conjugate() * turn(estimate))};
 }
 
+/// Distance of each pose from the first: frames, metres of path, rad of turns for both units of
+/// angle, and ns for seconds, as these are exact.
+std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
+  std::vector<double> progress = {0.0};
+  for (int i = 1; i < t.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    double step = 1.0;
+    if (unit == DeltaUnit::kMetres) step = t.Length(i - 1, i);
+    if (unit == DeltaUnit::kSeconds)
+      step = static_cast<double>(t.timestamps[at] - t.timestamps[at - 1]);
+    if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
+      step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
+    }
+    progress.push_back(progress.back() + step);
+  }
+  return progress;
+}
+
 using Pairs = std::vector<std::pair<int, int>>;
 
 Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaUnit unit) {
@@ -143,22 +161,6 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
   return s;
 }
 
-std::vector<double> internal::Progress(const Trajectory& t, DeltaUnit unit) {
-  std::vector<double> progress = {0.0};
-  for (int i = 1; i < t.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    double step = 1.0;
-    if (unit == DeltaUnit::kMetres) step = t.Length(i - 1, i);
-    if (unit == DeltaUnit::kSeconds)
-      step = static_cast<double>(t.timestamps[at] - t.timestamps[at - 1]);
-    if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
-      step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
-    }
-    progress.push_back(progress.back() + step);
-  }
-  return progress;
-}
-
 Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   ALIDADE_EXPECTS(options.delta > 0.0 && options.tolerance >= 0.0);
   const auto fail = [&](const std::string& what, const char* expected) {
@@ -176,7 +178,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   if (options.all && angles) {
     pairs = AllAnglePairs(estimate, delta, tolerance);
   } else {
-    const std::vector<double> progress = internal::Progress(estimate, options.unit);
+    const std::vector<double> progress = Progress(estimate, options.unit);
     pairs = options.all ? AllPairs(progress, delta, tolerance)
                         : ConsecutivePairs(progress, delta, options.unit);
   }

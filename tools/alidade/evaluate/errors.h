@@ -16,8 +16,4 @@ PoseErrors RelativeErrors(PoseRelation relation, const Trajectory& reference,
                           const Trajectory& estimate,
                           const std::vector<std::pair<int, int>>& pairs);
 
-/// How far each pose is after the first: frames, metres of path, rad of turns for both units of
-/// angle, and ns for seconds, as these are exact.
-std::vector<double> Progress(const Trajectory& trajectory, DeltaUnit unit);
-
 }  // namespace alidade::internal

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
-#include "alidade/evaluate/statistics_names.h"
 #include "alidade/run/metric_rows.h"
 
 namespace alidade {
@@ -18,11 +18,17 @@ namespace {
 
 using internal::FixedText;
 using internal::Json;
-using internal::kStatistics;
 using internal::NumberText;
 using internal::RoundedText;
 
 constexpr int kDecimals = 6;  // as evo has them
+
+/// The statistics with evo's names, in its order.
+constexpr std::pair<const char*, double ErrorStatistics::*> kStatistics[] = {
+    {"rmse", &ErrorStatistics::rmse},     {"mean", &ErrorStatistics::mean},
+    {"median", &ErrorStatistics::median}, {"std", &ErrorStatistics::std},
+    {"min", &ErrorStatistics::min},       {"max", &ErrorStatistics::max},
+    {"sse", &ErrorStatistics::sse}};
 
 std::string WithUnit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + " [" + unit + ']';
@@ -39,7 +45,9 @@ std::string ToleranceText(const Evaluation& evaluation) {
 std::string AlignText(const Evaluation& evaluation) {
   const EvaluateOptions& options = evaluation.options;
   std::string text = ToString(options.alignment);
-  if (!internal::LimitsAlignment(options)) return text;
+  const bool least_squares =
+      options.alignment != Alignment::kNone && options.alignment != Alignment::kOrigin;
+  if (options.align_poses == 0 || !least_squares) return text;
   return text + " by the first " + std::to_string(options.align_poses) + " poses";
 }
 

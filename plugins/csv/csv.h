@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
-#include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "alidade/base/line_reader.h"
-#include "alidade/base/text_cell.h"
 #include "alidade/host/source.h"
-#include "csv_calibration.h"
-#include "csv_layout.h"
 
 namespace alidade {
+
+inline constexpr const char* kCsvKeys =
+    "path           file or pipe, from the folder of the config; '-' is standard input\n"
+    "time           {column: t_s, unit: s, repeats: false}; unit s, ms, us or ns; default column "
+    "t_s in s; repeats: rows of one time, one after the other, are one frame\n"
+    "rate_hz        rows a second, where there is no column of time; the first is at 0\n"
+    "streams        stream: x, [x, y], or {columns: x, reciprocal: false, gain: 1, known: [a, b]}; "
+    "x a column, a and b those of numbers that its sensor takes as known\n"
+    "truth          the same for truth values, without known; may be left out\n"
+    "separator      character between cells; default ','\n"
+    "missing        cells that say there is no value; default [\"\"], the empty cell\n"
+    "blind_after    share of the rows, in [0, 1], from which on streams are dropped; default 1\n"
+    "blind          streams that blind_after drops; default the first";
 
 /// Measurements and truth from the columns of a table: a file, a pipe, or standard input.
 ///
@@ -26,266 +30,9 @@ namespace alidade {
 /// every digit. Comments above the names of the columns may tell the calibration, see
 /// CsvCalibration.
 ///
-/// Keys         kCsvKeys in csv_layout.h.
+/// Keys         kCsvKeys.
 /// Errors       kBadData with file, line and column of the first cell that is wrong; kInputMissing;
 ///              kIo where the file changes while it is read; kBadConfig.
-class CsvSource : public Source {
- public:
-  explicit CsvSource(const SourceArguments& arguments)
-      : layout_(ReadCsvLayout(arguments.entry)),
-        reader_(Open(arguments)),
-        any_order_(arguments.any_order) {
-    for (const CsvField& field : layout_.streams) streams_.push_back(field.info);
-    for (const CsvField& field : layout_.truths) truths_.push_back(field.info);
-    ReadHeader();
-    if (layout_.blind_after < 1.0) CountRows();
-  }
-
-  const std::vector<StreamInfo>& streams() const override { return streams_; }
-  const std::vector<StreamInfo>& truths() const override { return truths_; }
-  std::int64_t size() const override { return size_; }
-  Place place() const override { return {reader_.name(), last_line_, 0}; }
-  std::optional<Config> Calibration() const override { return calibration_.Get(); }
-
-  bool Next(SourceFrame& frame) override {
-    if (!has_row_ && !ReadRow()) {
-      if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
-      return false;
-    }
-    frame.timestamp = timestamp_;
-    frame.truth.resize(layout_.truths.size());
-    for (std::vector<double>& truth : frame.truth) truth.clear();
-    std::size_t used = 0;
-    do {
-      TakeRow(frame, used);
-    } while (layout_.time_repeats && ReadRow() && timestamp_ == frame.timestamp);
-    frame.measurements.resize(used);
-    return true;
-  }
-
- private:
-  /// The next row, whole, with its time in timestamp_; false at the end.
-  bool ReadRow() {
-    has_row_ = NextRow();
-    if (!has_row_) return false;
-    Split();
-    CheckColumns();
-    timestamp_ = ReadTimestamp();
-    return true;
-  }
-
-  /// Puts the row into the frame, whose first `used` measurements are there.
-  void TakeRow(SourceFrame& frame, std::size_t& used) {
-    for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
-      if (used == frame.measurements.size()) frame.measurements.emplace_back();
-      Measurement& measurement = frame.measurements[used];
-      if (!ReadField(layout_.streams[i], measurement.values)) continue;
-      if (!ReadKnown(layout_.streams[i], measurement.known)) continue;
-      if (layout_.streams[i].goes_blind && rows_ >= first_blind_row_) continue;
-      measurement.timestamp = frame.timestamp;
-      measurement.stream = static_cast<int>(i);
-      measurement.landmark = -1;
-      measurement.covariance.clear();
-      ++used;
-    }
-    for (std::size_t i = 0; i < frame.truth.size(); ++i) {
-      if (frame.truth[i].empty()) ReadField(layout_.truths[i], frame.truth[i]);
-    }
-    last_timestamp_ = timestamp_;
-    last_line_ = reader_.number();
-    ++rows_;
-    has_row_ = false;
-  }
-
-  static LineReader Open(const SourceArguments& arguments) {
-    const Node path = arguments.entry.At("path", "csv");
-    return {Path(path, arguments.folder), path.place(), path.path()};
-  }
-  static std::filesystem::path Path(const Node& node, const std::filesystem::path& folder) {
-    const std::filesystem::path path = node.Text();
-    if (path.empty()) node.Fail("no path", "a file, or '-' for standard input");
-    return path == "-" ? path : folder / path;
-  }
-
-  /// The next line that is neither comment nor blank. A blank line is a row where it is the missing
-  /// value of a single column, and a row of too few columns where rows count the time.
-  bool NextRow() {
-    while (reader_.Next(line_)) {
-      if (line_.starts_with('#')) {
-        if (names_.empty()) calibration_.Note(line_, reader_.name(), reader_.number());
-        continue;
-      }
-      const bool blank = line_.find_first_not_of(" \t") == std::string_view::npos;
-      const bool skips_blank = names_.empty() || (names_.size() > 1 && layout_.rate_hz == 0.0);
-      if (!blank || !skips_blank) return true;
-    }
-    return false;
-  }
-
-  /// Cuts line_ into cells_, each with its untrimmed start.
-  void Split() {
-    cells_.clear();
-    for (std::string_view rest = line_;;) {
-      const std::size_t end = std::min(rest.find(layout_.separator), rest.size());
-      cells_.push_back(rest.substr(0, end));
-      if (end == rest.size()) return;
-      rest.remove_prefix(end + 1);
-    }
-  }
-
-  void ReadHeader() {
-    if (!NextRow())
-      Fail(Place{reader_.name()}, {}, "no header line", "a line that names the columns");
-    header_line_ = last_line_ = reader_.number();
-    constexpr std::string_view kGzip = "\x1F\x8B";
-    if (line_.starts_with(kGzip) || line_.find('\0') != line_.npos) {
-      Fail(Place{reader_.name(), header_line_, 1}, {}, "bytes that are no text",
-           "a table; a compressed one by a pipe: zcat FILE | alidade run CONFIG --set "
-           "source.path=-");
-    }
-    Split();
-    std::vector<std::string> names;
-    for (const std::string_view cell : cells_) names.emplace_back(cell::Trim(cell));
-    names_ = std::move(names);
-    ResolveColumns(names_, reader_.name(), layout_);
-  }
-
-  void CountRows() {
-    if (any_order_) {
-      layout_.blind_after_node->Fail(
-          "counts rows as the file has them, not as 'out_of_sequence.policy' puts them",
-          "'out_of_sequence.policy: reject', which asks for a file in the order of time");
-    }
-    if (!reader_.regular()) {
-      layout_.blind_after_node->Fail(
-          "'" + reader_.name() + "' is a pipe, which cannot be read twice",
-          "a regular file, whose rows can be counted first");
-    }
-    std::int64_t rows = 0;
-    while (NextRow()) ++rows;
-    reader_.Rewind();
-    NextRow();  // the header
-    if (!layout_.time_repeats) size_ = rows;
-    const double share = layout_.blind_after * static_cast<double>(rows);
-    first_blind_row_ = static_cast<std::int64_t>(std::ceil(share * (1.0 - 1e-12)));
-  }
-
-  void CheckColumns() const {
-    const auto count = [](std::size_t n) {
-      return std::to_string(n) + (n == 1 ? " column" : " columns");
-    };
-    if (cells_.size() == names_.size()) return;
-    const bool few = cells_.size() < names_.size();
-    const std::size_t column = few ? line_.size() : Column(cells_[names_.size()]) - 1;
-    Fail(Place{reader_.name(), reader_.number(), static_cast<int>(column) + 1}, {},
-         (few && reader_.unterminated() ? "the last line is cut short: " : "") +
-             count(cells_.size()),
-         count(names_.size()) + ", as in line " + std::to_string(header_line_));
-  }
-
-  bool Missing(std::string_view cell) const {
-    return std::find(layout_.missing.begin(), layout_.missing.end(), cell) != layout_.missing.end();
-  }
-
-  /// Values of the field in this row; false, and none, where one of its cells says "missing".
-  bool ReadField(const CsvField& field, std::vector<double>& values) const {
-    values.clear();
-    for (const CsvColumn& column : field.columns) {
-      if (Missing(cell::Trim(cells_[column.index]))) continue;
-      const double x = ReadNumber(column);
-      const double value = field.reciprocal ? field.gain / x : field.gain * x;
-      if (!std::isfinite(value)) {
-        FailCell(column,
-                 field.reciprocal ? "has no finite reciprocal" : "is too large for the gain");
-      }
-      values.push_back(value);
-    }
-    if (values.size() < field.columns.size()) values.clear();
-    return !values.empty();
-  }
-
-  /// What comes with a measurement of the field; false where one of its cells says "missing".
-  bool ReadKnown(const CsvField& field, std::vector<double>& known) const {
-    known.clear();
-    for (const CsvColumn& column : field.known) {
-      if (Missing(cell::Trim(cells_[column.index]))) return false;
-      known.push_back(ReadNumber(column));
-    }
-    return true;
-  }
-
-  double ReadNumber(const CsvColumn& column, bool may_miss = true) const {
-    double value = 0.0;
-    const std::string_view text = cell::Trim(cells_[column.index]);
-    const char* const wrong = cell::ParseNumber(text, value);
-    if (wrong == nullptr) return value;
-    std::string expected = "a finite number";
-    if (may_miss && !std::isfinite(value))
-      expected += ", or 'source.missing: " + cell::Harmless(text) + '\'';
-    FailCell(column, wrong, expected);
-  }
-
-  Timestamp ReadTimestamp() const {
-    if (!layout_.time) return TimestampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
-    const CsvColumn& column = *layout_.time;
-    const double value = ReadNumber(column, false);
-    const double t_s = value * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
-    if (!(std::abs(t_s) < cell::kTimeLimit)) {
-      FailCell(column, "is beyond 292 years",
-               "-9.2e9 s to 9.2e9 s, or the unit of the column, as in 'source.time: {unit: ns}'");
-    }
-    const Timestamp timestamp =
-        cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
-    const bool same = timestamp == last_timestamp_;
-    if (!any_order_ && rows_ > 0 && timestamp <= last_timestamp_ &&
-        !(same && layout_.time_repeats)) {
-      const bool late = timestamp < last_timestamp_;
-      FailCell(
-          column,
-          (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
-          late ? "times that increase, or 'out_of_sequence.policy: buffer' or 'rollback'"
-               : "times that increase, 'time.repeats: true', by which rows of one time are one "
-                 "frame, or 'out_of_sequence.policy: buffer', which joins rows of different "
-                 "streams");
-    }
-    return timestamp;
-  }
-
-  std::size_t Column(std::string_view cell) const {
-    return static_cast<std::size_t>(cell.data() - line_.data()) + 1;
-  }
-
-  [[noreturn]] void FailCell(const CsvColumn& column, const std::string& what,
-                             std::string_view expected = "a finite number") const {
-    const int at = static_cast<int>(Column(cells_[column.index]));
-    Fail(Place{reader_.name(), reader_.number(), at}, column.name,
-         '\'' + cell::Harmless(cell::Trim(cells_[column.index])) + "' " + what, expected);
-  }
-  [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,
-                                std::string_view expected) {
-    throw Error(ExitCode::kBadData, ErrorLine(place, key, what, expected));
-  }
-
-  CsvLayout layout_;
-  LineReader reader_;
-  CsvCalibration calibration_;
-  bool any_order_;
-  std::vector<StreamInfo> streams_, truths_;
-  std::vector<std::string> names_;
-  int header_line_ = 0;
-  std::int64_t size_ = -1, first_blind_row_ = INT64_MAX;
-
-  std::string_view line_;
-  std::vector<std::string_view> cells_;
-  bool has_row_ = false;     ///< that no frame has yet
-  Timestamp timestamp_ = 0;  ///< of the row
-  std::int64_t rows_ = 0;    ///< given out so far
-  Timestamp last_timestamp_ = 0;
-  int last_line_ = 0;
-};
-
-inline std::unique_ptr<Source> CreateCsv(const SourceArguments& arguments) {
-  return std::make_unique<CsvSource>(arguments);
-}
+std::unique_ptr<Source> CreateCsv(const SourceArguments& arguments);
 
 }  // namespace alidade

@@ -30,7 +30,7 @@ struct CsvField {
   bool goes_blind = false;  ///< dropped from `blind_after` on
 };
 
-/// What the config says of a table: see kCsvKeys.
+/// What the config says of a table: see kCsvKeys in csv.h.
 struct CsvLayout {
   std::optional<CsvColumn> time;  ///< none: rows come at rate_hz
   std::size_t time_digits = 9;    ///< decimal digits from the unit of time to ns
@@ -42,19 +42,6 @@ struct CsvLayout {
   std::optional<Node> blind_after_node;
   double blind_after = 1.0;
 };
-
-inline constexpr const char* kCsvKeys =
-    "path           file or pipe, from the folder of the config; '-' is standard input\n"
-    "time           {column: t_s, unit: s, repeats: false}; unit s, ms, us or ns; default column "
-    "t_s in s; repeats: rows of one time, one after the other, are one frame\n"
-    "rate_hz        rows a second, where there is no column of time; the first is at 0\n"
-    "streams        stream: x, [x, y], or {columns: x, reciprocal: false, gain: 1, known: [a, b]}; "
-    "x a column, a and b those of numbers that its sensor takes as known\n"
-    "truth          the same for truth values, without known; may be left out\n"
-    "separator      character between cells; default ','\n"
-    "missing        cells that say there is no value; default [\"\"], the empty cell\n"
-    "blind_after    share of the rows, in [0, 1], from which on streams are dropped; default 1\n"
-    "blind          streams that blind_after drops; default the first";
 
 namespace csv_detail {
 

@@ -1,8 +1,450 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "models.h"
 
-#include "alidade/host/cpp_plugin.h"
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
-ALIDADE_SOURCE_PLUGIN({"models",
-                       "simulator: truth and measurements drawn from the models of the config",
-                       alidade::kModelsKeys, &alidade::CreateModels})
+#include "alidade/base/error.h"
+#include "alidade/base/random.h"
+#include "alidade/config/config.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/system/system.h"
+#include "sensor_schedule.h"
+
+namespace alidade {
+namespace {
+
+class Models : public Source {
+ public:
+  explicit Models(const SourceArguments& arguments) {
+    Params& p = arguments.params;
+    const double rate_hz = p.Number("rate_hz", "Hz", "time steps a second", {1e-6, 1e6}, 30.0);
+    const double duration_s =
+        p.Number("duration_s", "s", "time of the last step, at most", {0.0, 1e9}, 10.0);
+    const Node& entry = arguments.entry;
+    for (const char* key : {"start", "initial", "overrides", "sensors", "inputs", "landmarks"}) {
+      entry.Declare(key);
+    }
+    if (arguments.config == nullptr || arguments.host == nullptr) {
+      throw Error(ExitCode::kBadConfig, "source 'models' draws from the models of a config");
+    }
+    dt_s_ = 1.0 / rate_hz;
+    // A few units in the last place, for durations that are multiples of the step but for rounding.
+    count_ = 1 + static_cast<std::int64_t>(duration_s * rate_hz * (1.0 + 1e-15));
+    BuildTruth(arguments);
+    DrawStart(entry, arguments.seed);
+    AddMotions(entry, arguments.seed);
+    AddSensors(entry, arguments.seed, rate_hz);
+    DrawPoints(entry, arguments.seed);
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  std::int64_t size() const override { return count_; }
+
+  std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
+    if (id < 0 || id >= static_cast<std::int64_t>(points_.size())) return std::nullopt;
+    return points_[static_cast<std::size_t>(id)];
+  }
+
+  bool Next(SourceFrame& frame) override {
+    if (index_ == count_) return false;
+    if (index_ > 0) Step();
+    frame.timestamp = TimestampFromSeconds(Time());
+    frame.truth = x_;
+    frame.measurements.clear();
+    for (Sensor& sensor : sensors_) Measure(sensor, frame);
+    if (!frame.measurements.empty()) {
+      for (Motion& motion : motions_) motion.held = false;
+    }
+    for (Motion& motion : motions_) EmitInput(motion, frame);
+    ++index_;
+    return true;
+  }
+
+ private:
+  struct Motion {
+    const MotionBinding* binding;
+    Random noise;
+    int stream = -1;             ///< of its control input
+    const Motion* of = nullptr;  ///< that draws the stream, where it is not this one
+    std::vector<double> input, mean, amplitude;
+    double frequency_hz = 0.0;
+    std::vector<double> w;  ///< as it is drawn
+    bool held = false;      ///< w stays, as nothing has been measured since
+  };
+  struct Sensor {
+    const SensorBinding* binding;
+    SensorModel model;  ///< of landmarks that are xyz
+    int stream;
+    models::Schedule schedule;
+    Random noise;
+    int max_per_frame;  ///< of landmarks
+  };
+
+  /// The system of the config, with what `overrides` has of it.
+  void BuildTruth(const SourceArguments& arguments) {
+    const auto overrides = arguments.entry.Find("overrides");
+    const Config truth =
+        overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
+    system_ = BuildSystem(truth.root(), *arguments.host, {});
+    start_s_ = system_.initial_time_s.value_or(0.0);
+    if (!overrides) return;
+    for (const auto& [key, node] : overrides->Entries()) {
+      if (!truth.root().HasUnread(key)) continue;
+      node.Fail("the truth has no key '" + key + "'",
+                "`state`, `sensors`, and what their models read");
+    }
+  }
+
+  /// n of N(0, P) as a vector of the tangent; P may be singular.
+  static Eigen::VectorXd DrawFrom(const Eigen::MatrixXd& p, Random& random) {
+    const Eigen::LDLT<Eigen::MatrixXd> root(p);
+    Eigen::VectorXd n(p.rows());
+    for (double& value : n) value = random.Normal();
+    n = root.vectorD().cwiseMax(0.0).cwiseSqrt().cwiseProduct(n);
+    const Eigen::VectorXd drawn = root.matrixL() * n;
+    return root.transpositionsP().transpose() * drawn;
+  }
+
+  void DrawStart(const Node& entry, std::uint64_t seed) {
+    const auto start = entry.Find("start");
+    const bool draws = !start || start->Choice({"prior", "mean"}) == 0;
+    const auto given = entry.Find("initial");
+    Random random(seed, 0);
+    x_.resize(system_.layout.blocks().size());
+    for (const Prior& prior : system_.priors) {
+      const Block& block = system_.layout[prior.block];
+      std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
+      const std::string name = block.name.substr(block.owner.size() + 1);
+      const auto owner = given ? given->Find(block.owner) : std::nullopt;
+      if (owner && !owner->is_map()) owner->Fail("not a map", "{BLOCK: value}");
+      if (const auto value = owner ? owner->Find(name) : std::nullopt) {
+        constexpr double kUnitLength = 1e-3;
+        x = value->Numbers(block.geometry().ambient);
+        if (DistanceFrom(block.geometry(), x.data()) > kUnitLength) {
+          value->Fail("not of unit length", "a unit vector or quaternion [w, x, y, z] to 1e-3");
+        }
+        block.geometry().Normalise(x.data());
+        continue;
+      }
+      if (!prior.from.empty()) {
+        entry.Fail(
+            "block '" + block.name + "' starts from a measurement: its true value is unknown",
+            "source.initial: {" + block.owner + ": {" + name + ": value}}");
+      }
+      x = prior.mean;
+      if (!draws || prior.covariance.size() == 0) continue;
+      const Eigen::VectorXd d = DrawFrom(prior.covariance, random);
+      block.geometry().Plus(x.data(), d.data(), x.data());
+    }
+    if (given) {
+      for (const Block& block : system_.layout.blocks()) {
+        if (const auto owner = given->Find(block.owner)) owner->RejectUnread();
+      }
+      given->RejectUnread();
+    }
+    for (const Block& block : system_.layout.blocks()) {
+      truths_.push_back({block.name, block.geometry().ambient});
+    }
+  }
+
+  void AddMotions(const Node& entry, std::uint64_t seed) {
+    const auto inputs = entry.Find("inputs");
+    motions_.reserve(system_.motions.size());  // they point to each other
+    for (std::size_t i = 0; i < system_.motions.size(); ++i) {
+      const MotionBinding& binding = system_.motions[i];
+      Motion motion{&binding, Random(seed, 100 + i), -1, nullptr, {}, {}, {}, 0.0, {}, false};
+      motion.w.resize(static_cast<std::size_t>(binding.model.noise_size()));
+      if (binding.model.has_input()) ReadInput(entry, inputs, motion);
+      motions_.push_back(std::move(motion));
+    }
+    if (inputs) inputs->RejectUnread();
+  }
+
+  void ReadInput(const Node& source, const std::optional<Node>& inputs, Motion& motion) {
+    if (motion.binding->input.timeout_s < dt_s_) {
+      source.Fail(
+          "the control input of '" + motion.binding->name + "' times out before the next time step",
+          "rate_hz above 1 / timeout_s");
+    }
+    const std::string& stream = motion.binding->input.stream;
+    for (const Motion& other : motions_) {
+      if (other.stream < 0 || other.binding->input.stream != stream) continue;
+      if (const auto twice = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
+        twice->Fail("stream '" + stream + "' is that of '" + other.binding->name + "' too",
+                    "the input of '" + other.binding->name + "' alone");
+      }
+      motion.stream = other.stream;
+      motion.of = &other;
+      return;
+    }
+    const Geometry& geometry = motion.binding->model.input().geometry;
+    const auto size = static_cast<std::size_t>(geometry.ambient);
+    motion.mean.resize(size);
+    motion.amplitude.resize(size);
+    geometry.Identity(motion.mean.data());
+    motion.stream = static_cast<int>(streams_.size());
+    streams_.push_back({stream, geometry.ambient});
+    const auto entry = inputs ? inputs->Find(motion.binding->name) : std::nullopt;
+    if (entry) {
+      if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
+      if (const auto amplitude = entry->Find("amplitude")) {
+        if (geometry.kind != GeometryKind::kVector) {
+          amplitude->Fail("the input is no vector", "`mean` alone");
+        }
+        motion.amplitude = amplitude->Numbers(geometry.ambient);
+        motion.frequency_hz = entry->At("frequency_hz", "an amplitude").Number(0.0, 1e6);
+      }
+      entry->RejectUnread();
+    }
+  }
+
+  static std::vector<double> InputAt(const Motion& motion, double t_s) {
+    std::vector<double> u = motion.mean;
+    const double wave = std::sin(2.0 * std::numbers::pi * motion.frequency_hz * t_s);
+    for (std::size_t i = 0; i < u.size(); ++i) u[i] += motion.amplitude[i] * wave;
+    return u;
+  }
+
+  void AddSensors(const Node& entry, std::uint64_t seed, double rate_hz) {
+    const auto settings = entry.Find("sensors");
+    const auto landmarks = entry.Find("landmarks");
+    const auto most = landmarks ? landmarks->Find("max_per_frame") : std::nullopt;
+    const int max_per_frame = most ? static_cast<int>(most->Integer(1, LandmarkOptions::kUnlimited))
+                                   : LandmarkOptions::kUnlimited;
+    const std::ptrdiff_t inputs = std::ssize(streams_);
+    for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
+      const SensorBinding& binding = system_.sensors[i];
+      const auto own = settings ? settings->Find(binding.name) : std::nullopt;
+      const int known = binding.model.known_size();
+      const models::Schedule schedule =
+          models::ReadSchedule(own, rate_hz, known, seed, 1001 + 2 * i);
+      const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
+      if (taken != streams_.end()) {
+        const bool input = taken - streams_.begin() < inputs;
+        if (input) {
+          entry.Fail("stream '" + binding.stream + "' of sensor '" + binding.name +
+                         "' is that of a control input",
+                     "a stream of its own");
+        }
+        if (own) {
+          own->Fail("a sensor before it has the stream '" + binding.stream + "', and draws it",
+                    "the entry of that sensor");
+        }
+        continue;
+      }
+      if (known > 0 && !own) {
+        entry.Fail("sensor '" + binding.name + "' takes known numbers with each measurement",
+                   "sensors." + binding.name + ".known, a list of them for each measurement");
+      }
+      sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
+                          schedule, Random(seed, 1000 + 2 * i), max_per_frame});
+      streams_.push_back(
+          {binding.stream, binding.model.measurement().geometry.ambient, 0.0, known});
+    }
+    if (settings) settings->RejectUnread();
+  }
+
+  /// The model with landmarks that are points, or poses.
+  static SensorModel ModelOf(const Node& entry, const SensorBinding& binding) {
+    if (!binding.model.has_landmark()) return binding.model;
+    entry.At("landmarks", "sensor '" + binding.name + "'");
+    if (binding.xyz) return *binding.xyz;
+    if (HasPose(binding.model)) return binding.model;
+    const auto representation = RepresentationOf(binding.model.roles());
+    if (!representation || !IsXyz(*representation)) {
+      entry.Fail("model '" + binding.model.name() + "' of sensor '" + binding.name +
+                     "' has no representation xyz, which the points are drawn in",
+                 "a source with landmarks of its own");
+    }
+    return binding.model;
+  }
+
+  /// Whether its landmarks are a position and an orientation.
+  static bool HasPose(const SensorModel& model) {
+    const std::size_t last = model.roles().size() - 1;
+    return model.roles().size() >= 2 && model.roles()[last - 1].landmark() &&
+           model.roles()[last - 1].geometry == Geometry::Vector(3) &&
+           model.roles()[last].landmark() &&
+           model.roles()[last].geometry == Geometry::UnitQuaternion();
+  }
+
+  void DrawPoints(const Node& entry, std::uint64_t seed) {
+    const auto landmarks = entry.Find("landmarks");
+    if (!landmarks) return;
+    if (!system_.landmarks) landmarks->Fail("no sensor measures landmarks", "the key left out");
+    constexpr int kMost = 1'000'000;
+    const auto count =
+        static_cast<std::size_t>(landmarks->At("count", "landmarks").Integer(1, kMost));
+    const Node box = landmarks->At("box", "landmarks");
+    const std::vector<double> low = box.At("min").Numbers(3), high = box.At("max").Numbers(3);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!(low[k] <= high[k])) box.Fail("min above max", "min <= max in each of x, y, z");
+    }
+    box.RejectUnread();
+    landmarks->RejectUnread();
+    Random random(seed, 1);
+    points_.resize(count);
+    for (auto& point : points_) {
+      for (std::size_t k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * random.Uniform();
+    }
+    Random of_orientations(seed, 2);
+    orientations_.resize(count);
+    for (auto& orientation : orientations_) {
+      for (double& value : orientation) value = of_orientations.Normal();
+      Geometry::UnitQuaternion().Normalise(orientation.data());
+    }
+    for (const KnownLandmark& known : system_.landmarks->known) {
+      if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) {
+        landmarks->At("count").Fail(
+            "no point has the id " + std::to_string(known.id) + " of `landmarks.known`",
+            "more than its greatest id");
+      }
+      auto& point = points_[static_cast<std::size_t>(known.id)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        point[k] = known.position[k] + known.sigma * random.Normal();
+      }
+    }
+  }
+
+  double Time() const { return start_s_ + static_cast<double>(index_) * dt_s_; }
+
+  /// To the next time step.
+  void Step() {
+    const double t_s = Time();
+    std::vector<std::vector<double>> next = x_;
+    for (Motion& motion : motions_) {
+      const MotionModel& model = motion.binding->model;
+      if (model.stationary()) continue;
+      std::vector<const double*> blocks;
+      std::vector<double*> moved;
+      for (const BlockId id : motion.binding->blocks) {
+        blocks.push_back(x_[static_cast<std::size_t>(id)].data());
+        moved.push_back(next[static_cast<std::size_t>(id)].data());
+      }
+      Status status = Status::kOk;
+      const double* const input = motion.input.empty() ? nullptr : motion.input.data();
+      if (!motion.held || !model.discrete_noise()) status = DrawNoise(blocks, input, motion);
+      if (status == Status::kOk) {
+        status = model.Step(blocks.data(), input, motion.w.data(), dt_s_, moved.data(), nullptr,
+                            nullptr);
+      }
+      if (status != Status::kOk) {
+        throw Error(ExitCode::kBadData, "source 'models': the truth leaves the domain of model '" +
+                                            model.name() + "' of '" + motion.binding->name +
+                                            "' before t = " + std::to_string(t_s) + " s");
+      }
+      for (const BlockId id : motion.binding->blocks) {
+        system_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
+      }
+    }
+    // A constant block stays, whatever its model makes of it.
+    for (std::size_t id = 0; id < x_.size(); ++id) {
+      if (system_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
+        x_[id] = next[id];
+    }
+  }
+
+  Status DrawNoise(const std::vector<const double*>& blocks, const double* input,
+                   Motion& motion) const {
+    const auto n = static_cast<Eigen::Index>(motion.w.size());
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(n, n);
+    const Status status = motion.binding->model.SqrtQ(blocks.data(), input, dt_s_, l.data());
+    Eigen::VectorXd drawn(n);
+    for (double& value : drawn) value = motion.noise.Normal();
+    Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;
+    motion.held = true;
+    return status;
+  }
+
+  void Measure(Sensor& sensor, Frame& frame) {
+    if (!sensor.schedule.IsDue(index_)) return;
+    for (const std::vector<double>& known : sensor.schedule.known) {
+      if (!sensor.model.has_landmark()) {
+        MeasureOne(sensor, -1, known, frame);
+        continue;
+      }
+      int left = sensor.max_per_frame;
+      for (std::size_t id = 0; id < points_.size() && left > 0; ++id) {
+        left -= MeasureOne(sensor, static_cast<std::int64_t>(id), known, frame) ? 1 : 0;
+      }
+    }
+  }
+
+  /// Whether there is something to measure; what is missing counts.
+  bool MeasureOne(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
+                  Frame& frame) {
+    const Geometry& geometry = sensor.model.measurement().geometry;
+    std::vector<const double*> roles;
+    for (const RoleBinding& role : sensor.binding->roles) {
+      roles.push_back(role.block < 0 ? nullptr : x_[static_cast<std::size_t>(role.block)].data());
+    }
+    if (landmark >= 0) {
+      const auto id = static_cast<std::size_t>(landmark);
+      const bool has_pose = HasPose(sensor.model);
+      roles.resize(sensor.model.roles().size() - (has_pose ? 2 : 1));
+      roles.push_back(points_[id].data());
+      if (has_pose) roles.push_back(orientations_[id].data());
+    }
+    const auto m = static_cast<Eigen::Index>(geometry.tangent);
+    std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
+    // Before it is known whether h is defined: where the truth is does not shift the noise.
+    Eigen::VectorXd n(m);
+    for (double& value : n) value = sensor.noise.Normal();
+    const auto fate = sensor.schedule.Draw();
+    if (sensor.model.Predict(roles.data(), z.data(), known.data()) != Status::kOk ||
+        sensor.model.Valid(z.data(), known.data()) != Status::kOk ||
+        sensor.model.SqrtNoise(roles.data(), z.data(), l.data(), known.data()) != Status::kOk) {
+      return false;
+    }
+    const Eigen::VectorXd d = fate.sigma_scale * (l * n);
+    geometry.Plus(z.data(), d.data(), z.data());
+    if (sensor.model.Valid(z.data(), known.data()) != Status::kOk) return false;
+    if (fate.missing) return true;
+    Measurement& measurement = frame.measurements.emplace_back();
+    measurement.timestamp = frame.timestamp;
+    measurement.stream = sensor.stream;
+    measurement.landmark = landmark;
+    measurement.values = std::move(z);
+    measurement.known = known;
+    return true;
+  }
+
+  void EmitInput(Motion& motion, Frame& frame) {
+    if (motion.stream < 0) return;
+    motion.input = motion.of != nullptr ? motion.of->input : InputAt(motion, Time());
+    if (motion.of != nullptr) return;
+    Measurement& measurement = frame.measurements.emplace_back();
+    measurement.timestamp = frame.timestamp;
+    measurement.stream = motion.stream;
+    measurement.values = motion.input;
+  }
+
+  System system_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::vector<double>> x_;  ///< the true value of each block
+  std::vector<Motion> motions_;
+  std::vector<Sensor> sensors_;
+  std::vector<std::array<double, 3>> points_;
+  std::vector<std::array<double, 4>> orientations_;  ///< of landmarks that have a pose
+  double dt_s_, start_s_ = 0.0;
+  std::int64_t count_, index_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Source> CreateModels(const SourceArguments& arguments) {
+  return std::make_unique<Models>(arguments);
+}
+
+}  // namespace alidade

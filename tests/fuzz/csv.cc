@@ -10,6 +10,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace alidade::fuzz;
   const auto parts = Parts(TextOf(data, size), 2);
   const MemoryFile table(parts[1]);
-  static_cast<void>(Accepts([&] { ReadSource<alidade::CsvSource>(parts[0], table.path()); }));
+  static_cast<void>(Accepts([&] { ReadSource(alidade::CreateCsv, parts[0], table.path()); }));
   return 0;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "alidade/host/param_reader.h"
@@ -11,29 +12,29 @@
 
 namespace alidade::fuzz {
 
-/// Makes a source of its config map and the data at `path`, and takes all frames of it.
-template <class Made>
-void ReadSource(const std::string& yaml, const std::filesystem::path& path) {
+/// Creates a source from its config map and the data at `path`, and reads all of its frames.
+inline void ReadSource(std::unique_ptr<Source> (*create)(const SourceArguments&),
+                       const std::string& yaml, const std::filesystem::path& path) {
   Config config = Config::FromText(yaml, "source");
   config.Set("path", path.string(), "fuzz");
   internal::ParamReader reader(config.root(), "source");
   Params params(&reader.host());
   for (const bool any_order : {false, true}) {
-    Made source(SourceArguments{config.root(), params, 1, "/", any_order});
+    const auto source = create({config.root(), params, 1, "/", any_order});
     reader.Check();
-    static_cast<void>(Accepts([&] { static_cast<void>(source.Calibration()); }));
+    static_cast<void>(Accepts([&] { static_cast<void>(source->Calibration()); }));
     static_cast<void>(Accepts([&] {
       SourceFrame frame;
-      while (source.Next(frame)) {
+      while (source->Next(frame)) {
         for (const Measurement& one : frame.measurements) {
-          const auto& streams = source.streams();
+          const auto& streams = source->streams();
           Require(one.stream >= 0 && one.stream < std::ssize(streams), "no such stream");
           const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
           Require(std::ssize(one.values) == stream.size, "another size than the stream says");
           Require(std::ssize(one.known) == stream.known,
                   "other known numbers than the stream says");
         }
-        Require(frame.truth.size() <= source.truths().size(), "a truth of nothing");
+        Require(frame.truth.size() <= source->truths().size(), "a truth of nothing");
       }
     }));
   }

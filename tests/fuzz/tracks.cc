@@ -13,6 +13,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
                                     "groundtruth.tum", "known.csv",      "calibration.yaml"};
   const auto parts = Parts(TextOf(data, size), 1 + std::size(kFiles));
   for (std::size_t i = 0; i < std::size(kFiles); ++i) folder.Put(kFiles[i], parts[i + 1]);
-  static_cast<void>(Accepts([&] { ReadSource<alidade::Tracks>(parts[0], folder.path()); }));
+  static_cast<void>(Accepts([&] { ReadSource(alidade::CreateTracks, parts[0], folder.path()); }));
   return 0;
 }

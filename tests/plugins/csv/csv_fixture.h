@@ -29,15 +29,14 @@ class Csv : public ::testing::Test {
   void Write(const std::string& text) const { std::ofstream(File(), std::ios::binary) << text; }
 
   /// The source of `config_`, whose `source` map is the root.
-  std::unique_ptr<CsvSource> Open(const std::string& config = kDepthConfig) {
+  std::unique_ptr<Source> Open(const std::string& config = kDepthConfig) {
     config_ = std::make_unique<Config>(Config::FromText(config, "run.yaml"));
     return OpenConfig();
   }
-  std::unique_ptr<CsvSource> OpenConfig() {
+  std::unique_ptr<Source> OpenConfig() {
     static const AlidadeHost kHost{};
     Params params(&kHost);
-    auto source = std::make_unique<CsvSource>(
-        SourceArguments{config_->root(), params, 1, folder_.path(), any_order_});
+    auto source = CreateCsv({config_->root(), params, 1, folder_.path(), any_order_});
     config_->root().RejectUnread();
     return source;
   }

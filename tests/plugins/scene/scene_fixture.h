@@ -24,7 +24,7 @@ inline const std::string kPoints =
 /// `keys` are those of `source`, in braces.
 struct MadeScene {
   Config config;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<Source> scene;
 };
 
 inline MadeScene MakeScene(const std::string& keys, std::uint64_t seed = 1,
@@ -33,7 +33,7 @@ inline MadeScene MakeScene(const std::string& keys, std::uint64_t seed = 1,
   const Node entry = made.config.root().At("source");
   internal::ParamReader reader(entry, "source 'scene'");
   Params params(&reader.host());
-  made.scene = std::make_unique<Scene>(entry, params, seed);
+  made.scene = CreateScene({entry, params, seed, {}});
   reader.Check();
   entry.RejectUnread();
   made.config.root().RejectUnread();

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What the camera sees of the points, and what the config may get wrong.
+#include <Eigen/Core>
 #include <cmath>
 #include <set>
 
+#include "alidade/model/geometry.h"
 #include "scene_fixture.h"
 
 namespace alidade::testing {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Curves through way-points and key frames, and the paths made of them.
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "motion_models/odometry_pose.h"

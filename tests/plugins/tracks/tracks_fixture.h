@@ -27,14 +27,14 @@ class TracksTest : public ::testing::Test {
   fs::path File() const { return folder_ / "tracks.csv"; }
 
   /// The source of `keys`, those of `source` in braces, of the folder.
-  std::unique_ptr<Tracks> Open(const std::string& keys = "rate_hz: 10",
+  std::unique_ptr<Source> Open(const std::string& keys = "rate_hz: 10",
                                const std::string& path = "tracks.csv") {
     config_ = std::make_unique<Config>(
         Config::FromText("source: {path: \"" + path + "\", " + keys + "}", "run.yaml"));
     const Node entry = config_->root().At("source");
     internal::ParamReader reader(entry, "source 'tracks'");
     Params params(&reader.host());
-    auto source = std::make_unique<Tracks>(SourceArguments{entry, params, 1, folder_.path()});
+    auto source = CreateTracks({entry, params, 1, folder_.path()});
     reader.Check();
     entry.RejectUnread();
     return source;

@@ -2,18 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "alidade/base/random.h"
 #include "alidade/host/source.h"
 #include "alidade/model/camera.h"
-#include "alidade/model/geometry.h"
 
 /// Textured surfaces of a simulated world, and what a camera sees of them.
 namespace alidade {
@@ -25,150 +19,11 @@ struct Rectangle {
   std::uint64_t texture;  ///< equal numbers, equal textures
 };
 
-/// Uniform in [0, 1), the same for the same numbers.
-inline double LatticeValue(std::uint64_t texture, std::uint64_t octave, std::int64_t x,
-                           std::int64_t y) {
-  std::uint64_t bits = texture * 0x9e3779b97f4a7c15U + octave;
-  for (const std::int64_t number : {x, y}) {
-    bits = (bits ^ static_cast<std::uint64_t>(number)) * 0xbf58476d1ce4e5b9U;
-    bits ^= bits >> 29;
-  }
-  bits *= 0x94d049bb133111ebU;
-  return 0x1p-53 * static_cast<double>((bits ^ (bits >> 31)) >> 11);
-}
-
-/// Brightness in [0, 1] of a texture at (x, y), m: a sum of lattice noises [Perlin1985], each of
-/// half the wavelength and 0.8 of the amplitude of the one before. Those that a sample `sample_m`
-/// wide cannot tell are faded out, so that nothing aliases.
-inline double Brightness(const Rectangle& rectangle, double x, double y, double sample_m) {
-  constexpr double kFalloff = 0.8, kContrast = 0.9;
-  double sum = 0.0, amplitude = 1.0, squares = 0.0, wavelength = rectangle.grain_m;
-  for (std::uint64_t octave = 0; octave < 16; ++octave) {
-    const double share = std::clamp(0.5 * wavelength / sample_m - 1.0, 0.0, 1.0);
-    if (share == 0.0) break;
-    const double u = x / wavelength, v = y / wavelength;
-    const double u0 = std::floor(u), v0 = std::floor(v);
-    const auto smooth = [](double t) { return t * t * t * (t * (6.0 * t - 15.0) + 10.0); };
-    const double a = smooth(u - u0), b = smooth(v - v0);
-    const auto i = static_cast<std::int64_t>(u0), j = static_cast<std::int64_t>(v0);
-    const auto at = [&](std::int64_t k, std::int64_t l) {
-      return LatticeValue(rectangle.texture, octave, i + k, j + l);
-    };
-    const double value = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(1, 0)) +
-                         b * ((1.0 - a) * at(0, 1) + a * at(1, 1));
-    sum += share * amplitude * (value - 0.5);
-    squares += amplitude * amplitude;
-    amplitude *= kFalloff;
-    wavelength *= 0.5;
-  }
-  if (squares == 0.0) return 0.5;
-  return std::clamp(0.5 + kContrast * sum / std::sqrt(squares), 0.0, 1.0);
-}
-
-/// What one ray meets.
-struct Met {
-  int surface = -1;  ///< -1: none
-  double brightness = 0.0;
-};
-
-/// A camera at `position`, `orientation` (world_from_cam, w x y z), before surfaces.
-class SurfaceView {
- public:
-  SurfaceView(const std::vector<Rectangle>& surfaces, const Camera& camera, const double* position,
-              const double* orientation)
-      : surfaces_(surfaces),
-        camera_(camera),
-        eye_(position[0], position[1], position[2]),
-        orientation_{orientation[0], orientation[1], orientation[2], orientation[3]} {
-    for (const Rectangle& one : surfaces) {
-      const Eigen::Vector3d normal = one.right.cross(one.down).normalized();
-      planes_.push_back({normal, one.right / one.right.squaredNorm(),
-                         one.down / one.down.squaredNorm(), normal.dot(one.corner - eye_),
-                         one.right.norm(), one.down.norm()});
-    }
-  }
-
-  /// The nearest surface on the ray through pixel (u, v).
-  Met Look(double u, double v) const {
-    const double z[2] = {u, v};
-    double h[3];
-    Met met;
-    if (!camera_.Unproject(z, h)) return met;
-    Eigen::Vector3d ray;
-    UnitQuaternion::Rotate(orientation_.data(), h, ray.data());
-    double nearest = std::numeric_limits<double>::infinity(), right = 0.0, down = 0.0;
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      const Plane& plane = planes_[i];
-      const double along = plane.distance / plane.normal.dot(ray);
-      if (!(along > 0.0) || !(along < nearest)) continue;
-      const Eigen::Vector3d at = eye_ + along * ray - surfaces_[i].corner;
-      const double a = plane.right.dot(at), b = plane.down.dot(at);
-      if (a < 0.0 || a > 1.0 || b < 0.0 || b > 1.0) continue;
-      nearest = along;
-      right = a * plane.width;
-      down = b * plane.height;
-      met.surface = static_cast<int>(i);
-    }
-    if (met.surface < 0) return met;
-    const auto index = static_cast<std::size_t>(met.surface);
-    const double length = ray.norm();
-    const double cosine = std::max(std::abs(planes_[index].normal.dot(ray)) / length, 0.05);
-    met.brightness =
-        Brightness(surfaces_[index], right, down, nearest * length / (camera_.fx * cosine));
-    return met;
-  }
-
-  /// Of the whole pixel, which an edge passes: the mean of 4 x 4 rays.
-  double Mean(int u, int v) const {
-    constexpr double kOffsets[] = {-0.375, -0.125, 0.125, 0.375};
-    double sum = 0.0;
-    for (const double du : kOffsets) {
-      for (const double dv : kOffsets) sum += Look(u + du, v + dv).brightness;
-    }
-    return sum / 16.0;
-  }
-
- private:
-  struct Plane {
-    Eigen::Vector3d normal, right, down;  ///< unit normal; edges by their squared length
-    double distance, width, height;       ///< of the camera, m, signed; m
-  };
-  const std::vector<Rectangle>& surfaces_;
-  const Camera& camera_;
-  Eigen::Vector3d eye_;
-  std::array<double, 4> orientation_;
-  std::vector<Plane> planes_;
-};
-
 /// What a camera at `position`, `orientation` (world_from_cam, w x y z) sees of the nearest
 /// surface, with grey noise N(0, noise_grey^2); black where there is none. One ray for a pixel, at
 /// edges the mean of 4 x 4: a texture is smooth over a pixel, an edge is not.
-inline GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
-                        const double* position, const double* orientation, double noise_grey,
-                        Random& noise) {
-  const SurfaceView view(surfaces, camera, position, orientation);
-  std::vector<Met> all;
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) all.push_back(view.Look(u, v));
-  }
-  const auto at = [&](int u, int v) {
-    const auto column = static_cast<std::size_t>(std::clamp(u, 0, camera.width - 1));
-    const auto row = static_cast<std::size_t>(std::clamp(v, 0, camera.height - 1));
-    return all[row * static_cast<std::size_t>(camera.width) + column];
-  };
-  GreyImage image{camera.width, camera.height, {}};
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) {
-      const Met own = at(u, v);
-      const bool edge = at(u - 1, v).surface != own.surface ||
-                        at(u + 1, v).surface != own.surface ||
-                        at(u, v - 1).surface != own.surface || at(u, v + 1).surface != own.surface;
-      double grey = 255.0 * (edge ? view.Mean(u, v) : own.brightness);
-      if (noise_grey > 0.0) grey += noise_grey * noise.Normal();
-      image.pixels.push_back(static_cast<std::uint8_t>(std::clamp(grey + 0.5, 0.0, 255.0)));
-    }
-  }
-  return image;
-}
+GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
+                 const double* position, const double* orientation, double noise_grey,
+                 Random& noise);
 
 }  // namespace alidade

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "alidade/base/text_cell.h"
 #include "alidade/config/config.h"
 #include "alidade/host/source.h"
 
@@ -43,168 +41,12 @@ struct CsvLayout {
   double blind_after = 1.0;
 };
 
-namespace csv_detail {
-
-inline CsvField ReadField(const std::string& name, const Node& node, bool takes_known) {
-  CsvField field;
-  field.info.name = name;
-  Node columns = node;
-  if (node.is_map()) {
-    columns = node.At("columns", name);
-    if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
-    if (const auto gain = node.Find("gain")) {
-      field.gain = gain->Number();
-      if (field.gain == 0.0) gain->Fail("0 leaves nothing of the column", "a number but 0");
-    }
-    if (const auto known = takes_known ? node.Find("known") : std::nullopt) {
-      for (const Node& column : known->ItemsOrOne()) field.known.push_back({column.Text(), column});
-    }
-    node.RejectUnread();
-  }
-  for (const Node& column : columns.ItemsOrOne()) field.columns.push_back({column.Text(), column});
-  if (field.columns.empty()) columns.Fail("no columns", "the name of a column, or a list of names");
-  field.info.size = static_cast<int>(field.columns.size());
-  field.info.known = static_cast<int>(field.known.size());
-  return field;
-}
-
-inline std::vector<CsvField> ReadFields(const Node& map, bool take_known) {
-  std::vector<CsvField> fields;
-  for (const auto& [name, node] : map.Entries())
-    fields.push_back(ReadField(name, node, take_known));
-  return fields;
-}
-
-inline void ReadTime(const Node& entry, CsvLayout& layout) {
-  const std::optional<Node> time = entry.Find("time");
-  const std::optional<Node> rate = entry.Find("rate_hz");
-  if (rate) {
-    if (time) rate->Fail("'time' and 'rate_hz' are both given", "one of them");
-    layout.rate_hz = rate->Number(1e-3, 1e9);
-    return;
-  }
-  layout.time = CsvColumn{"t_s", time.value_or(entry)};
-  if (!time) return;
-  if (const auto column = time->Find("column")) layout.time = CsvColumn{column->Text(), *column};
-  if (const auto unit = time->Find("unit")) {
-    const int thousands = unit->Choice({"s", "ms", "us", "ns"});
-    layout.time_digits = static_cast<std::size_t>(9 - 3 * thousands);
-  }
-  if (const auto repeats = time->Find("repeats")) layout.time_repeats = repeats->Flag();
-  time->RejectUnread();
-}
-
-inline char ReadSeparator(const Node& node) {
-  const std::string text = node.Text();
-  const bool part_of_number = text.find_first_of("+-.#\"\r\n0123456789eE") != std::string::npos;
-  if (text.size() != 1 || part_of_number) {
-    node.Fail("not a separator", "one character that numbers do not hold, as in ';' or \"\\t\"");
-  }
-  return text[0];
-}
-
-/// The text of a cell that says there is no value.
-inline std::string ReadMissing(const Node& word) {
-  const std::string text = word.Text();
-  if (text == ".nan" || text == ".NaN" || text == ".NAN") {
-    word.Fail("'" + text + "' is not the text of a cell", "the text as the table has it",
-              text.substr(1));
-  }
-  return text;
-}
-
-inline void ReadBlind(const Node& entry, CsvLayout& layout) {
-  const std::optional<Node> after = entry.Find("blind_after");
-  const std::optional<Node> blind = entry.Find("blind");
-  if (!after) {
-    if (blind) blind->Fail("without 'blind_after' no stream goes blind", "'blind_after' with it");
-    return;
-  }
-  layout.blind_after_node = after;
-  layout.blind_after = after->Number(0.0, 1.0);
-  if (!blind) layout.streams.front().goes_blind = true;
-  for (const Node& item : blind ? blind->ItemsOrOne() : std::vector<Node>{}) {
-    std::vector<std::string> names;
-    for (const CsvField& stream : layout.streams) names.push_back(stream.info.name);
-    const auto found = std::find(names.begin(), names.end(), item.Text());
-    if (found == names.end()) {
-      std::string known;
-      for (const std::string& name : names) known += (known.empty() ? "one of " : ", ") + name;
-      item.Fail("no stream '" + item.Text() + "'", known, Nearest(item.Text(), names));
-    }
-    layout.streams[static_cast<std::size_t>(found - names.begin())].goes_blind = true;
-  }
-}
-
-/// `, or 'source.separator: ";"'` where the one column that there seems to be is several; else "".
-inline std::string OtherSeparator(const std::vector<std::string>& names) {
-  if (names.size() != 1) return {};
-  for (const char separator : {';', '\t', '|', ',', ' '}) {
-    if (names[0].find(separator) == std::string::npos) continue;
-    const std::string text = separator == '\t' ? "\\t" : std::string(1, separator);
-    return ", or 'source.separator: \"" + text + "\"'";
-  }
-  return {};
-}
-
-/// Finds a column in the header `names` of `file`.
-inline void Resolve(const std::vector<std::string>& names, const std::string& file,
-                    CsvColumn& column) {
-  constexpr std::size_t kListed = 20;
-  const auto found = std::find(names.begin(), names.end(), column.name);
-  if (found == names.end()) {
-    std::string expected = "one of ";
-    for (std::size_t i = 0; i < std::min(names.size(), kListed); ++i) {
-      expected += (i > 0 ? ", " : "") + cell::Harmless(names[i]);
-    }
-    if (names.size() > kListed) expected += ", ...";
-    const std::string remedy = OtherSeparator(names);
-    column.node.Fail("no column '" + column.name + "' in " + file, expected + remedy,
-                     remedy.empty() ? cell::Harmless(Nearest(column.name, names)) : "");
-  }
-  if (std::find(found + 1, names.end(), column.name) != names.end()) {
-    column.node.Fail(file + " has two columns '" + column.name + "'", "one");
-  }
-  column.index = static_cast<std::size_t>(found - names.begin());
-}
-
-}  // namespace csv_detail
-
 /// Reads all keys of kCsvKeys but `path`. Errors: kBadConfig.
-inline CsvLayout ReadCsvLayout(const Node& entry) {
-  CsvLayout layout;
-  for (const char* key : {"path", "time", "rate_hz", "streams", "truth", "separator", "missing",
-                          "blind_after", "blind"}) {
-    entry.Declare(key);
-  }
-  const Node streams = entry.At("streams", "csv");
-  layout.streams = csv_detail::ReadFields(streams, true);
-  if (layout.streams.empty()) streams.Fail("no streams", "a map, as in 'disparity: disparity_px'");
-  if (const auto truth = entry.Find("truth")) layout.truths = csv_detail::ReadFields(*truth, false);
-  csv_detail::ReadTime(entry, layout);
-  if (const auto separator = entry.Find("separator")) {
-    layout.separator = csv_detail::ReadSeparator(*separator);
-  }
-  if (const auto missing = entry.Find("missing")) {
-    layout.missing.clear();
-    for (const Node& word : missing->ItemsOrOne())
-      layout.missing.push_back(csv_detail::ReadMissing(word));
-  }
-  csv_detail::ReadBlind(entry, layout);
-  return layout;
-}
+CsvLayout ReadCsvLayout(const Node& entry);
 
 /// Finds the columns of the layout in the header of `file`. Errors: kBadConfig at the config's
 /// place, with the nearest name and the list of columns.
-inline void ResolveColumns(const std::vector<std::string>& names, const std::string& file,
-                           CsvLayout& layout) {
-  if (layout.time) csv_detail::Resolve(names, file, *layout.time);
-  for (std::vector<CsvField>* fields : {&layout.streams, &layout.truths}) {
-    for (CsvField& field : *fields) {
-      for (CsvColumn& column : field.columns) csv_detail::Resolve(names, file, column);
-      for (CsvColumn& column : field.known) csv_detail::Resolve(names, file, column);
-    }
-  }
-}
+void ResolveColumns(const std::vector<std::string>& names, const std::string& file,
+                    CsvLayout& layout);
 
 }  // namespace alidade

@@ -2,41 +2,21 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <array>
-#include <cmath>
-#include <numbers>
-#include <vector>
 
 #include "alidade/config/config.h"
 #include "curves.h"
-#include "points.h"
 
 /// How a camera is turned, in the forms that the config may say it.
 namespace alidade::scene {
 
 using Vector = std::array<double, 3>;
 
-inline Vector ToArray(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-inline Quaternion ToArray(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+Vector ToArray(const Eigen::Vector3d& v);
+Quaternion ToArray(const Eigen::Quaterniond& q);
 
 /// `{w: , x: , y: , z: }`, of unit length to 1e-3.
-inline Quaternion ReadQuaternion(const Node& node) {
-  Quaternion q;
-  const char* const keys[] = {"w", "x", "y", "z"};
-  double sum = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    q[i] = node.At(keys[i], "a quaternion").Number();
-    sum += q[i] * q[i];
-  }
-  node.RejectUnread();
-  if (!(std::abs(std::sqrt(sum) - 1.0) <= 1e-3)) {
-    node.Fail("not of unit length", "w^2 + x^2 + y^2 + z^2 = 1 to 1e-3");
-  }
-  Normalise<UnitQuaternion>(q.data());
-  return q;
-}
+Quaternion ReadQuaternion(const Node& node);
 
 /// The orientation of a key frame, in one of four forms:
 ///
@@ -44,70 +24,19 @@ inline Quaternion ReadQuaternion(const Node& node) {
 ///   matrix: [[,,], [,,], [,,]]    R, orthonormal to 1e-3, determinant 1; the nearest rotation
 ///   axis_angle_deg: [x, y, z, a]  turned by a about (x, y, z), of any length above 0
 ///   quaternion: {w, x, y, z}      Hamilton, unit
-inline Quaternion ReadOrientation(const Node& node) {
-  const auto [kind, what] = OneOf(node, {"euler_deg", "matrix", "axis_angle_deg", "quaternion"});
-  constexpr double kRadPerDeg = std::numbers::pi / 180.0;
-  using Eigen::AngleAxisd;
-  using Eigen::Vector3d;
-  if (kind == "quaternion") return ReadQuaternion(what);
-  if (kind == "euler_deg") {
-    const Vector3d angle = kRadPerDeg * ReadVector(what);
-    return ToArray(Eigen::Quaterniond(AngleAxisd(angle.z(), Vector3d::UnitZ()) *
-                                      AngleAxisd(angle.y(), Vector3d::UnitY()) *
-                                      AngleAxisd(angle.x(), Vector3d::UnitX())));
-  }
-  if (kind == "axis_angle_deg") {
-    const std::vector<double> v = what.Numbers(4);
-    const Vector3d axis(v[0], v[1], v[2]);
-    if (!(axis.norm() > 0.0)) what.Fail("no axis", "[x, y, z, angle], (x, y, z) not 0");
-    return ToArray(Eigen::Quaterniond(AngleAxisd(kRadPerDeg * v[3], axis.normalized())));
-  }
-  Eigen::Matrix3d rotation;
-  const std::vector<Node> rows = what.Items();
-  if (rows.size() != 3) what.Fail("not three rows", "[[a, b, c], [d, e, f], [g, h, i]]");
-  for (int i = 0; i < 3; ++i) {
-    rotation.row(i) = ReadVector(rows[static_cast<std::size_t>(i)]).transpose();
-  }
-  const double skew = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
-  if (!(skew <= 1e-3) || !(rotation.determinant() > 0.0)) {
-    what.Fail("not a rotation", "R R' = I to 1e-3, determinant 1");
-  }
-  return ToArray(Eigen::Quaterniond(rotation).normalized());
-}
+Quaternion ReadOrientation(const Node& node);
 
 /// world_from_cam of a camera at `from` that looks at `at`: z ahead, y as far down as z lets it.
 ///
 ///   z = (at - from) / |at - from|,  x = z x up / |z x up|,  y = z x x
 ///
 /// false where there is no such x.
-inline bool LookAt(const Eigen::Vector3d& from, const Eigen::Vector3d& at,
-                   const Eigen::Vector3d& up, Quaternion& orientation) {
-  constexpr double kLeast = 1e-9;
-  const Eigen::Vector3d ahead = at - from;
-  if (!(ahead.norm() > kLeast)) return false;
-  Eigen::Matrix3d rotation;
-  rotation.col(2) = ahead.normalized();
-  const Eigen::Vector3d right = rotation.col(2).cross(up.normalized());
-  if (!(right.norm() > kLeast)) return false;
-  rotation.col(0) = right.normalized();
-  rotation.col(1) = rotation.col(2).cross(rotation.col(0));
-  orientation = ToArray(Eigen::Quaterniond(rotation).normalized());
-  return true;
-}
+bool LookAt(const Eigen::Vector3d& from, const Eigen::Vector3d& at, const Eigen::Vector3d& up,
+            Quaternion& orientation);
 
 /// x with V(phi) x = y, V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2:
 /// the way y of a body that turns by phi meanwhile, in its axes at the start, as constant velocity
 /// in its own. |phi| < 2 pi.
-inline Eigen::Vector3d UndoTurn(const Eigen::Vector3d& phi, const Eigen::Vector3d& y) {
-  const double angle = phi.norm();
-  constexpr double kSeries = 1e-4;
-  const double a = angle < kSeries ? 0.5 : (1.0 - std::cos(angle)) / (angle * angle);
-  const double b =
-      angle < kSeries ? 1.0 / 6.0 : (angle - std::sin(angle)) / (angle * angle * angle);
-  Eigen::Matrix3d cross;
-  cross << 0.0, -phi.z(), phi.y(), phi.z(), 0.0, -phi.x(), -phi.y(), phi.x(), 0.0;
-  const Eigen::Matrix3d v = Eigen::Matrix3d::Identity() + a * cross + b * cross * cross;
-  return v.partialPivLu().solve(y);
-}
+Eigen::Vector3d UndoTurn(const Eigen::Vector3d& phi, const Eigen::Vector3d& y);
 
 }  // namespace alidade::scene

@@ -8,6 +8,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/model/camera.h"
+#include "alidade/model/geometry.h"
 #include "keyframes.h"
 #include "points.h"
 #include "surfaces.h"

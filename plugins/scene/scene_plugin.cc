@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene.h"
-
 #include "alidade/host/cpp_plugin.h"
+#include "scene.h"
 
 ALIDADE_SOURCE_PLUGIN({"scene", "simulator: points in space, seen by a camera that moves",
                        alidade::kSceneKeys, &alidade::CreateScene})

@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "calibration_file.h"
+#include "alidade/model/geometry.h"
 #include "feature_rows.h"
+#include "plugins/common/calibration_file.h"
 #include "plugins/common/companion_files.h"
 #include "tracks_options.h"
 
@@ -30,7 +31,7 @@ class Tracks : public Source {
   Place place() const override { return tracks_->place(); }
   std::optional<Config> Calibration() const override {
     if (!calibration_) return std::nullopt;
-    return CalibrationFile::Read(*calibration_);
+    return ReadCalibrationFile(*calibration_);
   }
 
   bool Next(SourceFrame& frame) override {

@@ -21,7 +21,7 @@ inline constexpr const char* kTracksKeys =
 /// else rate_hz gives frame k the time k / rate; and maybe `odometry.csv` (a header that
 /// names frame, vx_m_s, vy_m_s, vz_m_s, wx_rad_s, wy_rad_s, wz_rad_s) and `groundtruth.tum` or
 /// `truth.tum` (world_from_cam); and `known.csv`, rows of the same form: observations that tell
-/// depth; and `calibration.yaml`, see CalibrationFile.
+/// depth; and `calibration.yaml`, see ReadCalibrationFile().
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     a feature has all of them; the landmark is its id

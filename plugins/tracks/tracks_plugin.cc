@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tracks.h"
-
 #include "plugins/common/source_on_demand.h"
+#include "tracks.h"
 
 namespace alidade {
 namespace {

@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "alidade/base/error.h"
 #include "alidade/config/config.h"
 #include "alidade/host/source.h"
 
 namespace alidade {
 
-inline std::string SizeText(cv::Size size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height) + " px";
-}
+std::string SizeText(cv::Size size);
 
 /// The size that images must have: `camera.width` and `camera.height`, as the sensors on the
 /// source's streams read them: of their own entry, of the config, or of the calibration that comes
@@ -24,35 +20,10 @@ inline std::string SizeText(cv::Size size) {
 class CameraSize {
  public:
   CameraSize() = default;
-  CameraSize(const SourceArguments& arguments, const Source& source) {
-    if (arguments.config == nullptr) return;
-    const Config config = arguments.config->Copy();  // what is read here counts as unread there
-    const Node root = config.root();
-    const auto use = root.At("source").Find("calibration");
-    std::optional<Config> calibration;
-    if (!use || use->Text() != "ignore") calibration = source.Calibration();
-    std::vector<Node> shared{root};
-    if (calibration) shared.push_back(calibration->root().At("calibration"));
-    for (const Node& sensor : SensorsOn(source.streams(), root)) {
-      std::vector<Node> places{sensor};
-      places.insert(places.end(), shared.begin(), shared.end());
-      Read(places);
-    }
-    if (cameras_.empty()) Read(shared);
-  }
+  CameraSize(const SourceArguments& arguments, const Source& source);
 
   /// Refuses an image of another size: all its pixels would be of another camera. Errors: kBadData.
-  void Check(cv::Size found, const Place& image) const {
-    for (const Camera& camera : cameras_) {
-      if (IsOf(camera.width, found.width) && IsOf(camera.height, found.height)) continue;
-      throw Error(ExitCode::kBadData,
-                  ErrorLine(image, {},
-                            SizeText(found) + ", but the camera of " + camera.place + " is " +
-                                SideText(camera.width) + "x" + SideText(camera.height) + " px",
-                            "images of that camera, or the 'camera' of these images: its width and "
-                            "height, and fx, fy, cx, cy in their pixels"));
-    }
-  }
+  void Check(cv::Size found, const Place& image) const;
 
  private:
   struct Camera {
@@ -60,47 +31,13 @@ class CameraSize {
     std::string place;
   };
 
-  static bool IsOf(const std::optional<std::int64_t>& side, int found) {
-    return !side || *side == found;
-  }
-  static std::string SideText(const std::optional<std::int64_t>& side) {
-    return side ? std::to_string(*side) : "?";
-  }
+  static bool IsOf(const std::optional<std::int64_t>& side, int found);
+  static std::string SideText(const std::optional<std::int64_t>& side);
 
-  static std::vector<Node> SensorsOn(const std::vector<StreamInfo>& streams, const Node& root) {
-    std::vector<Node> found;
-    const auto sensors = root.Find("sensors");
-    if (!sensors || !sensors->is_map()) return found;
-    for (const auto& [name, sensor] : sensors->Entries()) {
-      const auto stream = sensor.is_map() ? sensor.Find("stream") : std::nullopt;
-      if (!stream || stream->kind() != Node::Kind::kScalar) continue;
-      if (std::ranges::find(streams, stream->Text(), &StreamInfo::name) != streams.end()) {
-        found.push_back(sensor);
-      }
-    }
-    return found;
-  }
+  static std::vector<Node> SensorsOn(const std::vector<StreamInfo>& streams, const Node& root);
 
   /// Each number of the first of the maps that has it.
-  void Read(const std::vector<Node>& maps) {
-    constexpr std::int64_t kMost = 1 << 20;
-    Camera camera;
-    const auto read = [&](const char* key, std::optional<std::int64_t>& side) {
-      for (const Node& map : maps) {
-        const auto own = map.Find("camera");
-        const auto node = own && own->is_map() ? own->Find(key) : std::nullopt;
-        if (!node) continue;
-        side = node->Integer(1, kMost);
-        const Place& place = node->place();
-        camera.place = place.file;
-        if (place.line > 0) camera.place += ":" + std::to_string(place.line);
-        return;
-      }
-    };
-    read("height", camera.height);
-    read("width", camera.width);
-    if (camera.width || camera.height) cameras_.push_back(camera);
-  }
+  void Read(const std::vector<Node>& maps);
 
   std::vector<Camera> cameras_;
 };

@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <fnmatch.h>
-
-#include <algorithm>
-#include <cstring>
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
-#include "alidade/base/error.h"
-#include "alidade/base/read_file.h"
 #include "alidade/config/config.h"
-#include "plugins/common/images/camera_size.h"
 
 namespace alidade {
 
@@ -30,41 +22,10 @@ class ImageReader {
  public:
   /// `names`: which files of a folder are images, as a shell matches names; empty: those that end
   /// like one.
-  ImageReader(std::filesystem::path path, const std::string& names, const Node& key)
-      : path_(std::move(path)) {
-    std::error_code error;
-    if (!std::filesystem::exists(path_, error)) {
-      throw Error(ExitCode::kInputMissing,
-                  ErrorLine(key.place(), key.path(), "no such file or folder: " + path_.string()));
-    }
-    if (std::filesystem::is_directory(path_, error)) {
-      List(names, key);
-      return;
-    }
-    is_live_ = std::filesystem::is_character_file(path_, error);
-    if (!is_live_ && !std::filesystem::is_regular_file(path_, error)) {
-      throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {}, "not a file",  // a pipe, say
-                                                "a video, a folder of images, or a camera"));
-    }
-    if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
-    throw Error(ExitCode::kBadData,
-                ErrorLine({path_.string()}, {},
-                          is_live_ ? "not a camera that OpenCV reads, or another program has it"
-                                   : "not a video that OpenCV reads",
-                          "a video, a folder of images, or a camera, as /dev/video0"));
-  }
+  ImageReader(std::filesystem::path path, const std::string& names, const Node& key);
 
   /// The next image; false at the end.
-  bool Next(cv::Mat& image) {
-    if (is_video() ? !ReadVideo(image) : !ReadFile(image)) return false;
-    ++number_;
-    if (size_.empty()) size_ = image.size();
-    if (image.size() != size_) {
-      Fail(SizeText(image.size()) + ", but the first image is " + SizeText(size_),
-           "images of one size");
-    }
-    return true;
-  }
+  bool Next(cv::Mat& image);
 
   bool is_video() const { return files_.empty(); }
   /// A camera: an image is taken when it is asked for, and there is no last one.
@@ -72,108 +33,29 @@ class ImageReader {
   /// Of the image that was read last, from 0.
   std::int64_t number() const { return number_; }
   /// The file of the image that was read last, or its number in the video.
-  Place place() const {
-    if (is_video()) return {path_.string() + ", image " + std::to_string(number_)};
-    return {number_ < 0 ? path_.string() : files_[static_cast<std::size_t>(number_)].string()};
-  }
+  Place place() const;
   /// Of the file of image k; empty: of a video.
-  std::string name(std::int64_t k) const {
-    return is_video() ? "" : files_[static_cast<std::size_t>(k)].filename().string();
-  }
+  std::string name(std::int64_t k) const;
   /// How many there are; of a video as it says; 0 of a camera.
-  std::int64_t size() const {
-    if (is_live_) return 0;
-    return is_video() ? static_cast<std::int64_t>(video_.get(cv::CAP_PROP_FRAME_COUNT))
-                      : std::ssize(files_);
-  }
+  std::int64_t size() const;
   /// Images a second, as a video says; 0: it does not.
   double rate_hz() const { return is_video() && !is_live_ ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
 
  private:
   /// By the name alone: an empty or broken image is an error, and not passed over.
-  static bool EndsLikeAnImage(const std::filesystem::path& file) {
-    constexpr const char* kEnds[] = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
-                                     ".pnm", ".bmp", ".tif",  ".tiff", ".webp"};
-    const std::string end = file.extension().string();
-    return std::ranges::any_of(kEnds,
-                               [&](const char* one) { return strcasecmp(end.c_str(), one) == 0; });
-  }
+  static bool EndsLikeAnImage(const std::filesystem::path& file);
 
-  void List(const std::string& names, const Node& key) {
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
-      const std::string name = entry.path().filename().string();
-      const bool is_image = names.empty() ? EndsLikeAnImage(entry.path())
-                                          : fnmatch(names.c_str(), name.c_str(), 0) == 0;
-      std::error_code ignored;
-      if (entry.is_regular_file(ignored) && is_image) files_.push_back(entry.path());
-    }
-    std::ranges::sort(files_, [](const auto& a, const auto& b) {
-      return strverscmp(a.filename().c_str(), b.filename().c_str()) < 0;
-    });
-    if (error) {
-      throw Error(ExitCode::kInputMissing,
-                  ErrorLine(key.place(), key.path(), path_.string() + ": " + error.message()));
-    }
-    if (!files_.empty()) return;
-    throw Error(ExitCode::kInputMissing,
-                ErrorLine(key.place(), key.path(),
-                          "no image in " + path_.string() +
-                              (names.empty() ? "" : " matches '" + names + "'"),
-                          "PNG, JPEG, PGM or another that OpenCV reads"));
-  }
+  void List(const std::string& names, const Node& key);
 
-  bool ReadVideo(cv::Mat& image) {
-    if (!video_.read(colour_)) return false;
-    if (colour_.channels() == 1) {
-      image = colour_;
-    } else {
-      cv::cvtColor(colour_, image, cv::COLOR_BGR2GRAY);
-    }
-    return true;
-  }
+  bool ReadVideo(cv::Mat& image);
 
-  bool ReadFile(cv::Mat& image) {
-    const auto next = static_cast<std::size_t>(number_ + 1);
-    if (next == files_.size()) return false;
-    const std::string bytes = internal::ReadFile(files_[next], [&](ExitCode code, int error) {
-      throw Error(code, ErrorLine({files_[next].string()}, {}, std::strerror(error)));
-    });
-    const bool is_cut = IsCutShort(bytes);
-    if (!bytes.empty() && !is_cut) {
-      const cv::Mat all(1, static_cast<int>(bytes.size()), CV_8UC1,
-                        const_cast<char*>(bytes.data()));
-      try {
-        image.release();  // imdecode leaves what it has where no decoder knows the file
-        cv::imdecode(all, cv::IMREAD_GRAYSCALE, &image);
-      } catch (const cv::Exception&) {  // a header that asks for more than OpenCV reads
-        image.release();
-      }
-    }
-    if (bytes.empty() || is_cut) image.release();
-    if (image.empty()) {
-      ++number_;
-      Fail(bytes.empty() ? "an empty file"
-           : is_cut      ? "the image is cut short"
-                         : "not an image that OpenCV reads",
-           "a whole image; `images` says which files are");
-    }
-    return true;
-  }
+  bool ReadFile(cv::Mat& image);
 
   /// The decoder of JPEG fills up what is not there, and says nothing; that of PNG writes a line of
   /// its own to stderr, as it does of one that is damaged otherwise.
-  static bool IsCutShort(std::string_view bytes) {
-    const auto lacks_end = [&](std::string_view end) {
-      return bytes.find(end, bytes.size() / 2) == bytes.npos;
-    };
-    if (bytes.starts_with("\x89PNG")) return lacks_end("IEND");
-    return bytes.starts_with("\xff\xd8") && lacks_end("\xff\xd9");
-  }
+  static bool IsCutShort(std::string_view bytes);
 
-  [[noreturn]] void Fail(const std::string& what, std::string_view expected) const {
-    throw Error(ExitCode::kBadData, ErrorLine(place(), {}, what, expected));
-  }
+  [[noreturn]] void Fail(const std::string& what, std::string_view expected) const;
 
   std::filesystem::path path_;
   std::vector<std::filesystem::path> files_;  ///< of a folder

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 
-#include "alidade/base/error.h"
-#include "plugins/common/companion_files.h"
+#include "alidade/base/number_rows.h"
+#include "alidade/base/timestamp.h"
+#include "alidade/config/config.h"
 #include "plugins/common/images/image_reader.h"
 
 namespace alidade {
@@ -28,14 +26,7 @@ class ImageTimes {
   /// By the clock, counted from the first image: a camera.
   ImageTimes() = default;
   explicit ImageTimes(double rate_hz) : rate_hz_(rate_hz) {}
-  ImageTimes(const std::filesystem::path& table, const Node& key) {
-    TimestampRows rows(table, key.place(), key.path());
-    table_ = rows.name();
-    std::int64_t number = 0;
-    for (Timestamp t = 0; rows.Next(number, t);) {
-      by_number_.emplace_hint(by_number_.end(), number, Row{t, rows.line()});
-    }
-  }
+  ImageTimes(const std::filesystem::path& table, const Node& key);
 
   /// The table of a folder of images where one of these has it; none where none has.
   ///
@@ -46,59 +37,15 @@ class ImageTimes {
   ///
   /// `by_layout`: any of them, else the first alone.
   static std::optional<ImageTimes> Beside(const std::filesystem::path& folder, bool by_layout,
-                                          const Node& key) {
-    std::error_code error;
-    const auto is_there = [&](const std::filesystem::path& file) {
-      return std::filesystem::is_regular_file(file, error);
-    };
-    if (is_there(folder / "timestamps.csv")) return ImageTimes(folder / "timestamps.csv", key);
-    if (!by_layout) return std::nullopt;
-    const std::filesystem::path whole = std::filesystem::weakly_canonical(folder, error);
-    const std::filesystem::path home = whole.parent_path();
-    ImageTimes times;
-    if (const auto euroc = home / "data.csv"; is_there(euroc)) {
-      times.ReadNamed(NumberRows(euroc, key.place(), key.path()), true);
-    } else if (const auto tum = home / (whole.filename().string() + ".txt"); is_there(tum)) {
-      times.ReadNamed(NumberRows(tum, key.place(), key.path(), ' '), false);
-    } else if (const auto kitti = home / "times.txt"; is_there(kitti)) {
-      times.ReadPlain(NumberRows(kitti, key.place(), key.path()));
-    } else {
-      return std::nullopt;
-    }
-    return times;
-  }
+                                          const Node& key);
 
   /// Whether each of the images of a folder from `first` on, `most` of them or all if that is 0,
   /// has a time, after that of the one before. Of a video that is seen as they come.
-  void Check(const ImageReader& images, std::int64_t first, std::int64_t most) const {
-    if (table_.empty() || images.is_video()) return;
-    const std::int64_t end = most > 0 ? std::min(images.size(), first + most) : images.size();
-    for (std::int64_t k = first; k < end; ++k) {
-      const Row& row = RowOf(k, images.name(k));
-      if (k == first || by_name_.empty()) continue;  // those by number increase
-      const Row& before = RowOf(k - 1, images.name(k - 1));
-      if (row.t > before.t) continue;
-      Fail(row.line,
-           "has a time for image " + images.name(k) + " that is not after that of " +
-               images.name(k - 1) + ", line " + std::to_string(before.line),
-           "times that increase, in the order of the names of the images");
-    }
-    End(images.size());
-  }
+  void Check(const ImageReader& images, std::int64_t first, std::int64_t most) const;
   /// Of image `number`, from 0, of that file name.
-  Timestamp At(std::int64_t number, const std::string& name) {
-    if (!table_.empty()) return RowOf(number, name).t;
-    if (rate_hz_ > 0.0) return TimestampFromSeconds(static_cast<double>(number) / rate_hz_);
-    return ByTheClock();
-  }
+  Timestamp At(std::int64_t number, const std::string& name);
   /// After the last of all images.
-  void End(std::int64_t count) const {
-    const auto surplus = by_number_.lower_bound(count);
-    if (surplus == by_number_.end()) return;
-    Fail(surplus->second.line, "has a time for image " + std::to_string(surplus->first) +
-                                   ", but there are " + std::to_string(count) +
-                                   " images, counted from 0");
-  }
+  void End(std::int64_t count) const;
 
  private:
   struct Row {
@@ -106,55 +53,13 @@ class ImageTimes {
     int line;
   };
 
-  void ReadNamed(NumberRows&& rows, bool in_ns) {
-    table_ = rows.name();
-    const char* const columns = in_ns ? "t_ns,name" : "t_s name";
-    while (rows.Next()) {
-      rows.ExpectColumns(2, columns);
-      const Timestamp t = in_ns ? rows.Index(0, "t_ns") : rows.Time(0, "t_s");
-      const std::string name = std::filesystem::path(rows.text(1)).filename().string();
-      if (!by_name_.emplace(name, Row{t, rows.line()}).second) {
-        rows.FailCell(1, "name", "is there twice", "each once");
-      }
-    }
-    if (by_name_.empty()) rows.FailLine("no rows", "a row `" + std::string(columns) + "` an image");
-  }
-  void ReadPlain(NumberRows&& rows) {
-    table_ = rows.name();
-    while (rows.Next()) {
-      rows.ExpectColumns(1, "t_s");
-      const Timestamp t = rows.Time(0, "t_s");
-      if (!by_number_.empty() && t <= by_number_.rbegin()->second.t) {
-        rows.FailCell(
-            0, "t_s",
-            "is not after that of line " + std::to_string(by_number_.rbegin()->second.line),
-            "times that increase");
-      }
-      by_number_.emplace_hint(by_number_.end(), std::ssize(by_number_), Row{t, rows.line()});
-    }
-    if (by_number_.empty()) rows.FailLine("no rows", "a row `t_s` for each image");
-  }
+  void ReadNamed(NumberRows&& rows, bool in_ns);
+  void ReadPlain(NumberRows&& rows);
 
-  const Row& RowOf(std::int64_t number, const std::string& name) const {
-    if (!by_name_.empty()) {
-      const auto found = by_name_.find(name);
-      if (found == by_name_.end()) Fail(0, "has no time for image " + name);
-      return found->second;
-    }
-    const auto found = by_number_.lower_bound(number);
-    if (found != by_number_.end() && found->first == number) return found->second;
-    const auto near = found == by_number_.end() ? std::prev(found) : found;
-    Fail(near->second.line, "has no time for image " + std::to_string(number));
-  }
-  Timestamp ByTheClock() {
-    const auto now = std::chrono::steady_clock::now();
-    if (!first_) first_ = now;
-    return std::chrono::nanoseconds(now - *first_).count();
-  }
+  const Row& RowOf(std::int64_t number, const std::string& name) const;
+  Timestamp ByTheClock();
   [[noreturn]] void Fail(int line, const std::string& what,
-                         const char* expected = "a time for each image") const {
-    throw Error(ExitCode::kBadData, ErrorLine({table_, line}, {}, what, expected));
-  }
+                         const char* expected = "a time for each image") const;
 
   double rate_hz_ = 0.0;
   std::string table_;  ///< file of the times below; empty: there is none

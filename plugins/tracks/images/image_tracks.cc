@@ -10,13 +10,13 @@
 
 #include "alidade/base/number_rows.h"
 #include "feature_tracker.h"
+#include "plugins/common/calibration_file.h"
 #include "plugins/common/companion_files.h"
 #include "plugins/common/images/camera_size.h"
 #include "plugins/common/images/grey_image.h"
 #include "plugins/common/images/image_reader.h"
 #include "plugins/common/images/image_times.h"
 #include "plugins/common/images/start_frame.h"
-#include "plugins/tracks/calibration_file.h"
 
 namespace alidade {
 namespace {
@@ -75,7 +75,7 @@ class ImageTracks : public Source {
   SeenImage Seen() const override { return {ToGreyImage(image_)}; }
   std::optional<Config> Calibration() const override {
     if (!calibration_) return std::nullopt;
-    return CalibrationFile::Read(*calibration_);
+    return ReadCalibrationFile(*calibration_);
   }
 
   std::string guided_by() const override { return guided_by_; }

@@ -12,8 +12,8 @@ namespace alidade {
 /// Beside the images, in their folder or that of the video, may be `timestamps.csv` (`frame,t_s`,
 /// frames counted from 0), or a table that ImageTimes::Beside knows, or else rate_hz gives image k
 /// the time k / rate; `groundtruth.tum` or `truth.tum` (world_from_cam), or the `groundtruth.txt`
-/// of TUM; and `calibration.yaml`, or the `sensor.yaml` of EuRoC, see CalibrationFile. Images of a
-/// camera have the times at which they came, from 0.
+/// of TUM; and `calibration.yaml`, or the `sensor.yaml` of EuRoC, see
+/// ReadCalibrationFile(). Images of a camera have the times at which they came, from 0.
 ///
 ///   stream   size  values       when
 ///   tracks   2     u, v         a feature is followed; the landmark is its id

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "motion_models/odometry_pose.h"
+#include "plugins/scene/curves.h"
 #include "scene_fixture.h"
 
 namespace alidade::testing {

@@ -1,57 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
+#include "plugins/common/calibration_file.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "alidade/base/error.h"
 #include "alidade/base/read_file.h"
-#include "alidade/config/config.h"
 
 namespace alidade {
+namespace {
 
-/// The `calibration.yaml` next to tracks or images, under the keys by which models ask. It has one
-/// of these forms:
-///
-///   written as                                        key
-///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it
-///
-///   image: {width, height}                            camera.width, camera.height
-///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx and so on, of a pinhole
-///   baseline_m                                        camera.baseline_m, of a rectified pair
-///   vehicle_from_cam: {position_m, quaternion}        vehicle_from_cam.position, .orientation
-///
-///   camera_matrix, distortion_coefficients: {data}, image_width, image_height, [distortion_model:
-///   plumb_bob, rational_polynomial or equidistant]           of OpenCV and ROS
-///
-///   cam0: {camera_model: pinhole, intrinsics, distortion_model: radtan or equidistant,
-///   distortion_coeffs, resolution}                           of Kalibr
-///
-///   camera_model: pinhole, intrinsics, distortion_model: radial-tangential or equidistant,
-///   distortion_coefficients, resolution                      of a sensor of EuRoC
-///
-/// Of the last three what is not of the camera itself is left out, and so is `sigma_px`, for
-/// `alidade bundle`.
-///
-/// Errors       kBadData with file, line and column; kInputMissing.
 class CalibrationFile {
  public:
-  static Config Read(const std::filesystem::path& file) {
-    try {
-      return CalibrationFile(file).to_;
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::kBadConfig) throw;
-      throw Error(ExitCode::kBadData,
-                  std::string(error.what()) + "; 'source.calibration: ignore' does without it");
-    }
-  }
-
- private:
+ public:
   explicit CalibrationFile(const std::filesystem::path& file)
       : from_(Config::FromText(PlainYaml(file), file.string())),
         to_(Config::FromText("calibration: {}", file.string())) {
@@ -68,6 +35,9 @@ class CalibrationFile {
     }
   }
 
+  Config calibration() && { return std::move(to_); }
+
+ private:
   void ReadOwn(const Node& root) {
     if (const auto camera = root.Find("camera")) {
       for (const auto& [key, value] : camera->Entries()) Copy(value, "camera." + key);
@@ -187,5 +157,17 @@ class CalibrationFile {
 
   Config from_, to_;
 };
+
+}  // namespace
+
+Config ReadCalibrationFile(const std::filesystem::path& file) {
+  try {
+    return CalibrationFile(file).calibration();
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kBadConfig) throw;
+    throw Error(ExitCode::kBadData,
+                std::string(error.what()) + "; 'source.calibration: ignore' does without it");
+  }
+}
 
 }  // namespace alidade

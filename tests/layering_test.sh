@@ -15,7 +15,7 @@
 #   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
 #             their own stem
 #   plugin    nothing includes from plugins/, but a plugin from its own folder, tests/plugins and
-#             tests/fuzz, which test the class behind the export; bench includes the costs of
+#             tests/fuzz, which test the library behind the export; bench includes the costs of
 #             plugins/ceres
 #   upward    what lies below does not include cli, bench, tests or examples
 #   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools alone;

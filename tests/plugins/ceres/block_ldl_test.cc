@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/ceres/batch/block_ldl.cc"
+#include "plugins/ceres/batch/block_ldl.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "alidade/base/random.h"
-#include "plugins/ceres/batch/elimination.cc"
+#include "plugins/ceres/batch/elimination.h"
 
 namespace alidade::ceres_batch {
 namespace {

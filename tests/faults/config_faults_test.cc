@@ -1,54 +1,409 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every file of tests/faults/run is a config with one fault; its first lines say what must come of
-// it: the exit code, the line named in the message (0: none), and words of the message.
+// Configs with one fault each: a base config of tests/faults/configs with a line or two changed,
+// and the exit code, the line and the words of the message that must come of it.
 #include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "support/program.h"
 
 namespace alidade::testing {
 namespace {
 
-const fs::path kFolder = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/run";
+using namespace std::string_literals;  // NOLINT(google-build-using-namespace): for a NUL in a text
 
-std::vector<std::string> ConfigsWithAFault() {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(kFolder)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem());
+const fs::path kBases = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/configs";
+
+/// Text of the base, there once, and the text in its stead.
+struct Change {
+  std::string from, to;
+};
+
+/// Inserts lines behind the one that ends with `text`.
+Change After(const std::string& text, const std::string& lines) {
+  return {text, text + '\n' + lines};
+}
+
+struct Fault {
+  std::string name;  ///< begins with the number in the table of README.md, if it has one
+  std::string base;  ///< empty: an empty text
+  std::vector<Change> changes;
+  int line = 0;  ///< 0: the message names the file alone
+  std::string words;
+  int code = 78;
+};
+
+Fault MakeFault(std::string name, std::string base, std::vector<Change> changes, int line,
+                std::string words, int code = 78) {
+  return {std::move(name), std::move(base), std::move(changes), line, std::move(words), code};
+}
+
+void PrintTo(const Fault& fault, std::ostream* stream) { *stream << fault.name; }
+
+// What of depth.yaml is changed often.
+const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, seed: 1}",
+                  kStereoRoles = "{depth: target.depth}", kStereoSigma = "    sigma_px: 1.0",
+                  kTemplateBlock = "template.inverse_distance",
+                  kTemplateBlocks = "{value: inverse_distance}",
+                  kPrior = "prior: {inverse_distance: 0.5, sigma: 0.25}";
+/// A table in place of the simulated target.
+std::string Rows(const std::string& keys) {
+  return "{type: csv, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
+}
+
+const Fault kTextFaults[] = {
+    MakeFault("01_duplicate_key", "depth", {After("focal_px: 400", "    focal_px: 401")}, 20,
+              "focal_px: duplicate key; first at line 19"),
+    MakeFault("04_trailing_text", "depth", {{"400", "3.8x"}}, 19, "'3.8x'"),
+    MakeFault("05_not_a_number", "depth", {{"400", ".nan"}}, 19, "finite"),
+    MakeFault("06_underflow", "depth", {{"sigma_px: 1.0", "sigma_px: 1e-400"}}, 21, "1e-400"),
+    MakeFault("07_leading_zeros", "depth", {{"400", "0400"}}, 19, "leading zero"),
+    MakeFault("08_yes_for_a_flag", "depth",
+              {{kDepthSource,
+                "{type: csv, path: rows.csv,\n  streams: {disparity: d,\n    inverse_scale: "
+                "{columns: [s], reciprocal: yes}}}"}},
+              30, "true or false"),
+    MakeFault("12_alias_bomb", "depth",
+              {After("alidade: 1",
+                     "a: &a [0, 0, 0, 0, 0, 0, 0, 0, 0]\n"
+                     "b: &b [*a, *a, *a, *a, *a, *a, *a, *a, *a]\n"
+                     "c: &c [*b, *b, *b, *b, *b, *b, *b, *b, *b]\n"
+                     "d: &d [*c, *c, *c, *c, *c, *c, *c, *c, *c]\n"
+                     "e: &e [*d, *d, *d, *d, *d, *d, *d, *d, *d]\n"
+                     "f: &f [*e, *e, *e, *e, *e, *e, *e, *e, *e]")},
+              7, "100000"),
+    MakeFault("13_self_reference", "depth", {After("alidade: 1", "title: &x [*x]")}, 2,
+              "refers to itself"),
+    MakeFault("14_nesting", "depth",
+              {After("alidade: 1", "title: " + std::string(80, '[') + std::string(80, ']'))}, 2,
+              "64"),
+    MakeFault("16_tab", "depth", {{"    focal_px", "\tfocal_px"}}, 19, "tab"),
+    MakeFault("17_invalid_utf8", "depth", {After("alidade: 1", "title: caf\xE9")}, 2,
+              "invalid UTF-8; expected UTF-8 text"),
+    MakeFault("17_nul", "depth", {After("alidade: 1", "title: a\0b"s)}, 2,
+              "NUL byte; expected text"),
+    MakeFault("19_merge_key", "depth", {{"focal_px: 400", "<<: {focal_px: 400}"}}, 19, "<<"),
+    MakeFault("20_second_document", "depth", {After(kDepthSource, "---")}, 29, "document"),
+    MakeFault("21_empty", "", {}, 0, "empty"),
+    MakeFault("23_include_outside", "depth", {After("alidade: 1", "include: ../config/base.yaml")},
+              2, "..", 77),
+    MakeFault(
+        "24_shell_text", "depth",
+        {{kDepthSource,
+          "{type: csv, path: \"$(touch hacked)\", streams: {disparity: d, inverse_scale: s}}"}},
+        28, "$(touch hacked)", 66),
+    MakeFault("26_newer_schema", "depth", {{"alidade: 1", "alidade: 2"}}, 1, "newest"),
+};
+
+const Fault kKeyFaults[] = {
+    MakeFault("02_output_is_a_map", "depth", {{"alidade", "output: {a: b}\nalidade"}}, 1,
+              "output: "),
+    MakeFault("02_override_of_no_entry", "depth",
+              {{kEkf, "{type: ekf,\n    overrides: {sensors: {stero: {sigma_px: 2}}}}"}}, 31,
+              "estimators.ekf.overrides.sensors.stero: no entry 'stero' in 'sensors' to override; "
+              "expected one of stereo, scale, or a new entry with a model; did you mean 'stereo'?"),
+    MakeFault("02_title_is_a_list", "depth", {{"alidade", "title: [a, b]\nalidade"}}, 1, "title: "),
+    MakeFault("02_truth_of_no_block", "depth",
+              {{kDepthSource, Rows("truth: {depth_rate: s,\n  detph: d}")}}, 29,
+              "source.truth.detph: truth of no block: no block has this name; expected the name "
+              "and size of one block, as in ENTRY.BLOCK; did you mean 'depth'?"),
+    MakeFault("02_truth_sigma_of_no_truth", "depth",
+              {After(kEkf, "evaluate: {truth_sigma: {dept: 0.01}}")}, 31,
+              "evaluate.truth_sigma.dept: no truth 'dept'; expected a truth of the source: depth, "
+              "depth_rate, inverse_distance; did you mean 'depth'?"),
+    MakeFault("02_unknown_key_at_the_root", "depth", {{"source:", "estimator: {}\nsource:"}}, 28,
+              "estimators"),
+    MakeFault("02_unknown_key_of_a_model", "depth", {After(kStereoSigma, "    focal_pix: 3")}, 22,
+              "did you mean 'focal_px'"),
+    MakeFault("02_unknown_key_of_a_nested_map", "depth",
+              {{"acceleration: 1.0", "acceleration: 1.0, acelleration: 2.0"}}, 6,
+              "state.target.noise.acelleration: unknown key"),
+    MakeFault("02_unknown_loss", "depth", {After(kStereoSigma, "    loss: {hubert: 1.345}")}, 22,
+              "did you mean 'huber'"),
+    MakeFault("03_missing_key", "depth", {{"    focal_px: 400\n", ""}}, 15, "stereo_disparity"),
+    MakeFault(
+        "03_missing_nested_key_with_a_like_one", "depth", {{"noise", "niose"}}, 3,
+        "state.target.noise.acceleration: missing; model 'constant_velocity' needs it (m/s^1.5, >= "
+        "0: random acceleration, root of its spectral density); found 'niose' at line 6"),
+    MakeFault("09_wrong_unit", "depth", {{"baseline_m: 0.065", "baseline_mm: 65"}}, 20,
+              "baseline_m"),
+    MakeFault("10_loss_scale_zero", "depth", {After(kStereoSigma, "    loss: {huber: 0}")}, 22,
+              "sensors.stereo.loss.huber: '0' is out of range; expected a number > 0"),
+    MakeFault("10_negative_sigma", "depth", {{"sigma_px: 1.0", "sigma_px: -1"}}, 21, "> 0"),
+    MakeFault("10_out_of_range_in_overrides", "depth",
+              {{kEkf, "{type: ekf,\n    overrides: {sensors: {stereo: {sigma_px: -1}}}}"}}, 31,
+              "estimators.ekf.overrides.sensors.stereo.sigma_px: '-1' is out of range"),
+    MakeFault("10_two_losses", "depth", {After(kStereoSigma, "    loss: {huber: 1, cauchy: 2}")},
+              22, "one of {huber: SCALE}, {cauchy: SCALE}"),
+    MakeFault("11_wrong_length", "depth", {{"mean: 0.3", "mean: [0.3, 1]"}}, 8, "1"),
+    MakeFault("36_rollback_without_a_window", "depth",
+              {After(kEkf, "out_of_sequence: {policy: rollback}")}, 31,
+              "out_of_sequence.policy: 'rollback' without 'window_s'"),
+    MakeFault("50_missing_plugin", "depth", {{"stereo_disparity", "stereo_disparty"}}, 16,
+              "stereo_disparity", 69),
+    MakeFault("74_covariance_not_psd", "depth",
+              {{"mean: 3.3, sigma: 0.5", "mean: 3.3, covariance: [[-1]]"}}, 13, "-1"),
+};
+
+const Fault kBlockFaults[] = {
+    MakeFault(
+        "25_constant_and_consider", "depth",
+        {{"    noise:", "    consider: [depth_rate]\n    constant: [depth_rate]\n    noise:"}}, 7,
+        "constant: block 'depth_rate' is in `consider` too; expected a block in one of them"),
+    MakeFault("25_cyclic_start", "depth",
+              {{"{mean: 0.3, sigma: 0.1}", "{from_measurement: a_by_b}"},
+               {"{mean: 3.3, sigma: 0.5}", "{from_measurement: b_by_a}"},
+               {"source:",
+                "  a_by_b: {model: ratio, stream: disparity, roles: {numerator: target.depth, "
+                "denominator: template.inverse_distance}}\n"
+                "  b_by_a: {model: ratio, stream: disparity, roles: {denominator: target.depth, "
+                "numerator: template.inverse_distance}}\n"
+                "source:"}},
+              8, "cyclic"),
+    MakeFault("25_name_of_a_block", "depth", {{"position: depth", "position: \"depth,m\""}}, 5,
+              "state.target.blocks.position: 'depth,m' cannot name a block; expected letters, "
+              "digits, _ and -"),
+    MakeFault("25_name_of_a_block_with_a_line_end", "depth",
+              {{"velocity: depth_rate", R"(velocity: "depth\nrate")"}}, 5,
+              R"('depth\nrate' cannot name a block)"),
+    MakeFault("25_name_of_a_segment", "depth",
+              {After(kEkf, "evaluate: {segments: {\"a@b\": {with: stereo}}}")}, 31,
+              "evaluate.segments.a@b: 'a@b' cannot name a segment"),
+    MakeFault("25_name_of_a_sensor", "depth", {{"  stereo:", "  \"stereo:left\":"}}, 15,
+              "sensors.stereo:left: 'stereo:left' cannot name a sensor"),
+    MakeFault("25_name_of_a_state_entry", "depth", {{"  target:", "  the target:"}}, 4,
+              "state.the target: 'the target' cannot name a state entry"),
+    MakeFault("25_one_block_in_two_roles", "depth", {{kTemplateBlock, "target.depth"}}, 25,
+              "another role"),
+    MakeFault("25_one_name_for_two_blocks", "depth", {{"velocity: depth_rate", "velocity: depth"}},
+              5, "depth"),
+    MakeFault("25_truth_given_twice", "depth",
+              {{kDepthSource, Rows("truth: {target.depth: d,\n  depth: d}")}}, 29,
+              "source.truth.depth: truth of no block: target.depth has a truth of its full name"),
+    MakeFault("25_truth_of_two_blocks", "depth",
+              {{kTemplateBlocks, "{value: depth}"},
+               {"{inverse_distance: {mean", "{depth: {mean"},
+               {kTemplateBlock, "template.depth"},
+               {kDepthSource, Rows("truth: {depth_rate: s,\n  depth: d}")}},
+              29,
+              "source.truth.depth: truth of no block: it may be of target.depth or template.depth"),
+    MakeFault("44_geometry_of_a_role", "depth",
+              {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
+              "block 'template.inverse_distance' is of geometry vector(2); expected vector(1), as "
+              "role 'inverse_distance' of model 'scale_2d'"),
+    MakeFault("44_truth_of_another_size", "depth",
+              {{kDepthSource, Rows("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
+              "source.truth.target.depth: truth of no block: target.depth has size 1, not 2"),
+};
+
+const Fault kEstimatorFaults[] = {
+    MakeFault("02_iterations_of_an_ekf", "depth", {{kEkf, "{type: ekf, max_iterations: 5}"}}, 30,
+              "unknown key"),
+    MakeFault("02_reference_of_no_estimator", "depth",
+              {After(kEkf, "  batch: {type: rts}\nreference: btach")}, 32,
+              "reference: no estimator 'btach'; expected truth, or an estimator: ekf, batch; did "
+              "you mean 'batch'?"),
+    MakeFault("02_unknown_key_of_an_estimator", "depth", {{kEkf, "{type: ekf, gaet: 1}"}}, 30,
+              "did you mean 'gate'"),
+    MakeFault(
+        "02_use_of_no_choice", "depth", {After(kEkf, "  other: {type: ekf, use: some}")}, 31,
+        "estimators.other.use: not a choice of data: 'some'; expected all, or {accepted_by: NAME}"),
+    MakeFault("02_use_of_no_estimator", "depth",
+              {After(kEkf, "  other: {type: ekf, use: {accepted_by: efk}}")}, 31,
+              "estimators.other.use.accepted_by: no estimator 'efk'; expected a name from "
+              "`estimators`; did you mean 'ekf'?"),
+    MakeFault("10_estimator_name_taken", "depth", {{"ekf: {type: ekf}", "figures: {type: ekf}"}},
+              30,
+              "estimators.figures: 'figures' cannot name an estimator: the run folder has one of "
+              "that name"),
+    MakeFault("10_gate_one", "depth", {{kEkf, "{type: ekf, gate: 1, fuse: joint}"}}, 30,
+              "estimators.ekf.gate: '1' is out of range; expected a number in (0, 1), or none"),
+    MakeFault("10_gate_zero", "depth", {{kEkf, "{type: ekf, gate: 0, fuse: joint}"}}, 30,
+              "expected a number in (0, 1), or none"),
+    MakeFault("10_max_dt_zero", "depth", {{kEkf, "{type: ekf, max_dt_s: 0}"}}, 30, "max_dt_s"),
+    MakeFault("10_one_iteration", "depth", {{kEkf, "{type: iekf, max_iterations: 1}"}}, 30,
+              "max_iterations: '1' is out of range; expected an integer in [2, 1000]"),
+    MakeFault("25_use_of_a_smoother", "depth",
+              {{"ekf: {type: ekf}",
+                "smoother: {type: rts}\n  ekf: {type: ekf, use: {accepted_by: smoother}}"}},
+              31,
+              "estimators.ekf.use.accepted_by: 'smoother' has its estimates at the end only; "
+              "expected a filter"),
+    MakeFault(
+        "25_use_of_itself", "depth", {{kEkf, "{type: ekf, use: {accepted_by: ekf}}"}}, 30,
+        "estimators.ekf.use.accepted_by: 'ekf' is this estimator itself; expected another one"),
+    MakeFault("25_use_of_one_listed_after", "depth",
+              {After("estimators:", "  first: {type: ekf, use: {accepted_by: ekf}}")}, 30,
+              "estimators.first.use.accepted_by: 'ekf' is listed after 'first'; expected an "
+              "estimator listed before"),
+    MakeFault(
+        "25_use_without_the_sensor", "depth",
+        {{"ekf: {type: ekf}",
+          "alone: {type: ekf, sensors: [stereo]}\n  ekf: {type: ekf, use: {accepted_by: alone}}"}},
+        31,
+        "estimators.ekf.use.accepted_by: 'alone' does not use sensor 'scale' on stream "
+        "'inverse_scale'; expected an estimator with the same sensors"),
+    MakeFault("key_of_another_estimator", "depth", {{kEkf, "{type: rts, alpha: 0.1}"}}, 30,
+              "estimators.ekf.alpha: unknown key; expected one of fuse, gate, max_dt_s, "
+              "on_divergence, on_plugin_failure, overrides, sensors"),
+    MakeFault("unsupported_compressed_covariance", "depth",
+              {{kEkf, "{type: iekf, covariance: auto}"}}, 30,
+              "estimator type 'iekf' has no choice of covariance"),
+    MakeFault("unsupported_consider_block", "depth",
+              {After(kTemplateBlocks, "    consider: [inverse_distance]"), {kEkf, "{type: rts}"}},
+              13,
+              "state.template.consider[0]: estimator type 'rts' does not support consider blocks"),
+    MakeFault("unsupported_consider_block_of_an_iekf", "depth",
+              {After(kTemplateBlocks, "    consider: [inverse_distance]"), {kEkf, "{type: iekf}"}},
+              13, "estimator type 'iekf' does not support consider blocks"),
+    MakeFault("unsupported_consider_role", "depth",
+              {{kTemplateBlock, "{block: template.inverse_distance, mode: consider}"},
+               {kEkf, "{type: ukf}"}},
+              25,
+              "sensors.scale.roles.inverse_distance.mode: estimator type 'ukf' does not support "
+              "consider roles"),
+    MakeFault("unsupported_consider_role_of_an_iekf", "depth",
+              {{kTemplateBlock, "{block: template.inverse_distance, mode: consider}"},
+               {kEkf, "{type: iekf}"}},
+              25, "estimator type 'iekf' does not support consider roles"),
+    MakeFault("unsupported_first_estimate", "depth",
+              {{kEkf, "{type: iekf, jacobian: first_estimate}"}}, 30,
+              "estimator type 'iekf' has no choice of Jacobian"),
+    MakeFault("unsupported_jacobian_at", "depth",
+              {{kStereoRoles, "{depth: {block: target.depth, jacobian_at: measurement}}"},
+               {kEkf, "{type: square_root_ekf}"}},
+              18,
+              "sensors.stereo.roles.depth.jacobian_at: estimator type 'square_root_ekf' does not "
+              "support jacobian_at: measurement"),
+    MakeFault("unsupported_jacobian_at_of_an_iekf", "depth",
+              {{kStereoRoles, "{depth: {block: target.depth, jacobian_at: measurement}}"},
+               {kEkf, "{type: iekf}"}},
+              18, "estimator type 'iekf' does not support jacobian_at: measurement"),
+    MakeFault("unsupported_landmarks_rts", "landmarks", {{kEkf, "{type: rts}"}}, 10,
+              "estimator type 'rts' does not support landmarks"),
+    MakeFault("unsupported_landmarks_square_root_ekf", "landmarks",
+              {{kEkf, "{type: square_root_ekf}"}}, 10,
+              "estimator type 'square_root_ekf' does not support landmarks"),
+    MakeFault("unsupported_landmarks_ukf", "landmarks", {{kEkf, "{type: ukf}"}}, 10,
+              "estimator type 'ukf' does not support landmarks"),
+    MakeFault("unsupported_rejection_recovery", "depth",
+              {{kEkf, "{type: ukf, rejection_recovery: {action: none}}"}}, 30,
+              "estimators.ekf.rejection_recovery: estimator type 'ukf' has no rejection recovery"),
+    MakeFault("unsupported_start_from_a_measurement", "depth",
+              {{"{mean: 0.3, sigma: 0.1}", "{from_measurement: stereo}"}, {kEkf, "{type: rts}"}}, 8,
+              "state.target.initial.depth.from_measurement: estimator type 'rts' does not support "
+              "blocks that start from a measurement"),
+};
+
+const Fault kLandmarkFaults[] = {
+    MakeFault("camera_key_missing", "landmarks", {{"focal_px", "focal"}}, 2, "camera.focal_px"),
+    MakeFault("landmarks_attempts_without_a_ratio", "landmarks",
+              {After(kPrior, "  prune: {min_attempts: 30}")}, 11,
+              "landmarks.prune.min_attempts: without a use"),
+    MakeFault("landmarks_compressed_and_anchored", "pose",
+              {{"representation: inverse_depth", "representation: anchored"},
+               {kEkf, "{type: ekf, covariance: compressed}"}},
+              26,
+              "those of `landmarks.representation: anchored` have the role 'direction', of "
+              "geometry unit_vector, where many small corrections are not one; those of "
+              "`inverse_depth` can; expected full or auto"),
+    MakeFault(
+        "landmarks_compressed_and_deleted_by_depth", "pose",
+        {After(kPrior, "  negative_depth: delete"), {kEkf, "{type: ekf, covariance: compressed}"}},
+        27,
+        "estimators.ekf.covariance: landmarks cannot be postponed: `negative_depth: delete` asks"),
+    MakeFault("landmarks_known_position_of_two", "landmarks",
+              {After(kPrior, "  known:\n    - {id: 3, position: [0, 1], sigma: 0}")}, 12,
+              "landmarks.known[0].position"),
+    MakeFault("landmarks_known_twice", "landmarks",
+              {After(kPrior,
+                     "  known:\n    - {id: 3, position: [0, 0, 1], sigma: 0}\n    - {id: 3, "
+                     "position: [0, 1, 1], sigma: 0}")},
+              13, "landmarks.known[1].id: landmark 3 is listed twice"),
+    MakeFault("landmarks_max_per_frame_unknown", "landmarks",
+              {After(kPrior, "  max_per_frame: all")}, 11,
+              "landmarks.max_per_frame: 'all' is not a finite number; expected an integer in [1, "
+              "1000000], or unlimited"),
+    MakeFault("landmarks_missing", "landmarks", {{"landmarks:\n  " + kPrior + '\n', ""}}, 0,
+              "landmarks: missing key"),
+    MakeFault("landmarks_name_of_a_state_entry", "landmarks",
+              {{"  cam:", "  landmarks:"}, {"cam.position", "landmarks.position"}}, 5,
+              "'landmarks' is not a state entry"),
+    MakeFault("landmarks_negative_sigma", "landmarks", {{"0.25", "-0.25"}}, 10,
+              "landmarks.prior.sigma"),
+    MakeFault("landmarks_outlier_rejection_unknown", "landmarks",
+              {After("sigma_px: 1.0", "    outlier_rejection: {method: two_point_ransac}")}, 17,
+              "sensors.pixels.outlier_rejection.method"),
+    MakeFault(
+        "landmarks_prior_missing", "landmarks", {{kPrior, "max_per_frame: 30"}}, 10,
+        "landmarks: no prior: model 'pixels' of sensor 'pixels' does not determine the distance"),
+    MakeFault(
+        "landmarks_ransac_of_one", "pose",
+        {After("sigma_px: 1.0", "    outlier_rejection: {method: one_point_ransac}"),
+         {kEkf, "{type: ekf, fuse: per_measurement}"}},
+        27, "estimators.ekf.fuse: one match has no others to agree with, as sensor 'pixels' asks"),
+    MakeFault("landmarks_representation_unknown", "landmarks",
+              {After(kPrior, "  representation: polar")}, 11, "landmarks.representation"),
+    MakeFault("landmarks_role_of_a_block", "landmarks",
+              {{"landmark: landmarks", "landmark: cam.position"}}, 15,
+              "sensors.pixels.roles.landmark: not the landmarks"),
+    MakeFault("landmarks_that_cannot_begin", "landmarks", {{kPrior, "representation: xyz"}}, 10,
+              "landmarks: no sensor determines where a landmark is when it is first seen"),
+    MakeFault("landmarks_unknown_key", "landmarks", {After(kPrior, "  max_per_fram: 30")}, 11,
+              "did you mean 'max_per_frame'?"),
+    MakeFault("landmarks_unknown_key_of_prune", "landmarks",
+              {After(kPrior, "  prune: {max_missed: 30}")}, 11,
+              "landmarks.prune.max_missed: unknown key"),
+    MakeFault("landmarks_without_a_sensor", "depth",
+              {{"sensors:", "landmarks:\n  " + kPrior + "\nsensors:"}}, 15,
+              "landmarks: no sensor measures landmarks"),
+    MakeFault("landmarks_xyz_at_infinity", "pose",
+              {{"representation: inverse_depth", "representation: xyz"},
+               {"inverse_distance: 0.5", "inverse_distance: 0"}},
+              14,
+              "landmarks.prior.inverse_distance: a landmark at infinity cannot be xyz; expected "
+              "above 0, 1/m"),
+    MakeFault(
+        "landmarks_xyz_to_xyz", "landmarks",
+        {After(kPrior, "  representation: xyz\n  convert_to_xyz: {max_linearity_index: 0.1}")}, 12,
+        "landmarks.convert_to_xyz: landmarks are xyz already"),
+};
+
+class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<Fault> {
+ protected:
+  /// The base with the changes.
+  static std::string Text(const Fault& fault) {
+    std::string text = fault.base.empty() ? "" : ReadText(kBases / (fault.base + ".yaml"));
+    for (const auto& [from, to] : fault.changes) {
+      const std::size_t place = text.find(from);
+      EXPECT_NE(place, std::string::npos) << from;
+      EXPECT_EQ(text.rfind(from), place) << from;
+      if (place != std::string::npos) text.replace(place, from.size(), to);
+    }
+    return text;
   }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-/// What stands after `key` in the first lines of the file.
-std::string Expected(const std::string& text, const std::string& key) {
-  const std::size_t at = text.find("# " + key + ": ");
-  EXPECT_NE(at, std::string::npos) << key;
-  const std::size_t start = at + key.size() + 4;
-  return text.substr(start, text.find('\n', start) - start);
-}
-
-class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<std::string> {};
+};
 
 TEST_P(ConfigFault, GetsItsCodePlaceAndWords) {
-  const fs::path file = kFolder / (GetParam() + ".yaml");
-  const std::string text = ReadText(file);
+  const Fault& fault = GetParam();
+  Write("fault.yaml", Text(fault));
+  Write("rows.csv", "t_s,d,s\n0,80,1\n");
   const std::string plugins = ALIDADE_BINARY_DIR "/tests/faults";
-  const Outcome outcome = Call({"run", file.string(), "-o", "out", "--plugin-path", plugins});
-  EXPECT_EQ("exit " + std::to_string(outcome.code), Expected(text, "fault")) << outcome.err;
-  EXPECT_EQ(outcome.err.rfind("error: ", 0), 0u) << outcome.err;
-  const std::string line = Expected(text, "line");
-  const std::string place = file.string() + ":" + (line == "0" ? "" : line + ":");
-  EXPECT_NE(outcome.err.find(place), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find(Expected(text, "text")), std::string::npos) << outcome.err;
+  const Outcome outcome = Call({"run", "fault.yaml", "-o", "out", "--plugin-path", plugins});
+  EXPECT_EQ(outcome.code, fault.code) << outcome.err;
+  const std::string line = fault.line == 0 ? "" : std::to_string(fault.line) + ':';
+  EXPECT_TRUE(outcome.err.starts_with("error: fault.yaml:" + line)) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, fault.words)) << outcome.err;
   EXPECT_TRUE(outcome.out.empty());
   EXPECT_FALSE(Exists("hacked"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Files, ConfigFault, ::testing::ValuesIn(ConfigsWithAFault()),
-                         [](const auto& file) { return "_" + file.param; });
+std::string Name(const ::testing::TestParamInfo<Fault>& fault) { return "_" + fault.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(Text, ConfigFault, ::testing::ValuesIn(kTextFaults), Name);
+INSTANTIATE_TEST_SUITE_P(Keys, ConfigFault, ::testing::ValuesIn(kKeyFaults), Name);
+INSTANTIATE_TEST_SUITE_P(Blocks, ConfigFault, ::testing::ValuesIn(kBlockFaults), Name);
+INSTANTIATE_TEST_SUITE_P(Estimators, ConfigFault, ::testing::ValuesIn(kEstimatorFaults), Name);
+INSTANTIATE_TEST_SUITE_P(Landmarks, ConfigFault, ::testing::ValuesIn(kLandmarkFaults), Name);
 
 class ConfigText : public ProgramTest {
  protected:

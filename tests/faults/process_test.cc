@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several runs, and plugins, in one process. The number of each fault is in the comment above its
-// test.
+// Several runs, and plugins, in one process.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <optional>
 
 #include "alidade/run/run.h"
@@ -59,7 +57,7 @@ TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
   EXPECT_EQ(Finish(waiting), expected);
 }
 
-// FAULTS 71: models, sources and estimators outlive the host that made them, in any order.
+// Models, sources and estimators outlive the host that made them, in any order.
 TEST(OneProcess, WhatAHostMadeOutlivesIt) {
   std::optional<PluginHost> host(std::in_place, std::vector<std::filesystem::path>{});
   Experiment kept = Build(*host);
@@ -75,33 +73,6 @@ TEST(OneProcess, WhatAHostMadeOutlivesIt) {
   EXPECT_EQ(sensor.Predict(&role, &disparity), Status::kOk);
   EXPECT_DOUBLE_EQ(disparity, 52.0);
   EXPECT_FALSE(Finish(kept).metrics.empty());
-}
-
-using OneProcessDeathTest = ::testing::Test;
-
-// FAULTS 71: the program ends while experiments, hosts and models are alive.
-TEST(OneProcessDeathTest, ExitsWithLiveObjects) {
-  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
-  EXPECT_EXIT(
-      {
-        static const PluginHost host(std::vector<std::filesystem::path>{});
-        static Experiment finished = Build(host);
-        static Experiment untouched = Build(host);
-        Finish(finished);
-        std::exit(0);
-      },
-      ::testing::ExitedWithCode(0), "");
-  // Destroyed the other way round: the host first, what it made at the very end.
-  EXPECT_EXIT(
-      {
-        static std::optional<Experiment> experiment;
-        static std::optional<PluginHost> host;
-        host.emplace(std::vector<std::filesystem::path>{});
-        experiment.emplace(Build(*host));
-        Finish(*experiment);
-        std::exit(0);
-      },
-      ::testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

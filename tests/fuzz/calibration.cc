@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The calibration of a camera, as this project, OpenCV, ROS, Kalibr or EuRoC write it.
+#include "fuzz.h"
+#include "plugins/tracks/calibration_file.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace alidade::fuzz;
+  const MemoryFile file(TextOf(data, size));
+  static_cast<void>(Accepts([&] {
+    const alidade::Config config = alidade::CalibrationFile::Read(file.path());
+    const std::string text = config.ToYaml();
+    std::string again;
+    Require(Accepts([&] { again = alidade::Config::FromText(text, "again").ToYaml(); }),
+            "the calibration that was read is refused");
+    Require(text == again, "another calibration");
+  }));
+  return 0;
+}

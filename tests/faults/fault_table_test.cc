@@ -16,7 +16,7 @@ const fs::path kTests = fs::path(ALIDADE_SOURCE_DIR) / "tests";
 /// `Suite.Name` of every test in the sources, and `ConfigFault.NN_*` of every number of a config.
 std::set<std::string> TestsInSources() {
   std::set<std::string> tests;
-  const std::regex test(R"(\nTEST(?:_F|_P)?\((\w+),\s+(\w+)\))"), config(R"re(\("(\d\d_))re");
+  const std::regex test(R"(\nTEST(?:_F|_P)?\((\w+),\s+(\w+)\))"), config(R"re("(\d\d_))re");
   for (const auto& entry : fs::recursive_directory_iterator(kTests)) {
     if (!entry.path().string().ends_with("_test.cc")) continue;
     const std::string text = ReadText(entry.path());

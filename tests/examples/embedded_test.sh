@@ -3,9 +3,9 @@
 #
 # tests/examples/embedded_test.sh COMPILER INCLUDE...
 #
-# Compiles examples/09_static_depth, and each shipped model by itself, with COMPILER as C++17 without
-# exceptions and RTTI, and fails where the example would allocate or throw. INCLUDE: folders of the
-# libraries, Eigen. Exit code 77 where there is no such compiler.
+# Compiles examples/09_static_depth, and the shipped models, with COMPILER as C++17 without exceptions
+# and RTTI, and fails if the example would allocate or throw. INCLUDE: folders of the libraries,
+# Eigen. Exit code 77 if there is no such compiler.
 set -euo pipefail
 compiler=$1
 shift
@@ -21,10 +21,8 @@ for include in "$@"; do flags+=(-isystem "$include"); done
 object=$(mktemp --suffix .o)
 trap 'rm -f "$object"' EXIT
 
-for header in motion_models/*.h sensors/*.h; do
-  printf '#include "%s"\n' alidade/model/static_ekf.h "$header" |
-    "$compiler" "${flags[@]}" -fsyntax-only -x c++ -
-done
+printf '#include "%s"\n' alidade/model/static_ekf.h motion_models/*.h sensors/*.h |
+  "$compiler" "${flags[@]}" -fsyntax-only -x c++ -
 "$compiler" "${flags[@]}" -c examples/09_static_depth/main.cc -o "$object"
 # -print-prog-name may be a bare name, which the path then finds.
 undefined=$("$("$compiler" -print-prog-name=nm)" -uC "$object")

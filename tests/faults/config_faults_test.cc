@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Configs with one fault each: a base config of tests/faults/configs with a line or two changed,
-// and the exit code, the line and the words of the message that must come of it.
+// and the expected exit code, line and words of the message.
 #include <gtest/gtest.h>
 
 #include "support/program.h"
@@ -13,12 +13,12 @@ using namespace std::string_literals;  // NOLINT(google-build-using-namespace): 
 
 const fs::path kBases = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/configs";
 
-/// Text of the base, there once, and the text in its stead.
+/// Replaces `from`, which the base has once, by `to`.
 struct Change {
   std::string from, to;
 };
 
-/// Inserts lines behind the one that ends with `text`.
+/// Inserts lines after the line that ends with `text`.
 Change After(const std::string& text, const std::string& lines) {
   return {text, text + '\n' + lines};
 }
@@ -39,13 +39,13 @@ Fault MakeFault(std::string name, std::string base, std::vector<Change> changes,
 
 void PrintTo(const Fault& fault, std::ostream* stream) { *stream << fault.name; }
 
-// What of depth.yaml is changed often.
+// Texts of the bases that several faults change.
 const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, seed: 1}",
                   kStereoRoles = "{depth: target.depth}", kStereoSigma = "    sigma_px: 1.0",
                   kTemplateBlock = "template.inverse_distance",
                   kTemplateBlocks = "{value: inverse_distance}",
                   kPrior = "prior: {inverse_distance: 0.5, sigma: 0.25}";
-/// A table in place of the simulated target.
+/// A table as the source, in place of the simulated target.
 std::string Rows(const std::string& keys) {
   return "{type: csv, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
 }

@@ -323,9 +323,10 @@ for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h;
   plant upward sensors/new.cc "$licence\n#include \"$header\""
 done
 for header in yaml-cpp/yaml.h boost/dll.hpp spdlog/spdlog.h openssl/evp.h nlohmann/json.hpp; do
-  for file in core/alidade/run/new.h plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
-    plant library "$file" "$licence\n#include <$header>"
-  done
+  plant library core/alidade/run/new.h "$licence\n#include <$header>"
+done
+for file in plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
+  plant library "$file" "$licence\n#include <yaml-cpp/yaml.h>"
 done
 for file in core/alidade/run/new.cc plugins/csv/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
@@ -337,20 +338,18 @@ plant library plugins/csv/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library tests/plugins/new.cc "$licence\n#include <opencv2/core.hpp>"
 for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);' 'if (x) std::quick_exit(1);' \
   'std::terminate();' '/* why */ abort();'; do
-  for file in core/alidade/run/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
-    plant exit "$file" "$licence\n$call"
-  done
+  plant exit core/alidade/run/new.cc "$licence\n$call"
 done
 for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//");' 'puts("x");' \
   'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'std::print("x");'; do
-  for file in core/alidade/run/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
-    plant print "$file" "$licence\n$call"
-  done
+  plant print core/alidade/run/new.cc "$licence\n$call"
+done
+for file in sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+  plant exit "$file" "$licence\nabort();"
+  plant print "$file" "$licence\nputs(\"x\");"
 done
 for name in ceres_batch fixed_lag ceres_bundle image_writer image_tracks depth_target alidade_ceres_bundle.so; do
-  for file in core/alidade/run/new.cc tools/alidade/compare/new.h; do
-    plant named "$file" "$licence\nif (entry.name == \"$name\") return;"
-  done
+  plant named tools/alidade/compare/new.h "$licence\nif (entry.name == \"$name\") return;"
 done
 plant named core/alidade/run/new.h "$licence\n/// As of ceres_batch."
 for flag in -march=native -ffast-math -Ofast -mavx2; do

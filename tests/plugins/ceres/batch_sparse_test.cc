@@ -204,7 +204,7 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   for (const char* name : {"05_depth_principled", "08_depth_all_estimators", "21_poses",
                            "22_range_bearing", "23_satellites"}) {
     SCOPED_TRACE(name);
-    const Both both = SolveBoth(Example(name), 80);
+    const Both both = SolveBoth(Example(name), 40);
     ExpectSame(both.sparse, both.dense);
   }
 }

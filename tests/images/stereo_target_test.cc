@@ -588,7 +588,7 @@ class StereoTargetOfFaces : public StereoTarget {
     }
     const cv::Rect2d& first = boxes.at(0);
     Write("config.yaml", cv::format("alidade: 1\nsource: {type: stereo_target, left: '%s', target: "
-                                    "[%g, %g, %g, %g], max_relative_sigma: 0.1}\n",
+                                    "[%g, %g, %g, %g], max_relative_sigma: 0.1, max_frames: 400}\n",
                                     video.c_str(), first.x, first.y, first.width, first.height));
     const Outcome outcome = Measure();
     ASSERT_EQ(outcome.code, 0) << outcome.err;

@@ -232,6 +232,7 @@ fs::path FreeFolder(const fs::path& folder) {
 Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,
                     const std::string& prefix) {
   const fs::path named = NamedFolder(given, config, input, prefix);
+  FullPath(named);  // or the current folder is gone
   const fs::path folder = given.empty() && !force ? FreeFolder(named) : named;
   KeepInputs(folder.string(), config.inputs());
   return {folder, named};

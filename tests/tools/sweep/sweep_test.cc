@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "alidade/replay/run_inputs.h"
 #include "support/recording.h"
 
 namespace alidade {
@@ -112,6 +113,24 @@ TEST(SweepFolder, RunsHaveTheirValuesInTheColumnsOfAll) {
   EXPECT_EQ(lines[1], "1,ekf,false,false,,1,5,");
   EXPECT_EQ(lines[2], "2,ekf,false,false,,2,,");
   EXPECT_EQ(lines[3], "3,ekf,true,false,7,100,,8");
+}
+
+// What it wrote when it was stopped is of the runs until then.
+TEST(SweepFolder, AStoppedOneIsContinuedWithoutItsResults) {
+  const testing::TemporaryFolder temporary;
+  const Config config = Config::FromText("{}", "config.yaml");
+  const std::string inputs = internal::InputsJson({{"sweep"}, {}, {}}, config, {}, {});
+  SweepResult result = SixRuns();
+  result.stopped = true;
+  SweepFolder({temporary / "out", false, inputs}, config).Write(result, Summarise(result), config);
+  const std::filesystem::path partial = temporary / "out.partial";
+  EXPECT_TRUE(std::filesystem::exists(partial / "failures.csv"));
+  EXPECT_FALSE(std::filesystem::exists(temporary / "out"));
+  const SweepFolder resumed({temporary / "out", false, inputs, true}, config);
+  EXPECT_EQ(testing::FilesIn(partial),
+            (std::vector<std::string>{"config.resolved.yaml", "files.txt", "finished_runs.jsonl",
+                                      "inputs.json", "sweep.json"}));
+  EXPECT_EQ(testing::Lines(partial / "sweep.json").at(1), "  \"status\": \"running\"");
 }
 
 TEST(Sweep, ItsRunsShareTheirNames) {

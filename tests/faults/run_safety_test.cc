@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What surrounds a run fails: disk, signals, memory, descriptors, other processes. The number of
-// each fault is in the comment above its test. These are tested elsewhere:
+// What surrounds a run fails: disk, signals, memory. The number of each fault is in the comment
+// above its test. These are tested elsewhere:
 //   87  Recorder.AFullDiskKeepsTheRows, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
 //   93  OutputFolder.AFolderThatCannotBeWrittenToIsRefused
@@ -209,45 +209,6 @@ TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
     ++failed;
   }
   EXPECT_GT(failed, 0);
-}
-
-// 99
-TEST_F(RunSafety, FewDescriptorsAreAnErrorThatSaysSo) {
-  if (kSanitized) GTEST_SKIP() << "the sanitizer needs descriptors to look at memory";
-  int failed = 0, code = -1;
-  for (int limit = 4; code != 0 && limit < 64; ++limit) {
-    fs::remove_all(folder_ / "out");
-    before_ = "ulimit -n " + std::to_string(limit);
-    const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
-    code = run.code;
-    if (code == 0 || code == 127) continue;  // 127: the loader had not enough
-    EXPECT_EQ(run.signal, 0) << limit << ": " << run.err;
-    EXPECT_TRUE(code == 66 || code == 69 || code == 73 || code == 74) << limit << ": " << run.err;
-    EXPECT_TRUE(Contains(run.err, "Too many open files")) << limit << ": " << run.err;
-    ExpectRecordOfFailure("Too many open files");
-    ++failed;
-  }
-  EXPECT_EQ(code, 0);
-  EXPECT_GT(failed, 2);
-}
-
-// 100
-TEST_F(RunSafety, MessagesThatNobodyTakesDoNotEndTheRun) {
-  ASSERT_EQ(Call({"run", "config.yaml", "-o", "plain", "--no-figures"}).code, 0);
-  ::mkfifo((folder_ / "pipe").c_str(), 0600);
-  for (const std::string to : {"exec 2>/dev/full", "exec 3<>pipe 2>pipe 3<&-"}) {
-    fs::remove_all(folder_ / "out");
-    // A gnuplot that fails gives the run something to say there.
-    fs::create_directories(folder_ / "bin");
-    fs::create_symlink("/bin/false", folder_ / "bin/gnuplot");
-    before_ = "PATH=\"$PWD/bin:$PATH\"; " + to;
-    const Outcome run = Call({"run", "config.yaml", "-o", "out"});
-    fs::remove_all(folder_ / "bin");
-    EXPECT_EQ(run.code, 0) << to;
-    EXPECT_TRUE(Contains(run.out, "wrote out\n")) << to;
-    EXPECT_EQ(Estimates("out"), Estimates("plain")) << to;
-    EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66) << to;
-  }
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
   EXPECT_TRUE(warnings.texts[0].ends_with("; the run goes on without its log"));
 }
 
-// 100: a limit of 4 bytes stands for a full disk. The buffer holds 64 KiB: one message is written
+// A limit of 4 bytes stands for a full disk. The buffer holds 64 KiB: one message is written
 // at the end, a thousand of 100 bytes are not.
 TEST(LogFile, ThatCannotBeWrittenIsAWarning) {
   for (const int messages : {1, 1000}) {

@@ -80,7 +80,7 @@ class Times {
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
     is_guided_ = experiment.guide != nullptr;
-    const internal::EstimatorGuide guide(experiment, nullptr);
+    const internal::EstimatorGuide guide(experiment);
     Estimator& filter = *experiment.estimators[0].estimator;
     SourceFrame frame;
     std::vector<cv::Point2f> from, to, back;

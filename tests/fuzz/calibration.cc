@@ -2,13 +2,13 @@
 //
 // The calibration of a camera, as this project, OpenCV, ROS, Kalibr or EuRoC write it.
 #include "fuzz.h"
-#include "plugins/tracks/calibration_file.h"
+#include "plugins/common/calibration_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace alidade::fuzz;
   const MemoryFile file(TextOf(data, size));
   static_cast<void>(Accepts([&] {
-    const alidade::Config config = alidade::CalibrationFile::Read(file.path());
+    const alidade::Config config = alidade::ReadCalibrationFile(file.path());
     const std::string text = config.ToYaml();
     std::string again;
     Require(Accepts([&] { again = alidade::Config::FromText(text, "again").ToYaml(); }),

@@ -236,11 +236,11 @@ TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});
   EXPECT_EQ(video.code, 74) << video.err;
-  EXPECT_TRUE(Contains(video.err, "data/v.avi: cannot be written in full")) << video.err;
+  EXPECT_TRUE(Contains(video.err, "data.partial/v.avi: cannot be written in full")) << video.err;
   before_ = "ulimit -f 2";
   const Outcome images = Simulate(kScene, {"--images", "images"});
   EXPECT_EQ(images.code, 74) << images.err;
-  EXPECT_TRUE(Contains(images.err, "data/images/000000.png: cannot be written")) << images.err;
+  EXPECT_TRUE(Contains(images.err, "data.partial/images/000000.png: cannot be written")) << images.err;
   EXPECT_FALSE(Exists("data"));
 }
 

@@ -3,13 +3,13 @@
 #
 # tests/install/flags_test.sh FLAG FOLDER OPTIONS COMPILER [CXXFLAG...] INCLUDE...
 #
-# Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by `;`) that
+# Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by commas) that
 # the target alidade::core adds, and runs it against the libraries in FOLDER, built without it. If
 # the processor lacks the instructions it is compiled only. Without OPTIONS the program must either
 # mean the same or be refused in words that name the remedy.
 set -euo pipefail
 flag=-$1 folder=$2 compiler=$4
-IFS=';' read -ra options <<<"$3"
+IFS=',' read -ra options <<<"$3"
 shift 4
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)

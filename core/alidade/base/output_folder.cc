@@ -142,7 +142,7 @@ fs::path OutputFolder::Add(const std::string& name) const {
   }
   list.Write(name + '\n');
   list.Close();
-  return path;
+  return path.has_filename() ? path : path.parent_path();
 }
 
 std::unique_ptr<OutputFile> OutputFolder::Create(const std::string& name) const {

@@ -15,6 +15,11 @@ namespace {
 
 using internal::Refuse;
 
+#if defined(__aarch64__)
+constexpr Elf64_Half kMachine = EM_AARCH64;
+#else
+constexpr Elf64_Half kMachine = EM_X86_64;
+#endif
 constexpr std::uint64_t kMaxBytes = 1 << 20;  // of each of the pieces below
 
 /// Reads `count` values of T at `offset`; none if the file ends before.
@@ -27,15 +32,16 @@ std::vector<T> ReadAt(std::istream& file, std::uint64_t offset, std::uint64_t co
   return values;
 }
 
-/// The bytes of a section of an ELF file, read without opening it as a library; empty if there is
-/// no such file or section.
+/// The bytes of a section of an ELF file for this kind of processor, read without opening it as a
+/// library; empty if there is no such file or section.
 std::vector<char> ReadSection(const fs::path& path, const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return {};  // a pipe would be waited for
   std::ifstream file(path, std::ios::binary);
   const auto header = ReadAt<Elf64_Ehdr>(file, 0, 1);
   if (header.empty() || std::memcmp(header[0].e_ident, ELFMAG, SELFMAG) != 0 ||
-      header[0].e_ident[EI_CLASS] != ELFCLASS64 || header[0].e_shentsize != sizeof(Elf64_Shdr)) {
+      header[0].e_ident[EI_CLASS] != ELFCLASS64 || header[0].e_machine != kMachine ||
+      header[0].e_shentsize != sizeof(Elf64_Shdr)) {
     return {};
   }
   const auto sections = ReadAt<Elf64_Shdr>(file, header[0].e_shoff, header[0].e_shnum);
@@ -61,8 +67,8 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   const std::vector<char> bytes = ReadSection(path, ALIDADE_BUILD_TAG_SECTION);
   if (bytes.empty()) {
     Refuse(path,
-           "has no alidade build tag: it is not an alidade plugin, is damaged, was built without "
-           "ALIDADE_PLUGIN, or has lost its section headers");
+           "has no alidade build tag: it is not an alidade plugin, is for another kind of processor, "
+           "is damaged, was built without ALIDADE_PLUGIN, or has lost its section headers");
   }
   AlidadeBuildTag tag{};
   std::memcpy(&tag, bytes.data(), std::min(bytes.size(), sizeof(tag)));

@@ -24,6 +24,10 @@ class Context {
  public:
   Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
           const CheckOptions& options, Journal& journal);
+  /// The destruction of the model is noted as a call.
+  ~Context() { journal_.Enter("destroy"); }
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
 
   const ModelUnderTest& model() const { return *model_; }
   const CheckOptions& options() const { return options_; }

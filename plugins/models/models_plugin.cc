@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "models.h"
-
 #include "alidade/host/cpp_plugin.h"
+#include "models.h"
 
 ALIDADE_SOURCE_PLUGIN({"models",
                        "simulator: truth and measurements drawn from the models of the config",

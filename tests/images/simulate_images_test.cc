@@ -240,7 +240,8 @@ TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 2";
   const Outcome images = Simulate(kScene, {"--images", "images"});
   EXPECT_EQ(images.code, 74) << images.err;
-  EXPECT_TRUE(Contains(images.err, "data.partial/images/000000.png: cannot be written")) << images.err;
+  EXPECT_TRUE(Contains(images.err, "data.partial/images/000000.png: cannot be written"))
+      << images.err;
   EXPECT_FALSE(Exists("data"));
 }
 

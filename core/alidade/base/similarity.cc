@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 
 namespace alidade::internal {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/config/tree.h"
 

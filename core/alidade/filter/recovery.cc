@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/filter/square_root.h"

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/rts.h"
 
-#include <Eigen/Cholesky>
-
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
@@ -24,7 +23,7 @@ struct Adjoint {
     whole.topRows(n) = a;
     if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
     lambda = whole.transpose() * lambda + b;
-    later = whole.transpose() * later * whole + information;
+    later = Product(TransposedProduct(whole, later), whole) + information;
     later = 0.5 * (later + later.transpose()).eval();
   }
 };
@@ -72,14 +71,14 @@ Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
   const Outcome outcome = linear_.Correct(f, rows);
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
   // The filter has factorised the same S.
-  const Eigen::LLT<Eigen::MatrixXd> s(all.h * p * all.h.transpose() + all.noise);
-  const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H
-  Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
+  const Eigen::MatrixXd h = all.h, weighted = SolvePositive(Congruence(h, p) + all.noise, h);
+  Eigen::MatrixXd a = -Product(ProductTransposed(p, h), weighted);  // I - P H' S^-1 H
   a.diagonal().array() += 1.0;
   const Workspace::Matrix back = TransportTo(f.state, before, f.work);
   frame_.b += frame_.a.transpose() * (weighted.transpose() * all.innovation);
-  frame_.information += frame_.a.transpose() * (all.h.transpose() * weighted) * frame_.a;
-  frame_.a = back.transpose() * a * frame_.a;
+  frame_.information +=
+      Product(TransposedProduct(frame_.a, TransposedProduct(h, weighted)), frame_.a);
+  frame_.a = Product(TransposedProduct(back, a), frame_.a);
   return outcome;
 }
 
@@ -136,7 +135,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     Eigen::MatrixXd with(n, n + held);            // Cov(x, (x, w))
     with.leftCols(n) = passed->p;
     with.rightCols(held) = passed->m.leftCols(held);
-    const Eigen::MatrixXd p = passed->p - with * information * with.transpose();
+    const Eigen::MatrixXd p = passed->p - internal::Congruence(with, information);
     const bool positive = (p.diagonal().array() >= 0.0).all();
     if (!positive) {
       events.push_back({timestamp(), "not_pd",

@@ -240,9 +240,7 @@ ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, 
   }
 }
 
-ModelInstance::~ModelInstance() {
-  internal::DestroyInstance(instance_, name_, plugin_);
-}
+ModelInstance::~ModelInstance() { internal::DestroyInstance(instance_, name_, plugin_); }
 
 void ModelInstance::Refuse(const std::string& why) const {
   throw Error(ExitCode::kPlugin, ErrorLine({plugin_}, {}, "model '" + name_ + "' " + why));
@@ -407,8 +405,8 @@ std::string ModelInstance::error_text() const {
   };
   const auto last = std::find_if(failed_calls.rbegin(), failed_calls.rend(), of_this);
   if (last != failed_calls.rend() && last->thrown) {
-    return std::string(NameOfCall(instance_, last->slot)) + " of model '" + name_ +
-           "' of plugin " + plugin_ + " threw: " + *last->thrown;
+    return std::string(NameOfCall(instance_, last->slot)) + " of model '" + name_ + "' of plugin " +
+           plugin_ + " threw: " + *last->thrown;
   }
   if (instance_.error_text == nullptr) return "";
   std::string text;

@@ -154,8 +154,8 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   if (plugin.cpp_table != nullptr) {
     for (int i = 0; i < plugin.cpp_table->source_count; ++i) {
       const SourceEntry& source = plugin.cpp_table->sources[i];
-      entries_.push_back({PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "",
-                          plugin.file});
+      entries_.push_back(
+          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file});
     }
     for (int i = 0; i < plugin.cpp_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.cpp_table->estimators[i];

@@ -66,15 +66,15 @@ std::string Version(unsigned major, unsigned minor) {
 AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   const std::vector<char> bytes = ReadSection(path, ALIDADE_BUILD_TAG_SECTION);
   if (bytes.empty()) {
-    Refuse(path,
-           "has no alidade build tag: it is not an alidade plugin, is for another kind of processor, "
-           "is damaged, was built without ALIDADE_PLUGIN, or has lost its section headers");
+    Refuse(
+        path,
+        "has no alidade build tag: it is not an alidade plugin, is for another kind of processor, "
+        "is damaged, was built without ALIDADE_PLUGIN, or has lost its section headers");
   }
   AlidadeBuildTag tag{};
   std::memcpy(&tag, bytes.data(), std::min(bytes.size(), sizeof(tag)));
   constexpr std::size_t kVersioned = offsetof(AlidadeBuildTag, kind);
-  if (bytes.size() < kVersioned ||
-      std::memcmp(tag.magic, "ALIDADE", sizeof(tag.magic)) != 0) {
+  if (bytes.size() < kVersioned || std::memcmp(tag.magic, "ALIDADE", sizeof(tag.magic)) != 0) {
     Refuse(path, "malformed build tag");
   }
   if (tag.abi_major != ALIDADE_ABI_MAJOR) {

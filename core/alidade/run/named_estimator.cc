@@ -294,10 +294,10 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator
     why = e.what();
   } catch (...) {
   }
-  throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
-                                           "estimator '" + plugin->name + "' of plugin " +
-                                               plugin->plugin.string() +
-                                               " failed while being created: " + why));
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        "estimator '" + plugin->name + "' of plugin " + plugin->plugin.string() +
+                            " failed while being created: " + why));
 }
 
 /// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/random.h"
 #include "alidade/model/geometry.h"
 #include "alidade/system/landmark_representation.h"

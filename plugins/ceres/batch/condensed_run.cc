@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"
 #include "alidade/filter/square_root.h"

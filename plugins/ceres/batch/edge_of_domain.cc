@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edge_of_domain.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/base/dense_algebra.h"
 
 namespace alidade::ceres_batch {
 namespace {
@@ -97,7 +98,7 @@ bool EdgeOfDomain::Hold(Eigen::VectorXd& z) {
       return run_.NormalOf(landmark, of, points, CondensedRun::Undefined::kFails, normal, nullptr);
     };
     if (!normal_of(l, now)) return;
-    const Eigen::VectorXd step = -now.c.llt().solve(now.b), s = step.normalized();
+    const Eigen::VectorXd step = -internal::SolvePositive(now.c, now.b), s = step.normalized();
     const auto t = EdgeAlong(landmark, l, s, 0.0, step.norm(), points);
     if (!t) return;
     const auto n = NormalOfEdge(landmark, l, s, *t, points);

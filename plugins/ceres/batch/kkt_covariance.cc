@@ -2,9 +2,10 @@
 #include "kkt_covariance.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
+
+#include "alidade/base/dense_algebra.h"
 
 namespace alidade::ceres_batch {
 
@@ -12,9 +13,9 @@ Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
   if (p.size() == 0) return p;
   Eigen::MatrixXd symmetric = 0.5 * (p + p.transpose());
   if (symmetric.ldlt().vectorD().minCoeff() >= 0.0) return symmetric;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(symmetric);
-  const Eigen::VectorXd positive = eigen.eigenvalues().cwiseMax(0.0);
-  return eigen.eigenvectors() * positive.asDiagonal() * eigen.eigenvectors().transpose();
+  const internal::SymmetricEigen eigen = internal::EigenOf(symmetric);
+  const Eigen::VectorXd positive = eigen.values.cwiseMax(0.0);
+  return internal::ProductTransposed(eigen.vectors * positive.asDiagonal(), eigen.vectors);
 }
 
 KktSystem::Covariances::Covariances(KktSystem& of) : s_(of) {
@@ -132,22 +133,25 @@ Eigen::MatrixXd KktSystem::Covariances::OfFrame(std::size_t frame) const {
     Eigen::Index other = 0;
     for (const int j : multipliers) {
       const auto b_j = node.b.middleRows(other, s_.ldl_.SizeOf(j));
-      of_w += s_.alpha_ * s_.alpha_ * b_i.transpose() * Found(i, j) * b_j;
+      const Eigen::MatrixXd of_pair = internal::TransposedProduct(b_i, Found(i, j));
+      of_w += s_.alpha_ * s_.alpha_ * internal::Product(of_pair, b_j);
       other += b_j.rows();
     }
     if (k > 0) {
       for (const Part& part : s_.PartsOf(k - 1)) {
-        cross(*part.rows, Eigen::all) += s_.alpha_ * Found(part.variable, i) * b_i;
+        const Eigen::MatrixXd tie = internal::Product(Found(part.variable, i), b_i);
+        cross(*part.rows, Eigen::all) += s_.alpha_ * tie;
       }
     }
     at += b_i.rows();
   }
   const Eigen::MatrixXd& s = s_.at_[frame].s;
   const Eigen::MatrixXd by_w = s.rightCols(node.columns);
-  Eigen::MatrixXd p = by_w * of_w * by_w.transpose();
+  Eigen::MatrixXd p = internal::Congruence(by_w, of_w);
   if (k > 0) {
-    const Eigen::MatrixXd f = s.leftCols(n), fc = f * cross * by_w.transpose();
-    p += f * JointOf(k - 1) * f.transpose() + fc + fc.transpose();
+    const Eigen::MatrixXd f = s.leftCols(n);
+    const Eigen::MatrixXd fc = internal::ProductTransposed(internal::Product(f, cross), by_w);
+    p += internal::Congruence(f, JointOf(k - 1)) + fc + fc.transpose();
   }
   return Clipped(p.topLeftCorner(system, system));
 }
@@ -172,7 +176,7 @@ Eigen::MatrixXd KktSystem::Covariances::OfLandmark(std::size_t i) const {
   const Point3& point = s_.points_[i];
   const Eigen::MatrixXd own = Found(point.variable, point.variable);
   const Eigen::MatrixXd& by_l = point.place.by_d;
-  if (!landmark.first) return Clipped(by_l * own * by_l.transpose());
+  if (!landmark.first) return Clipped(internal::Congruence(by_l, own));
   std::vector<int> variables{s_.nodes_[s_.node_of_[landmark.first->epoch]].read};
   for (const int constant : s_.landmark_constants_) {
     variables.push_back(s_.constants_[static_cast<std::size_t>(constant)].value);
@@ -180,8 +184,8 @@ Eigen::MatrixXd KktSystem::Covariances::OfLandmark(std::size_t i) const {
   std::erase(variables, -1);
   variables.insert(variables.begin(), point.variable);
   Eigen::MatrixXd j(by_l.rows(), by_l.cols() + point.c.cols());
-  j << by_l, point.place.by_x - by_l * point.c;
-  return Clipped(j * JointOf(variables) * j.transpose());
+  j << by_l, point.place.by_x - internal::Product(by_l, point.c);
+  return Clipped(internal::Congruence(j, JointOf(variables)));
 }
 
 void KktSystem::Covariances::PutMap(std::vector<LandmarkEstimate>& map) const {

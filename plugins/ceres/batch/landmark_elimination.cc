@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/dense_algebra.h"
 #include "condensed_run.h"
 
 /// The landmarks of a CondensedRun: how they are initialised in it, and where they cost least.
@@ -159,11 +157,11 @@ Eigen::MatrixXd CondensedRun::FollowOf(const MapLandmark& landmark, const Invers
   if (m.rows() > inputs) {
     const auto point = PointOf(landmark, place.y);
     if (!point || inputs < 3) return none;
-    m = point->jacobian * m;
-    n = point->jacobian * n;
+    m = internal::Product(point->jacobian, m);
+    n = internal::Product(point->jacobian, n);
   }
-  Eigen::MatrixXd c = m.rows() == inputs ? Eigen::MatrixXd(m.partialPivLu().solve(n))
-                                         : m.completeOrthogonalDecomposition().solve(n);
+  Eigen::MatrixXd c =
+      m.rows() == inputs ? internal::SolveSquare(m, n) : internal::SolveLeastNorm(m, n);
   return c.allFinite() ? c : none;
 }
 
@@ -213,13 +211,13 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
   const double root = std::sqrt(Weight(loss, r.norm()));
   r *= root;
   a *= root;
-  const Eigen::MatrixXd a_y = a.rightCols(a.cols() - n), a_l = a_y * place.by_d;
-  normal.c.noalias() += a_l.transpose() * a_l;
-  normal.b.noalias() += a_l.transpose() * r;
+  const Eigen::MatrixXd a_y = a.rightCols(a.cols() - n), a_l = internal::Product(a_y, place.by_d);
+  normal.c += internal::TransposedProduct(a_l, a_l);
+  normal.b += internal::TransposedProduct(a_l, r);
   if (information == nullptr) return true;
   Eigen::MatrixXd a_x = Packed(a.leftCols(n).transpose()), a_first;
   if (landmark.first) {
-    a_first = Packed((a_y * place.by_x).transpose());
+    a_first = Packed(internal::Product(a_y, place.by_x).transpose());
     if (landmark.first->epoch == epoch) {
       a_x += a_first;
       a_first.resize(0, 0);
@@ -228,22 +226,22 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
   const auto here = d * static_cast<Eigen::Index>(epoch);
   const bool of_states = information->h.size() > 0;
   if (of_states) {
-    information->h.block(here, here, d, d).noalias() += a_x * a_x.transpose();
-    information->g.segment(here, d).noalias() += a_x * r;
+    information->h.block(here, here, d, d) += internal::ProductTransposed(a_x, a_x);
+    information->g.segment(here, d) += internal::Product(a_x, r);
   }
   if (normal.epochs.empty() || normal.epochs.back() != epoch) {
     normal.epochs.push_back(epoch);
     normal.ties.emplace_back(Eigen::MatrixXd::Zero(d, normal.b.size()));
   }
-  normal.ties.back().noalias() += a_x * a_l;
+  normal.ties.back() += internal::Product(a_x, a_l);
   if (a_first.size() == 0) return true;
   if (of_states) {
     const auto first = d * static_cast<Eigen::Index>(landmark.first->epoch);
-    information->h.block(first, first, d, d).noalias() += a_first * a_first.transpose();
-    information->h.block(here, first, d, d).noalias() += a_x * a_first.transpose();
-    information->g.segment(first, d).noalias() += a_first * r;
+    information->h.block(first, first, d, d) += internal::ProductTransposed(a_first, a_first);
+    information->h.block(here, first, d, d) += internal::ProductTransposed(a_x, a_first);
+    information->g.segment(first, d) += internal::Product(a_first, r);
   }
-  normal.ties.front().noalias() += a_first * a_l;
+  normal.ties.front() += internal::Product(a_first, a_l);
   return true;
 }
 
@@ -286,7 +284,7 @@ bool CondensedRun::OptimiseLandmark(MapLandmark& landmark, const std::vector<Poi
   }
   double before = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMostSteps && landmark.l.size() > 0; ++i) {
-    Eigen::VectorXd step = -now.c.llt().solve(now.b);
+    Eigen::VectorXd step = -internal::SolvePositive(now.c, now.b);
     const double decrement = -step.dot(now.b), rounding = kRounding * (1.0 + now.cost);
     const bool unseen = decrement <= rounding;
     if (!(decrement > within * within) || (unseen && decrement > 0.5 * before)) break;

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <optional>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "plugins/ceres/loss.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/base/dense_algebra.h"
 #include "alidade/system/landmark_representation.h"
 #include "condensed_run.h"
 
@@ -47,8 +48,8 @@ bool CondensedRun::AddPlain(const std::vector<Point>& points, Undefined undefine
       const double w = Weight(loss, r.norm());
       const Eigen::MatrixXd a_x = Packed(a.leftCols(n).transpose());
       const auto here = d * static_cast<Eigen::Index>(k);
-      information->h.block(here, here, d, d).noalias() += w * a_x * a_x.transpose();
-      information->g.segment(here, d).noalias() += w * a_x * r;
+      information->h.block(here, here, d, d) += internal::ProductTransposed(w * a_x, a_x);
+      information->g.segment(here, d) += internal::Product(w * a_x, r);
     }
   }
   return true;
@@ -81,12 +82,12 @@ bool CondensedRun::Project(const Eigen::VectorXd& e, const std::vector<Point>& p
     for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
       const auto row = d * static_cast<Eigen::Index>(normal.epochs[i]);
       const Eigen::MatrixXd gain = c.solve(normal.ties[i].transpose()).transpose();
-      information.g.segment(row, d).noalias() -= gain * normal.b;
+      information.g.segment(row, d) -= internal::Product(gain, normal.b);
       std::size_t& earliest = information.first[normal.epochs[i]];
       earliest = std::min(earliest, normal.epochs.front());
       for (std::size_t k = 0; k <= i; ++k) {
         const auto column = d * static_cast<Eigen::Index>(normal.epochs[k]);
-        information.h.block(row, column, d, d).noalias() -= gain * normal.ties[k].transpose();
+        information.h.block(row, column, d, d) -= internal::ProductTransposed(gain, normal.ties[k]);
       }
     }
   }
@@ -125,14 +126,15 @@ Eigen::MatrixXd CondensedRun::Assemble(const Eigen::VectorXd& e, const std::vect
     const Eigen::MatrixXd own = h.block(row, row, d, d).selfadjointView<Eigen::Lower>();
     const auto before = h.block(row, first, d, row - first);
     const auto here = s.block(row, 0, d, begin(k + 1));
-    hs.block(row, 0, d, here.cols()).noalias() += own * here;
-    hs.block(row, 0, d, begin(k)).noalias() += before * s.block(first, 0, row - first, begin(k));
-    hs.block(first, 0, row - first, here.cols()).noalias() += before.transpose() * here;
+    hs.block(row, 0, d, here.cols()) += internal::Product(own, here);
+    hs.block(row, 0, d, begin(k)) +=
+        internal::Product(before, s.block(first, 0, row - first, begin(k)));
+    hs.block(first, 0, row - first, here.cols()) += internal::TransposedProduct(before, here);
   }
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
-    a.block(from, 0, to - from, to).noalias() +=
-        s.block(row, from, size - row, to - from).transpose() * hs.block(row, 0, size - row, to);
+    a.block(from, 0, to - from, to) += internal::TransposedProduct(
+        s.block(row, from, size - row, to - from), hs.block(row, 0, size - row, to));
   }
   const Eigen::VectorXd g_x = information.g + h.selfadjointView<Eigen::Lower>() * offset;
   g += s.transpose() * g_x;
@@ -158,16 +160,17 @@ bool CondensedRun::PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
       return false;
     }
     const Eigen::LLT<Eigen::MatrixXd> c(normal.c);
-    Eigen::MatrixXd p = place.by_d * c.solve(Eigen::MatrixXd(place.by_d.transpose()));
+    Eigen::MatrixXd p =
+        internal::Product(place.by_d, c.solve(Eigen::MatrixXd(place.by_d.transpose())));
     if (inputs_ > 0) {  // Eigen solves for one column at least
       Eigen::MatrixXd m = Eigen::MatrixXd::Zero(normal.b.size(), inputs_);
       for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
-        m.noalias() += normal.ties[i].transpose() * Packed(points[normal.epochs[i]].s);
+        m += internal::TransposedProduct(normal.ties[i], Packed(points[normal.epochs[i]].s));
       }
-      m = -place.by_d * c.solve(m);
-      if (found->first) m += place.by_x * points[found->first->epoch].s;
+      m = internal::Product(-place.by_d, c.solve(m));
+      if (found->first) m += internal::Product(place.by_x, points[found->first->epoch].s);
       const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(m.transpose());
-      p = (y.transpose() * y + p).eval();
+      p += internal::TransposedProduct(y, y);
     }
     Describe(*found, p, estimate);
   }
@@ -217,7 +220,7 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
   const auto point = PointOf(landmark, landmark.y);
   if (!point) return;
   estimate.position = point->position;
-  estimate.covariance = point->jacobian * p * point->jacobian.transpose();
+  estimate.covariance = internal::Congruence(point->jacobian, p);
 }
 
 }  // namespace alidade::ceres_batch

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "kkt_covariance.h"
@@ -195,7 +196,7 @@ std::optional<SparseSolve::Trial> SparseSolve::Extrapolated(double predicted) {
     dz.col(i) = (newest ? z_ : to->z) - from.z;
     ds.col(i) = (newest ? kkt_.step().dz : to->step) - from.step;
   }
-  const Eigen::VectorXd t = ds.colPivHouseholderQr().solve(kkt_.step().dz);
+  const Eigen::VectorXd t = internal::SolveByPivoting(ds, kkt_.step().dz);
   Trial trial;
   trial.z = z_ + kkt_.step().dz - (dz + ds) * t;
   if (!trial.z.allFinite()) return {};

@@ -10,7 +10,7 @@
 #include <map>
 #include <memory>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/bundle/bundle.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/state/covariance.h"

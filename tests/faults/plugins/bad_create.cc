@@ -128,15 +128,17 @@ constexpr AlidadeEntry Reading(const char* name) {
 
 }  // namespace
 
-ALIDADE_PLUGIN(
-    ALIDADE_SENSOR(Throws, "throws", "", ""), ALIDADE_SENSOR(ThrowsInt, "throws_int", "", ""),
-    ALIDADE_SENSOR(Misfit, "misfit", "", ""),
-    ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""), Reading<kNoDefault>("no_default"),
-    Reading<kNoNumber>("no_number"), Reading<kTwoChoices>("two_choices"),
-    Reading<kAnyChoices>("any_choices"), Reading<kDefaultBeyond>("default_beyond"),
-    Reading<kLaterFlag>("later_flag"), Reading<kReservedMember>("reserved_member"),
-    Reading<kNoKey>("no_key"), Reading<kGap>("gap_in_key"), Reading<kHuge>("huge"),
-    ALIDADE_SENSOR(Forges, "forges", "", ""), ALIDADE_SENSOR(AsksMuch, "asks_much", "", ""),
-    Reading<kEmptyRange>("empty_range"), Reading<kManyChoices>("many_choices"),
-    Reading<kHalf>("half"), Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
-    ALIDADE_SENSOR(Titled, "titled", "", ""))
+ALIDADE_PLUGIN(ALIDADE_SENSOR(Throws, "throws", "", ""),
+               ALIDADE_SENSOR(ThrowsInt, "throws_int", "", ""),
+               ALIDADE_SENSOR(Misfit, "misfit", "", ""),
+               ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""),
+               Reading<kNoDefault>("no_default"), Reading<kNoNumber>("no_number"),
+               Reading<kTwoChoices>("two_choices"), Reading<kAnyChoices>("any_choices"),
+               Reading<kDefaultBeyond>("default_beyond"), Reading<kLaterFlag>("later_flag"),
+               Reading<kReservedMember>("reserved_member"), Reading<kNoKey>("no_key"),
+               Reading<kGap>("gap_in_key"), Reading<kHuge>("huge"),
+               ALIDADE_SENSOR(Forges, "forges", "", ""),
+               ALIDADE_SENSOR(AsksMuch, "asks_much", "", ""), Reading<kEmptyRange>("empty_range"),
+               Reading<kManyChoices>("many_choices"), Reading<kHalf>("half"),
+               Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
+               ALIDADE_SENSOR(Titled, "titled", "", ""))

@@ -4,7 +4,7 @@
 #include <map>
 #include <optional>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_rows.h"
 #include "alidade/bundle/bundle_file.h"
 #include "alidade/model/geometry.h"

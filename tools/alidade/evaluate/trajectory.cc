@@ -8,7 +8,7 @@
 #include <numeric>
 #include <optional>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_rows.h"
 #include "alidade/base/number_text.h"
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/evaluate/errors.h"

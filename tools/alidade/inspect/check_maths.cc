@@ -4,7 +4,7 @@
 #include <cmath>
 #include <span>
 
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/inspect/check_context.h"
 #include "alidade/inspect/check_values.h"

@@ -86,12 +86,8 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
 }
 
 Json JsonOf(const PluginEntry& entry) {
-  return {{"name", entry.name},
-          {"kind", KindName(entry.kind)},
-          {"family", entry.family},
-          {"doc", entry.doc},
-          {"citation", entry.citation},
-          {"file", entry.plugin.string()}};
+  return {{"name", entry.name}, {"kind", KindName(entry.kind)}, {"family", entry.family},
+          {"doc", entry.doc},   {"citation", entry.citation},   {"file", entry.plugin.string()}};
 }
 
 Json JsonOf(const std::vector<ParamInfo>& schema) {

@@ -3,9 +3,24 @@
 
 #include <Eigen/Core>
 
-/// Decompositions of dense matrices that are not in an inner loop. Eigen's are compiled here alone,
-/// once: they are among what costs most to instantiate.
+/// Products and decompositions of dense matrices outside of inner loops, compiled once: Eigen
+/// instantiates each combination of operands anew, which takes most of the time of a build.
 namespace alidade::internal {
+
+/// A matrix or a block of one.
+using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+
+Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< A B
+Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b);  ///< A B'
+Eigen::MatrixXd TransposedProduct(const ConstMatrix& a, const ConstMatrix& b);  ///< A' B
+Eigen::MatrixXd Congruence(const ConstMatrix& a, const ConstMatrix& p);         ///< A P A'
+
+/// X with A X = B, A square and regular.
+Eigen::MatrixXd SolveSquare(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+/// X with A X = B, A symmetric and positive definite.
+Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+/// The X of least norm with |A X - B| least, A of any shape and rank.
+Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 /// A = V diag(l) V', the eigenvalues l in increasing order.
 struct SymmetricEigen {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/base/decompositions.h"
+#include "alidade/base/dense_algebra.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 namespace alidade::internal {
@@ -14,6 +16,32 @@ Eigen::MatrixXd UpperTriangle(const Qr& qr) {
 }
 
 }  // namespace
+
+Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b) { return a * b; }
+
+Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b) {
+  return a * b.transpose();
+}
+
+Eigen::MatrixXd TransposedProduct(const ConstMatrix& a, const ConstMatrix& b) {
+  return a.transpose() * b;
+}
+
+Eigen::MatrixXd Congruence(const ConstMatrix& a, const ConstMatrix& p) {
+  return ProductTransposed(Product(a, p), a);
+}
+
+Eigen::MatrixXd SolveSquare(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.partialPivLu().solve(b);
+}
+
+Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.llt().solve(b);
+}
+
+Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.completeOrthogonalDecomposition().solve(b);
+}
 
 SymmetricEigen EigenOf(const Eigen::MatrixXd& symmetric) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);

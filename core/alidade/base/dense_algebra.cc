@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/base/dense_algebra.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
 
 namespace alidade::internal {
 namespace {
@@ -41,6 +42,34 @@ Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b
 
 Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.completeOrthogonalDecomposition().solve(b);
+}
+
+double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eigen::MatrixXd>& ldlt,
+                    Eigen::MatrixXd& root) {
+  root.resize(p.rows(), p.cols());
+  if (p.size() == 0) return 0.0;
+  ldlt.compute(p);
+  const auto d = ldlt.vectorD();
+  root = ldlt.matrixL();
+  for (Eigen::Index i = 0; i < d.size(); ++i) root.col(i) *= std::sqrt(std::max(d[i], 0.0));
+  root = ldlt.transpositionsP().transpose() * root;
+  const double least = d.minCoeff(), largest = p.diagonal().maxCoeff();
+  if (!(least < 0.0)) return 0.0;
+  return largest > 0.0 ? least / largest : -1.0;
+}
+
+double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {
+  constexpr double kSingular = 1e-13;
+  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
+  if (!p.allFinite() || !error.allFinite() || !(sigma.minCoeff() > 0.0)) return std::nan("");
+  const Eigen::VectorXd scale = sigma.cwiseInverse();
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  ldlt.compute(Eigen::MatrixXd(scale.asDiagonal() * p * scale.asDiagonal()));
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > kSingular))
+    return std::nan("");
+  const Eigen::VectorXd scaled = scale.cwiseProduct(error);
+  const double squared = scaled.dot(ldlt.solve(scaled));
+  return std::isfinite(squared) ? squared : std::nan("");
 }
 
 SymmetricEigen EigenOf(const Eigen::MatrixXd& symmetric) {

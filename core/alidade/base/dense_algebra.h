@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 /// Products and decompositions of dense matrices outside of inner loops, compiled once: Eigen
@@ -21,6 +22,16 @@ Eigen::MatrixXd SolveSquare(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 /// The X of least norm with |A X - B| least, A of any shape and rank.
 Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
+/// A square root A of a symmetric, positive semi-definite P = A A', singular or not, from the
+/// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest
+/// variance; 0: none. Negative pivots count as zero. `ldlt` is memory.
+double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eigen::MatrixXd>& ldlt,
+                    Eigen::MatrixXd& root);
+
+/// e' P^-1 e; NaN if P is singular, indefinite or not finite. P is scaled to unit variances first,
+/// so that singular means the same in any unit.
+double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error);
 
 /// A = V diag(l) V', the eigenvalues l in increasing order.
 struct SymmetricEigen {

@@ -6,7 +6,6 @@
 #include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/first_values.h"
-#include "alidade/filter/square_root.h"
 
 namespace alidade::internal {
 namespace {
@@ -14,7 +13,8 @@ namespace {
 /// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const SymmetricEigen above = EigenOf(b - a);
-  return a + above.vectors * above.values.cwiseMax(0.0).asDiagonal() * above.vectors.transpose();
+  const Eigen::VectorXd positive = above.values.cwiseMax(0.0);
+  return a + ProductTransposed(above.vectors * positive.asDiagonal(), above.vectors);
 }
 
 /// Of the blocks that one motion model moves together with `id`: the values they have are no better
@@ -78,7 +78,7 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   }
   ++repairs_;
   f.motions.EndInterval();
-  p.SetBlock(0, 0, root * root.transpose());
+  p.SetBlock(0, 0, ProductTransposed(root, root));
   Note(f, "repaired",
        text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
            std::to_string(options_.max_covariance_repairs) + ")");

@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
-#include "alidade/filter/square_root.h"
 #include "alidade/state/projection.h"
 #include "alidade/state/tiles.h"
 #include "alidade/state/vector_kernels.h"

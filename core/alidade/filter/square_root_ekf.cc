@@ -4,10 +4,10 @@
 #include <Eigen/Householder>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/square_root.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/method.h"
-#include "alidade/filter/square_root.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

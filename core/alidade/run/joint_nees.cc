@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/run/joint_nees.h"
 
-#include "alidade/base/mahalanobis.h"
+#include "alidade/base/dense_algebra.h"
 
 namespace alidade::internal {
 

@@ -10,7 +10,6 @@
 #include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"
-#include "alidade/filter/square_root.h"
 
 namespace alidade::ceres_batch {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/mahalanobis.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/statistics.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/run/run.h"

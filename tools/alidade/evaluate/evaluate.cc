@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/base/mahalanobis.h"
+#include "alidade/base/dense_algebra.h"
 #include "alidade/base/statistics.h"
 #include "alidade/evaluate/errors.h"
 #include "alidade/evaluate/warnings.h"

@@ -205,6 +205,19 @@ TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
       << none.err;
 }
 
+// FAULTS 91
+TEST_F(EvalCli, ATornLastRowOfAnUnfinishedRunIsIgnored) {
+  const std::string whole = HalfCircle(2.0);
+  const std::string torn = whole.substr(0, whole.size() - 5);
+  for (const char* folder : {"killed.partial", "copied"}) {
+    Write(std::string(folder) + "/truth.tum", whole);
+    Write(std::string(folder) + "/ekf/trajectory.tum", torn.substr(0, torn.rfind(' ')));
+  }
+  const Config json = Evaluated({"killed.partial"});
+  EXPECT_EQ(json.root().At("evaluations").Items().front().At("matched").Number(), 30);
+  EXPECT_EQ(Call({"eval", "copied"}).code, 65) << "a file of a user's is whole or wrong";
+}
+
 TEST_F(EvalCli, SeveralEstimatesAreOneTable) {
   const Outcome table = Call({"eval", "truth.tum", "truth.tum", "mono.tum", "-a", "--markdown"});
   EXPECT_EQ(table.code, 0);

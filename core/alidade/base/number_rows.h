@@ -17,7 +17,8 @@
 namespace alidade {
 
 /// The rows of a file of numbers, one at a time, in constant memory. Blank lines and lines that
-/// begin with `#` are left out.
+/// begin with `#` are left out, and so is a last row without a line end in `NAME.partial`, the
+/// folder of a run that has not come to its end.
 ///
 /// Errors       kBadData with file, line and column; those of LineReader.
 class NumberRows {
@@ -27,7 +28,10 @@ class NumberRows {
   /// `separator` ' ': any blanks; kCommaOrBlanks: commas in a row that has one, else blanks.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
-      : reader_(path, place, key), separator_(separator) {}
+      : reader_(path, place, key), separator_(separator) {
+    const auto is_partial = [](const auto& part) { return part.extension() == ".partial"; };
+    may_be_torn_ = std::any_of(path.begin(), path.end(), is_partial);
+  }
 
   const std::string& name() const { return reader_.name(); }
   int line() const { return reader_.number(); }
@@ -39,6 +43,7 @@ class NumberRows {
   /// The next row; false at the end.
   bool Next() {
     while (reader_.Next(line_)) {
+      if (may_be_torn_ && reader_.unterminated()) return false;
       if (line_.find_first_not_of(" \t") == std::string_view::npos) continue;
       if (line_.starts_with('#')) continue;
       Split();
@@ -124,6 +129,7 @@ class NumberRows {
 
   LineReader reader_;
   char separator_;
+  bool may_be_torn_ = false;
   std::string_view line_;
   std::vector<std::string_view> cells_;
 };

@@ -105,7 +105,9 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
 std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experiment& experiment,
                                     const Config& config) {
   if (arguments.video.empty() && !arguments.view) return nullptr;
-  KeepInputs(arguments.video, config.inputs());
+  const std::filesystem::path video(arguments.video);
+  KeepInputs(video, config.inputs());
+  KeepInputs(video.parent_path() / (video.stem().string() + ".partial.avi"), config.inputs());
   const auto title = config.root().Find("title");
   auto viewer = std::make_unique<RunViewer>(experiment, title ? title->Text() : "alidade run");
   if (!arguments.video.empty()) viewer->AddVideo(arguments.video, arguments.force);

@@ -18,7 +18,6 @@ namespace {
 
 class CalibrationFile {
  public:
- public:
   explicit CalibrationFile(const std::filesystem::path& file)
       : from_(Config::FromText(PlainYaml(file), file.string())),
         to_(Config::FromText("calibration: {}", file.string())) {

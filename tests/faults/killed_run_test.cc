@@ -34,7 +34,8 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
   const Outcome refused = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
   EXPECT_EQ(refused.code, 73);
   EXPECT_EQ(refused.err,
-            "error: out.partial: exists already: its run was ended early or is still running; "
+            "error: out.partial: exists already: the command that writes it has ended early "
+            "or is still running; "
             "add --force to replace it, or remove it\n");
   EXPECT_EQ(Read("out.partial/ekf/estimates.csv"), rows);
   EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"}).code, 0);

@@ -128,7 +128,7 @@ TEST_F(RunSafety, ForceSparesRunsInsideARun) {
     const Outcome refused = Call(all);
     EXPECT_EQ(refused.code, 73);
     EXPECT_EQ(refused.err,
-              "error: out: holds what was not written with it: 'base', 'ekf/sweep'; move that "
+              "error: out: holds files that alidade did not write: 'base', 'ekf/sweep'; move that "
               "elsewhere, or choose another folder\n");
   }
   EXPECT_TRUE(Exists("out/base/run.json"));

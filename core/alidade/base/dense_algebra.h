@@ -58,7 +58,7 @@ Eigen::MatrixXd ComplementOf(const Eigen::MatrixXd& a);
 
 /// x with |A x - b| least, A of any rank, by pivoting columns.
 Eigen::VectorXd SolveByPivoting(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
-/// The rank of A, where pivots below `threshold` times the largest count as zero.
+/// The rank of A: pivots below `threshold` times the largest count as zero.
 int RankOf(const Eigen::MatrixXd& a, double threshold);
 
 }  // namespace alidade::internal

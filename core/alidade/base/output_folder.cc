@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/base/output_folder.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -84,7 +86,7 @@ std::string Few(const std::vector<std::string>& names) {
 void CheckListed(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder, error)) {
-    Refuse(folder, "is a link to what does not exist", "remove it, or choose another folder");
+    Refuse(folder, "is a link to a missing file", "remove it, or choose another folder");
   }
   if (!fs::is_directory(folder, error)) Refuse(folder, "is a file", "choose another folder");
   const std::vector<std::string> foreign = Unlisted(folder);
@@ -93,7 +95,7 @@ void CheckListed(const fs::path& folder) {
     Refuse(folder, std::string("is not a run folder (it has no ") + kList + ')',
            "--force replaces run folders only; remove it yourself, or choose another folder");
   }
-  Refuse(folder, "holds what was not written with it: " + Few(foreign),
+  Refuse(folder, "holds files that alidade did not write: " + Few(foreign),
          "move that elsewhere, or choose another folder");
 }
 
@@ -102,22 +104,37 @@ void CheckListed(const fs::path& folder) {
 fs::path PartialOf(const fs::path& target) { return Normal(target) += ".partial"; }
 
 OutputFolder::OutputFolder(const fs::path& target, bool force, bool resume)
-    : target_(Normal(target)), partial_(PartialOf(target)), force_(force) {
+    : target_(Normal(target)), partial_(fs::path(target_) += ".partial"), force_(force) {
   CheckTarget();
+  std::error_code error;
   if (Exists(partial_)) {
     if (!force && !resume) {
-      Refuse(partial_, "exists already: its run was ended early or is still running",
+      Refuse(partial_,
+             "exists already: the command that writes it has ended early or is still running",
              "add --force to replace it, or remove it");
     }
     CheckListed(partial_);
     keep_ = resume;
-    if (resume) return;
+    if (resume) {
+      Open();
+      return;
+    }
+    fs::remove_all(partial_, error);
   }
-  std::error_code error;
-  fs::remove_all(partial_, error);
   if (!error && partial_.has_parent_path()) fs::create_directories(partial_.parent_path(), error);
   if (error) FailCreate(partial_.string(), error.value());
   if (::mkdir(partial_.c_str(), 0777) != 0) FailCreate(partial_.string(), errno);
+  Open();
+}
+
+void OutputFolder::Open() {
+  descriptor_ = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor_ < 0) FailCreate(partial_.string(), errno);
+}
+
+bool OutputFolder::exists() const {
+  struct stat status {};
+  return ::fstat(descriptor_, &status) == 0 && status.st_nlink > 0;
 }
 
 void OutputFolder::CheckTarget() const {
@@ -128,20 +145,21 @@ void OutputFolder::CheckTarget() const {
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
-  if (!keep_) fs::remove_all(partial_, ignored);
+  if (!keep_ && exists()) fs::remove_all(partial_, ignored);
+  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 fs::path OutputFolder::Add(const std::string& name) const {
   const fs::path path = partial_ / name;
-  std::error_code error;
-  fs::create_directories(path.parent_path(), error);
-  if (error) FailCreate(path.parent_path().string(), error.value());
   OutputFile list(partial_ / kList, OutputFile::Mode::kAppend);
   for (fs::path above = fs::path(name).parent_path(); !above.empty(); above = above.parent_path()) {
     list.Write(above.string() + '\n');
   }
   list.Write(name + '\n');
-  list.Close();
+  list.Close();  // before anything is created: no file of a killed process is unlisted
+  std::error_code error;
+  fs::create_directories(path.parent_path(), error);
+  if (error) FailCreate(path.parent_path().string(), error.value());
   return path.has_filename() ? path : path.parent_path();
 }
 
@@ -166,14 +184,26 @@ void OutputFolder::Remove(const std::string& name) const {
 
 void OutputFolder::Commit() {
   keep_ = true;
+  if (!exists()) {
+    Refuse(partial_, "was replaced by another command while this one wrote it",
+           "write to another folder");
+  }
   std::set<std::string> names = Contents(partial_);
+  for (const std::string& foreign : Unlisted(partial_)) {
+    std::erase_if(names, [&](const std::string& name) {
+      return name == foreign || name.starts_with(foreign + '/');
+    });
+  }
   names.insert(kList);
   std::string list;
   for (const std::string& name : names) list += name + '\n';
-  Write(kList, list);
+  constexpr const char* kNewList = "files.txt.new";  // a disk that is full keeps the old one
+  Write(kNewList, list);
+  std::error_code error;
+  fs::rename(partial_ / kNewList, partial_ / kList, error);
+  if (error) FailIo((partial_ / kList).string(), "write", error.value());
   try {
     CheckTarget();
-    std::error_code error;
     fs::remove_all(target_, error);
     if (!error) fs::rename(partial_, target_, error);
     if (error) FailIo(target_.string(), "replace", error.value());

@@ -11,8 +11,8 @@
 namespace alidade::internal {
 
 /// A folder `NAME` that exists only if it is complete: its files are written to `NAME.partial` next
-/// to it, which Commit() renames. Its `files.txt` lists what was written, and nothing else is ever
-/// replaced.
+/// to it, which Commit() renames. `files.txt` lists the files of the folder; no other file is ever
+/// removed.
 class OutputFolder {
  public:
   /// Creates `NAME.partial`, and the folders above it. If `target` is a link to a folder, NAME is
@@ -36,7 +36,7 @@ class OutputFolder {
   void Write(const std::string& name, std::string_view text) const;
   /// Removes a file or folder, if it exists.
   void Remove(const std::string& name) const;
-  /// From now on `NAME.partial` stays even if it is not committed: it has results.
+  /// From now on `NAME.partial` stays even if it is not committed, because it holds results.
   void Keep() { keep_ = true; }
   /// `NAME.partial`
   const std::filesystem::path& partial() const { return partial_; }
@@ -47,8 +47,12 @@ class OutputFolder {
  private:
   /// Refuses to replace NAME.
   void CheckTarget() const;
+  /// Keeps a descriptor of `NAME.partial`, which knows if another command removes the folder.
+  void Open();
+  bool exists() const;
 
   std::filesystem::path target_, partial_;
+  int descriptor_ = -1;  ///< of `NAME.partial`
   bool force_, keep_ = false;
 };
 

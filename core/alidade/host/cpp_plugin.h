@@ -19,8 +19,12 @@ struct BundleResult;    // likewise
 
 /// The ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if
 /// its number is that of the library. Whoever changes the layout or the meaning of an installed
-/// class or function raises it.
+/// class or function raises it. The classes of a debug standard library have another layout.
+#if defined(_GLIBCXX_DEBUG)
+#define ALIDADE_CPP_ABI "1 with _GLIBCXX_DEBUG"
+#else
 #define ALIDADE_CPP_ABI "1"
+#endif
 
 struct SourceEntry {
   const char* name;

@@ -150,8 +150,8 @@ AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 /// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
 /// above it owned by another than root, the caller or the owner of the running program; writable
-/// for the world (sticky folders above excepted) or for a group other than such a user's private
-/// one, which has the user's name and no other member. Follows symbolic links and checks each
+/// for the world (sticky folders above excepted) or for a group other than the caller's private
+/// one, which has the caller's name and no other member. Follows symbolic links and checks each
 /// folder on the way. Errors: kNotTrusted.
 void CheckTrusted(const std::filesystem::path& file);
 

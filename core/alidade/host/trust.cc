@@ -60,19 +60,25 @@ class TrustCheck {
                                      : "user " + std::to_string(status.st_uid)) +
                    ", not by root, you or the owner of this program");
   }
-  /// Whether only one of the trusted users is in the group: it is that user's primary group, has
-  /// the user's name and no other member.
-  bool IsPrivateGroup(gid_t id) const {
+  /// Whether it is the private group of the user: the primary group, of the user's name and
+  /// without another member. The group of root is not, as any user may have it in a container.
+  static bool IsPrivateGroup(gid_t id) {
+    const uid_t own = geteuid();
+    const passwd* const user = getpwuid(own);
+    if (id == 0 || user == nullptr || user->pw_gid != id) return false;
+    const std::string name = user->pw_name;
     const group* const found = getgrgid(id);
-    if (found == nullptr) return false;
-    const std::string name = found->gr_name;
+    if (found == nullptr || name != found->gr_name) return false;
     for (char** member = found->gr_mem; *member != nullptr; ++member) {
       if (name != *member) return false;
     }
-    return std::ranges::any_of(owners_, [&](uid_t owner) {
-      const passwd* const user = getpwuid(owner);
-      return user != nullptr && user->pw_gid == id && name == user->pw_name;
-    });
+    bool is_shared = false;  // the primary group of another user
+    setpwent();
+    while (const passwd* const other = getpwent()) {
+      is_shared = is_shared || (other->pw_gid == id && other->pw_uid != own);
+    }
+    endpwent();
+    return !is_shared;
   }
   void CheckMode(const fs::path& path, const struct stat& status, bool sticky_allowed) const {
     if (sticky_allowed && (status.st_mode & S_ISVTX) != 0) return;

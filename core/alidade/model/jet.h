@@ -15,7 +15,8 @@ namespace alidade {
 ///
 /// A constant becomes a dual number by itself, with derivatives of zero. Comparisons, isfinite,
 /// isnan and isinf look at the value alone. Functions are found by their argument, as in
-/// `using std::sin; sin(x)`. Eigen's matrices may have such elements.
+/// `using std::sin; sin(x)`. Eigen's matrices may have such elements. If a function has no finite
+/// slope, as sqrt, hypot and atan2 at 0 and asin at 1, the derivatives are infinite or NaN.
 template <class T, int N>
 struct Jet {
   static_assert(std::is_floating_point_v<T> && N > 0, "a number, and at least one variable");
@@ -85,12 +86,13 @@ struct Jet {
     return Chain(f, x.a / f, x, y.a / f, y);
   }
   friend Jet pow(const Jet& x, T p) {
-    return Chain(std::pow(x.a, p), p * std::pow(x.a, p - T(1)), x);
+    return Chain(std::pow(x.a, p), p == T(0) ? T(0) : p * std::pow(x.a, p - T(1)), x);
   }
   friend Jet pow(const Jet& x, const Jet& p) {
     if (p.IsConstant()) return pow(x, p.a);  // defined for x < 0 as well
     const T f = std::pow(x.a, p.a);
-    return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, f * std::log(x.a), p);
+    const T by_exponent = f == T(0) ? T(0) : f * std::log(x.a);
+    return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, by_exponent, p);
   }
 
   friend Jet exp(const Jet& x) {
@@ -174,6 +176,10 @@ struct Jet {
 
 }  // namespace alidade
 
+/// The limits of the value.
+template <class T, int N>
+class std::numeric_limits<alidade::Jet<T, N>> : public std::numeric_limits<T> {};
+
 // Eigen's view of a dual number, for models that write their formulas with Eigen's matrices.
 namespace Eigen {
 
@@ -197,10 +203,10 @@ struct NumTraits<alidade::Jet<T, N>> {
     AddCost = 1 + N,
     MulCost = 3 + 3 * N
   };
-  static constexpr T epsilon() { return std::numeric_limits<T>::epsilon(); }
-  static constexpr T dummy_precision() { return T(1e-12); }
-  static constexpr T highest() { return std::numeric_limits<T>::max(); }
-  static constexpr T lowest() { return std::numeric_limits<T>::lowest(); }
+  static constexpr Real epsilon() { return std::numeric_limits<T>::epsilon(); }
+  static constexpr Real dummy_precision() { return T(1e-12); }
+  static constexpr Real highest() { return std::numeric_limits<T>::max(); }
+  static constexpr Real lowest() { return std::numeric_limits<T>::lowest(); }
   static constexpr int digits10() { return std::numeric_limits<T>::digits10; }
 };
 

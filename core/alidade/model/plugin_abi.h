@@ -83,7 +83,7 @@ typedef void (*AlidadeReservedCall)(void);
 
 enum { ALIDADE_PLUGIN_C_ABI = 1, ALIDADE_PLUGIN_CPP = 2 };
 
-/* Bits of AlidadeBuildTag.flags, for information alone. */
+/* Bits of AlidadeBuildTag.flags, which some compilers of plugins set. A host ignores these. */
 enum {
   ALIDADE_BUILT_UNOPTIMISED = 1,
   ALIDADE_BUILT_FAST_MATH = 1 << 16,

@@ -7,7 +7,6 @@
 #include <span>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
 #include "alidade/run/accepted_data.h"
 #include "alidade/run/frame_check.h"
 #include "alidade/run/frame_order.h"

@@ -82,8 +82,8 @@ TEST(OutputFolder, LeavesAnExistingPartialFolderAlone) {
   std::string text;
   EXPECT_EQ(CodeOf([&] { OutputFolder(out, false); }, &text), 73);
   EXPECT_EQ(text, (temporary / "out.partial").string() +
-                      ": exists already: its run was ended early or is still running; add --force "
-                      "to replace it, or remove it");
+                      ": exists already: the command that writes it has ended early or is still "
+                      "running; add --force to replace it, or remove it");
   EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\n");
   Complete(out, true, "new\n");
   EXPECT_EQ(Read(out / "ekf/a.csv"), "new\n");
@@ -100,6 +100,29 @@ TEST(OutputFolder, IsContinuedIfAsked) {
   EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\nmore\n") << "it stays";
   OutputFolder(temporary / "out", false, true).Commit();
   EXPECT_EQ(Lines(temporary / "out/files.txt"), EntriesOf(temporary / "out"));
+}
+
+TEST(OutputFolder, DoesNotListWhatSomebodyElsePutIntoIt) {
+  const TemporaryFolder temporary;
+  OutputFolder folder(temporary / "out", false);
+  folder.Write("ekf/a.csv", "rows\n");
+  fs::create_directory(temporary / "out.partial/notes");
+  std::ofstream(temporary / "out.partial/notes/mine.txt") << "mine\n";
+  folder.Commit();
+  EXPECT_EQ(Lines(temporary / "out/files.txt"),
+            (std::vector<std::string>{"ekf", "ekf/a.csv", "files.txt"}));
+  EXPECT_EQ(CodeOf([&] { OutputFolder(temporary / "out", true); }), 73);
+}
+
+TEST(OutputFolder, IsNotCompletedIfAnotherCommandHasReplacedIt) {
+  const TemporaryFolder temporary;
+  OutputFolder first(temporary / "out", false);
+  first.Write("a.csv", "first\n");
+  OutputFolder second(temporary / "out", true);
+  second.Write("a.csv", "second\n");
+  EXPECT_EQ(CodeOf([&] { first.Commit(); }), 73);
+  second.Commit();
+  EXPECT_EQ(Read(temporary / "out/a.csv"), "second\n");
 }
 
 TEST(OutputFolder, ForceReplacesAFolderWhenTheNewOneIsComplete) {
@@ -124,7 +147,7 @@ TEST(OutputFolder, ForceSparesWhatWasNotWrittenWithIt) {
       std::string text;
       const fs::path target = folder == out ? out : temporary / "left";
       EXPECT_EQ(CodeOf([&] { OutputFolder(target, true); }, &text), 73);
-      EXPECT_EQ(text, folder.string() + ": holds what was not written with it: " + names +
+      EXPECT_EQ(text, folder.string() + ": holds files that alidade did not write: " + names +
                           "; move that elsewhere, or choose another folder");
     };
     Complete(folder / "ekf/run", false, "another\n");
@@ -193,7 +216,7 @@ TEST(OutputFolder, WritesWhereALinkPoints) {
   }
   std::string text;
   EXPECT_EQ(CodeOf([&] { OutputFolder(temporary / "dangling", true); }, &text), 73);
-  EXPECT_TRUE(text.find(": is a link to what does not exist; ") != text.npos) << text;
+  EXPECT_TRUE(text.find(": is a link to a missing file; ") != text.npos) << text;
 }
 
 TEST(OutputFolder, NeedsAName) {

@@ -70,6 +70,8 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
     } catch (const Error& e) {
       return e.code() == ExitCode::kBadConfig ? kError + std::string(e.what())
                                               : Encode(internal::Fail(e.what()));
+    } catch (const std::exception& e) {
+      return Encode(internal::Fail(e.what()));
     }
   };
   const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);

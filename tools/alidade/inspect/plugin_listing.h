@@ -19,7 +19,7 @@ std::string PluginListJson(const PluginHost& host);
 std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
 /// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
-/// `doc`). A built-in estimator has no `family`, `citation`, `file`, `unoptimised` and `describes`.
+/// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 
 }  // namespace alidade

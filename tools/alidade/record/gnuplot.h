@@ -22,7 +22,7 @@ struct GnuplotResult {
 };
 
 /// Runs gnuplot, found through PATH, in `folder`, which has a folder `figures`, without a shell and
-/// without the user's settings. It is killed where a limit is reached.
+/// without the user's settings. It is killed if a limit is reached.
 GnuplotResult RunGnuplot(const std::filesystem::path& folder,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits);
 

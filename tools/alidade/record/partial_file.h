@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cerrno>
 #include <filesystem>
-#include <fstream>
-#include <string>
 #include <utility>
 
 #include "alidade/base/error.h"
@@ -19,12 +16,12 @@ class PartialFile {
       : file_(std::move(file)),
         partial_(file_.parent_path() / (file_.stem().string() + ".partial.avi")) {
     std::error_code ignored;
-    if (!force && std::filesystem::exists(file_, ignored)) {
+    for (const std::filesystem::path& place : {file_, partial_}) {
+      if (force || !std::filesystem::exists(place, ignored)) continue;
       throw Error(ExitCode::kCannotCreate,
-                  ErrorLine({file_.string()}, {}, "is there; --force replaces it"));
+                  ErrorLine({place.string()}, {}, "is there; --force replaces it"));
     }
-    errno = 0;
-    if (!std::ofstream(partial_)) internal::FailCreate(file_.string(), errno);
+    OutputFile(partial_).Close();
   }
   ~PartialFile() {
     std::error_code ignored;
@@ -34,8 +31,10 @@ class PartialFile {
   PartialFile& operator=(const PartialFile&) = delete;
 
   const std::filesystem::path& partial() const { return partial_; }
+  /// Leaves no file if nothing was written.
   void Commit() const {
     std::error_code error;
+    if (std::filesystem::file_size(partial_, error) == 0) return;
     std::filesystem::rename(partial_, file_, error);
     if (error) internal::FailCreate(file_.string(), error.value());
   }

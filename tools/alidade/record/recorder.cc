@@ -251,9 +251,10 @@ void Recorder::Finish(const RunResult& result) {
     without_report = impl_->WriteResults(result);
     impl_->log.Close();
     impl_->folder.Write(kRunFile, internal::RunJson(result, impl_->facts));
-  } catch (const Error& error) {
+  } catch (...) {
     try {
-      impl_->folder.Write(kRunFile, internal::UnfinishedRunJson("failed", error.what()));
+      const std::string reason = CaughtFailure().reason;
+      impl_->folder.Write(kRunFile, internal::UnfinishedRunJson("failed", reason));
     } catch (const Error&) {  // the disk may be full
     }
     throw;

@@ -278,7 +278,6 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config& config) {
   if (finished) {
     finished->Close();
-    folder.Keep();
     if (stopped) return;
     if (shard) {
       WriteShardRuns(folder, parts);
@@ -293,6 +292,7 @@ void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config&
 
 void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                         const Config& config) {
+  impl_->folder.Keep();
   const OutputFolder& folder = impl_->folder;
   folder.Write("sweep.json", SweepJson(result, summaries));
   const Parts parts = {{&result, ""}};
@@ -304,6 +304,7 @@ void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummar
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
+  impl_->folder.Keep();
   const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
   folder.Write("sweep.json", SweepJson(sweep));

@@ -171,7 +171,7 @@ class SweepFolder {
   /// Errors: those of OutputFolder; kCannotCreate if the sweep to be resumed was made from another
   /// config or other inputs.
   SweepFolder(const Options& options, const Config& config);
-  /// Likewise, without inputs: nothing is kept before all runs are finished or it is stopped.
+  /// Likewise, without inputs: nothing is kept before Write().
   SweepFolder(const std::filesystem::path& folder, bool force);
   ~SweepFolder();
   SweepFolder(const SweepFolder&) = delete;

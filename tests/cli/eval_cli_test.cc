@@ -210,6 +210,7 @@ TEST_F(EvalCli, ATornLastRowOfAnUnfinishedRunIsIgnored) {
   const std::string whole = HalfCircle(2.0);
   const std::string torn = whole.substr(0, whole.size() - 5);
   for (const char* folder : {"killed.partial", "copied"}) {
+    fs::create_directories(folder_ / folder / "ekf");
     Write(std::string(folder) + "/truth.tum", whole);
     Write(std::string(folder) + "/ekf/trajectory.tum", torn.substr(0, torn.rfind(' ')));
   }

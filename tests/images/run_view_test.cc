@@ -237,7 +237,7 @@ TEST_F(RunView, RefusesWhatItCannotWrite) {
 
   const Outcome nowhere = Run(kPlate, {"--save-video", "none/v.avi"});
   EXPECT_EQ(nowhere.code, 73);
-  EXPECT_TRUE(Contains(nowhere.err, "none/v.avi: ")) << nowhere.err;
+  EXPECT_TRUE(Contains(nowhere.err, "none/v.partial.avi: ")) << nowhere.err;
 
   Write("v.avi", "mine");
   const Outcome there = Run(kPlate, {"--save-video", "v.avi"});

@@ -181,6 +181,7 @@ template <class T, int N>
 class std::numeric_limits<alidade::Jet<T, N>> : public std::numeric_limits<T> {};
 
 // Eigen's view of a dual number, for models that write their formulas with Eigen's matrices.
+// NOLINTBEGIN(readability-identifier-naming): the names are Eigen's
 namespace Eigen {
 
 template <class T>
@@ -221,3 +222,4 @@ struct ScalarBinaryOpTraits<T, alidade::Jet<T, N>, Operation> {
 };
 
 }  // namespace Eigen
+// NOLINTEND(readability-identifier-naming)

@@ -44,7 +44,7 @@ TEST_F(TrustTest, AFileThatAGroupCanWrite) {
   const fs::path file = Copy("good", "a/good.so");
   Allow(file, fs::perms::group_write);
   Allow(folder_ / "a", fs::perms::group_write);
-  Allow(folder_.path(), fs::perms::others_exec);
+  Allow(folder_.path(), fs::perms::others_exec | fs::perms::group_exec);
   const auto trusted = [&](gid_t of_folder, gid_t of_file) {
     EXPECT_EQ(chown((folder_ / "a").c_str(), id, of_folder), 0);
     EXPECT_EQ(chown(file.c_str(), id, of_file), 0);

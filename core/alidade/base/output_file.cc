@@ -31,8 +31,8 @@ void FailIo(const std::string& path, const char* verb, int error_number) {
 }
 
 OutputFile::OutputFile(std::filesystem::path file, Mode mode) : path_(std::move(file)) {
-  const int at = mode == Mode::kAppend ? O_APPEND : O_TRUNC;
-  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | at, 0666);
+  const int open_flag = mode == Mode::kAppend ? O_APPEND : O_TRUNC;
+  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | open_flag, 0666);
   if (fd_ < 0) FailCreate(path_.string(), errno);
   buffer_.reserve(kBufferSize);
 }
@@ -40,7 +40,7 @@ OutputFile::OutputFile(std::filesystem::path file, Mode mode) : path_(std::move(
 OutputFile::~OutputFile() {
   try {
     if (fd_ >= 0) Close();
-  } catch (const std::exception&) {  // whoever wants to know calls Close()
+  } catch (const std::exception&) {  // errors are reported by Close()
   }
 }
 
@@ -51,7 +51,7 @@ void OutputFile::Write(std::string_view text) {
 }
 
 void OutputFile::Flush() {
-  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // what follows a gap is worth nothing
+  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // rows after a gap would mislead
   for (std::string_view rest = buffer_; !rest.empty();) {
     const ssize_t written = ::write(fd_, rest.data(), rest.size());
     if (written < 0 && errno == EINTR) continue;

@@ -82,7 +82,7 @@ std::string Few(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Refuses to replace a folder that holds what its list does not have.
+/// Refuses to replace a folder that holds files that its list does not have.
 void CheckListed(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder, error)) {

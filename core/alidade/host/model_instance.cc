@@ -179,7 +179,7 @@ struct FailedCall {
 /// The last of this thread, each of another slot; the last one is the latest.
 thread_local std::vector<FailedCall> failed_calls;
 
-/// The author's name of the function in that slot of an instance; null if it is none of its slots.
+/// The author's name of the function in that slot; null if the slot is not of this instance.
 const char* NameOfCall(const AlidadeInstance& c, const void* slot) {
   if (c.sensor != nullptr) {
     if (slot == &c.sensor->eval) return "Predict";

@@ -9,7 +9,7 @@
 #include "alidade/host/plugin_host.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Plugin files: what is checked before and while one is opened.
+/// Checks of plugin files before and during loading.
 namespace alidade {
 
 struct CppPluginTable;

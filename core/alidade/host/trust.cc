@@ -39,10 +39,10 @@ class TrustCheck {
   }
 
  private:
-  [[noreturn]] void Fail(const fs::path& where, const std::string& why) const {
-    const std::string what = where == file_ ? "it is " : "'" + where.string() + "' is ";
+  [[noreturn]] void Fail(const fs::path& path, const std::string& why) const {
+    const std::string subject = path == file_ ? "it is " : "'" + path.string() + "' is ";
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine({file_.string()}, {}, "not trusted: " + what + why));
+                ErrorLine({file_.string()}, {}, "not trusted: " + subject + why));
   }
   struct stat Status(const fs::path& path) const {
     struct stat status;

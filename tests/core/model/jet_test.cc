@@ -113,6 +113,9 @@ TEST(Jet, AConstantExponentServesNegativeNumbersToo) {
   EXPECT_EQ(square.a, 9.0);
   EXPECT_EQ(square.v[0], -6.0);
   EXPECT_TRUE(std::isnan(pow(Jet2(-3.0, 0), Jet2(2.0, 1)).v[1]));
+  // 0^p is 0 for all p > 0, and x^0 is 1 for all x.
+  EXPECT_EQ(pow(Jet2(0.0, 0), Jet2(2.0, 1)).v[1], 0.0);
+  EXPECT_EQ(pow(Jet2(0.0, 0), 0.0).v[0], 0.0);
 }
 
 TEST(Jet, DecisionsAreThoseOfTheValue) {
@@ -142,6 +145,11 @@ TEST(Jet, MatricesOfEigenMayHaveThem) {
 TEST(Jet, IsKnownWhenTheProgramIsCompiled) {
   constexpr Jet<float, 1> x(3.0f, 0), y = x * x - 2.0f * x + 1.0f;
   static_assert(y.a == 4.0f && y.v[0] == 4.0f);
+}
+
+TEST(Jet, HasTheLimitsOfItsValue) {
+  EXPECT_EQ(std::numeric_limits<Jet2>::epsilon(), std::numeric_limits<double>::epsilon());
+  EXPECT_EQ(std::numeric_limits<Jet2>::infinity(), std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

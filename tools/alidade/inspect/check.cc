@@ -43,27 +43,27 @@ Finding Decode(const std::string& answer) {
 }
 
 /// How the child ended, in words, and in which call.
-std::string EndWords(const ChildEnd& end, const internal::Journal& journal, double timeout_s) {
-  const std::string at = journal.state().empty() ? "" : " at " + journal.state();
+std::string EndWords(const ChildEnd& end, const internal::CallRecord& record, double timeout_s) {
+  const std::string at = record.state().empty() ? "" : " at " + record.state();
   if (end.late) {
     const std::string where =
-        journal.call().empty() ? "before its first call" : "in " + journal.call() + at;
+        record.call().empty() ? "before its first call" : "in " + record.call() + at;
     return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it was " +
            where;
   }
-  std::string words = journal.call().empty() ? "the check" : journal.call();
+  std::string words = record.call().empty() ? "the check" : record.call();
   words += ' ' + end.text;
-  if (!journal.state().empty()) words += "; at " + journal.state();
+  if (!record.state().empty()) words += "; at " + record.state();
   return words;
 }
 
 /// One check, in a child process.
 Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& entry,
                  const Node& parameters, const CheckOptions& options, bool& ended) {
-  const internal::SharedJournal journal;
+  internal::CallRecord record;
   const auto work = [&]() -> std::string {
     try {
-      Context context(host, entry, parameters, options, *journal);
+      Context context(host, entry, parameters, options, record);
       const Finding finding = check.run(context);
       context.Close();
       return Encode(finding);
@@ -77,7 +77,7 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
   const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);
   ended = !end.answered;
   Finding finding =
-      end.answered ? Decode(end.text) : internal::Fail(EndWords(end, *journal, options.timeout_s));
+      end.answered ? Decode(end.text) : internal::Fail(EndWords(end, record, options.timeout_s));
   if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
       !end.printed.empty()) {
     finding = internal::Fail("the model prints, which goes into the output of a run: '" +

@@ -25,8 +25,8 @@ bool Overflows(const CheckedState& state, const Answer& answer) {
 }  // namespace
 
 Context::Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
-                 const CheckOptions& options, Journal& journal)
-    : host_(host), entry_(entry), parameters_(parameters), options_(options), journal_(journal) {
+                 const CheckOptions& options, CallRecord& record)
+    : host_(host), entry_(entry), parameters_(parameters), options_(options), record_(record) {
   model_ = Create();
 }
 
@@ -49,19 +49,19 @@ const std::vector<CheckedState>& Context::states() {
 }
 
 std::unique_ptr<ModelUnderTest> Context::Create() const {
-  journal_.Enter("create");
+  record_.Enter("create");
   return std::make_unique<ModelUnderTest>(host_.Create(entry_, parameters_));
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
   std::string thrown;  // of which the host warns alone
-  journal_.Enter("destroy");
+  record_.Enter("destroy");
   {
     const auto take = [&](LogLevel, std::string_view text) { thrown = text; };
     const LogSubscription warnings(LogLevel::kWarning, take);
     model.reset();
   }
-  journal_.Enter("");
+  record_.Enter("");
   if (!thrown.empty()) throw Error(ExitCode::kPlugin, thrown);
 }
 
@@ -84,9 +84,9 @@ Answer Context::Call(const Function& f, const CheckedState& state, int matrices)
 }
 
 Answer Context::CallWith(const Function& f, const Values& inputs, int matrices) const {
-  journal_.Enter(f.name.c_str(), StateText(InputSpaces(f), inputs));
+  record_.Enter(f.name.c_str(), StateText(InputSpaces(f), inputs));
   Answer answer = CallFunction(f, inputs, matrices);
-  journal_.Enter("");
+  record_.Enter("");
   return answer;
 }
 

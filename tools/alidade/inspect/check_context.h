@@ -23,9 +23,11 @@ struct CheckedState {
 class Context {
  public:
   Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
-          const CheckOptions& options, Journal& journal);
+          const CheckOptions& options, CallRecord& record);
   /// The destruction of the model is noted as a call.
-  ~Context() { journal_.Enter("destroy"); }
+  ~Context() {
+    if (model_) record_.Enter("destroy");
+  }
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
@@ -60,7 +62,7 @@ class Context {
   const PluginEntry& entry_;
   const Node& parameters_;
   const CheckOptions& options_;
-  Journal& journal_;
+  CallRecord& record_;
   std::unique_ptr<ModelUnderTest> model_;
   std::vector<CheckedState> states_;
 };

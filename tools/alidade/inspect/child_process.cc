@@ -121,19 +121,19 @@ std::string FirstLine(int pipe_end) {
 
 }  // namespace
 
-void Journal::Enter(const char* call, const std::string& state) {
-  std::snprintf(call_, sizeof call_, "%s", call);
-  std::snprintf(state_, sizeof state_, "%s", state.c_str());
-}
-
-SharedJournal::SharedJournal() {
+CallRecord::CallRecord() {
   void* const memory =
-      mmap(nullptr, sizeof(Journal), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw Error(ExitCode::kInternal, "out of memory to share with a child");
-  journal_ = new (memory) Journal();
+  shared_ = new (memory) Shared();
 }
 
-SharedJournal::~SharedJournal() { munmap(journal_, sizeof(Journal)); }
+CallRecord::~CallRecord() { munmap(shared_, sizeof(Shared)); }
+
+void CallRecord::Enter(const char* call, const std::string& state) {
+  std::snprintf(shared_->call, sizeof shared_->call, "%s", call);
+  std::snprintf(shared_->state, sizeof shared_->state, "%s", state.c_str());
+}
 
 ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()>& work) {
   Pipe answer(0), output(O_NONBLOCK);

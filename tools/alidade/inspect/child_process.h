@@ -7,30 +7,26 @@
 /// Work that may crash, exit, hang or use up memory, done in a child process.
 namespace alidade::internal {
 
-/// The current call of the child, in memory that the parent shares: if the child dies, the parent
-/// reports this call.
-class Journal {
+/// The current call of a child process, in memory that it shares with its parent: if the child dies,
+/// the parent reports this call.
+class CallRecord {
  public:
+  /// Error: kInternal.
+  CallRecord();
+  ~CallRecord();
+  CallRecord(const CallRecord&) = delete;
+  CallRecord& operator=(const CallRecord&) = delete;
+
   /// Notes the call and the state at which it is made, both truncated if they are too long.
   void Enter(const char* call, const std::string& state = {});
-  std::string call() const { return call_; }
-  std::string state() const { return state_; }
+  std::string call() const { return shared_->call; }
+  std::string state() const { return shared_->state; }
 
  private:
-  char call_[128], state_[512];
-};
-
-/// A Journal that parent and children share, zeroed. Error: kInternal.
-class SharedJournal {
- public:
-  SharedJournal();
-  ~SharedJournal();
-  SharedJournal(const SharedJournal&) = delete;
-  SharedJournal& operator=(const SharedJournal&) = delete;
-  Journal& operator*() const { return *journal_; }
-
- private:
-  Journal* journal_;
+  struct Shared {
+    char call[128], state[512];
+  };
+  Shared* shared_;
 };
 
 struct ChildLimits {

@@ -7,8 +7,8 @@
 /// Work that may crash, exit, hang or use up memory, done in a child process.
 namespace alidade::internal {
 
-/// The current call of a child process, in memory that it shares with its parent: if the child dies,
-/// the parent reports this call.
+/// The current call of a child process, in memory that it shares with its parent: if the child
+/// dies, the parent reports this call.
 class CallRecord {
  public:
   /// Error: kInternal.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/inspect/check.h"
+#include "alidade/check/check.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/plugin_host.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/run/run.h"
 
 /// The commands of the program. Each one reads its arguments, calls core and prints.
 namespace alidade::cli {

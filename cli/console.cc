@@ -13,7 +13,7 @@
 #include <system_error>
 
 #include "alidade/base/error.h"
-#include "alidade/base/utf8.h"
+#include "alidade/io/utf8.h"
 
 namespace alidade::cli {
 namespace {

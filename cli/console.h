@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "alidade/base/log.h"
+#include "alidade/io/log.h"
 
 namespace alidade::cli {
 

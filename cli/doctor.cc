@@ -10,7 +10,7 @@
 #include <system_error>
 #include <thread>
 
-#include "alidade/inspect/plugin_listing.h"
+#include "alidade/check/plugin_listing.h"
 #include "alidade/state/vector_kernels.h"
 #include "command.h"
 #include "console.h"

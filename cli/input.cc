@@ -7,8 +7,8 @@
 #include <new>
 #include <set>
 
-#include "alidade/base/output_folder.h"
-#include "alidade/host/plugin_file.h"
+#include "alidade/io/output_folder.h"
+#include "alidade/plugin/plugin_file.h"
 #include "command.h"
 #include "console.h"
 

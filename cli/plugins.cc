@@ -3,7 +3,7 @@
 #include <CLI/Formatter.hpp>
 #include <memory>
 
-#include "alidade/inspect/plugin_listing.h"
+#include "alidade/check/plugin_listing.h"
 #include "command.h"
 #include "console.h"
 

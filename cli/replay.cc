@@ -9,7 +9,7 @@
 #include <memory>
 #include <system_error>
 
-#include "alidade/base/output_file.h"
+#include "alidade/io/output_file.h"
 #include "command.h"
 #include "console.h"
 

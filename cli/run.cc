@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -9,11 +9,11 @@
 #include <memory>
 #include <sstream>
 
+#include "alidade/experiment/metric_rows.h"
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
 #include "alidade/record/run_viewer.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/run/metric_rows.h"
 #include "command.h"
 #include "console.h"
 #include "video_name.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sweep_report.h"
 
-#include "alidade/base/output_folder.h"
+#include "alidade/io/output_folder.h"
 #include "console.h"
 
 namespace alidade::cli {

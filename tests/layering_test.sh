@@ -19,7 +19,7 @@
 #             plugins/ceres
 #   upward    what lies below does not include cli, bench, tests or examples
 #   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools alone;
-#             of nlohmann-json the forward declarations also in core/alidade/base/json.h, which
+#             of nlohmann-json the forward declarations also in core/alidade/io/json.h, which
 #             names the type for all, and the whole in its test; CLI11 in cli, OpenCV in
 #             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone
 #   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
@@ -35,7 +35,7 @@ if [[ ${1:-} == --self-test ]]; then
   self_test=true
   shift
 fi
-rooms="model base config state host system filter run evaluate bundle inspect replay record sweep compare"
+rooms="model base io state config plugin estimation experiment evaluate bundle check replay record sweep compare"
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 
@@ -111,8 +111,8 @@ sources() {
     }
     function check_include(path, bracket) {
       if (path ~ /^(yaml-cpp|boost|spdlog|openssl|nlohmann)\// && FILENAME !~ /^(core|tools)\/.*\.cc$/ &&
-          !(path == "nlohmann/json_fwd.hpp" && FILENAME == "core/alidade/base/json.h") &&
-          !(path == "nlohmann/json.hpp" && FILENAME == "tests/core/base/json_test.cc"))
+          !(path == "nlohmann/json_fwd.hpp" && FILENAME == "core/alidade/io/json.h") &&
+          !(path == "nlohmann/json.hpp" && FILENAME == "tests/core/io/json_test.cc"))
         report("library", "only sources of core and tools include " path)
       if (path ~ /^CLI\// && folder != "cli" && folder != "bench")
         report("library", "only cli and bench include " path)
@@ -125,7 +125,7 @@ sources() {
         report("plugin", "plugins are loaded, not included: " path)
       # core/CMakeLists.txt writes headers_hash.h.
       if (folder ~ /^(core|tools)$/ && foreign_to_library(path, bracket) &&
-          path != "alidade/host/headers_hash.h")
+          path != "alidade/plugin/headers_hash.h")
         report("core", "not a header of " folder ", or not by its full path: " path)
       if (folder ~ /^(core|tools)$/ && path ~ /^alidade\// && floor_of(path) > floor_of(FILENAME))
         report("order", "a room that stands above: " path)
@@ -290,28 +290,28 @@ allow() {
 
 check "$copy" || { echo "the tree itself is not clean"; failed=1; }
 
-plant spdx core/alidade/run/new.cc 'int x;'
+plant spdx core/alidade/experiment/new.cc 'int x;'
 plant spdx sensors/new.h '#pragma once'
 plant spdx cmake/New.cmake 'set(x 1)'
 plant spdx scripts/new '#!/bin/sh\ntrue'
 plant spdx tests/new/CMakeLists.txt 'project(x)'
-for header in sensors/scale_2d.h motion_models/constant.h alidade/run/no_such.h ../../sensors/scale_2d.h scale_2d.h \
+for header in sensors/scale_2d.h motion_models/constant.h alidade/experiment/no_such.h ../../sensors/scale_2d.h scale_2d.h \
   alidade/sensors/scale_2d.h run.h ../base/error.h alidade/record/recorder.h; do
-  plant core core/alidade/run/new.cc "$licence\n#include \"$header\""
+  plant core core/alidade/experiment/new.cc "$licence\n#include \"$header\""
 done
-plant core core/alidade/run/new.h "$licence\n#  include <sensors/scale_2d.h>"
+plant core core/alidade/experiment/new.h "$licence\n#  include <sensors/scale_2d.h>"
 plant core tools/alidade/sweep/new.cc "$licence\n#include \"sensors/scale_2d.h\""
 plant core tools/alidade/sweep/new.cc "$licence\n#include \"sweep.h\""
 plant order core/alidade/base/new.h "$licence\n#include \"alidade/config/config.h\""
 plant order core/alidade/model/new.h "$licence\n#include \"alidade/base/error.h\""
-plant order core/alidade/filter/new.cc "$licence\n#include \"alidade/run/run.h\""
+plant order core/alidade/estimation/new.cc "$licence\n#include \"alidade/experiment/run.h\""
 plant order tools/alidade/evaluate/new.cc "$licence\n#  include \"alidade/sweep/sweep.h\""
 for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_models/constant.h"' '<vector.h>' \
   '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<yaml-cpp/yaml.h>' '"alidade/model/no_such.h"' '"alidade/base/error.h"'; do
   plant model sensors/new.cc "$licence\n#include $header"
   plant model motion_models/new.cc "$licence\n#include ${header/stereo_disparity/scale_2d}"
 done
-for file in core/alidade/run/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
+for file in core/alidade/experiment/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
   plant plugin "$file" "$licence\n#include \"plugins/csv/csv.h\""
 done
 plant plugin tests/sensors/new.cc "$licence\n#include \"../../plugins/csv/csv.h\""
@@ -323,26 +323,26 @@ for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h;
   plant upward sensors/new.cc "$licence\n#include \"$header\""
 done
 for header in yaml-cpp/yaml.h boost/dll.hpp spdlog/spdlog.h openssl/evp.h nlohmann/json.hpp; do
-  plant library core/alidade/run/new.h "$licence\n#include <$header>"
+  plant library core/alidade/experiment/new.h "$licence\n#include <$header>"
 done
 for file in plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <yaml-cpp/yaml.h>"
 done
-for file in core/alidade/run/new.cc plugins/csv/new.cc tests/core/new.cc; do
+for file in core/alidade/experiment/new.cc plugins/csv/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
 done
-plant library core/alidade/run/new.cc "$licence\n#include <ceres/problem.h>"
+plant library core/alidade/experiment/new.cc "$licence\n#include <ceres/problem.h>"
 plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
-plant library core/alidade/run/new.cc "$licence\n#include <opencv2/core.hpp>"
+plant library core/alidade/experiment/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library plugins/csv/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library tests/plugins/new.cc "$licence\n#include <opencv2/core.hpp>"
 for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);' 'if (x) std::quick_exit(1);' \
   'std::terminate();' '/* why */ abort();'; do
-  plant exit core/alidade/run/new.cc "$licence\n$call"
+  plant exit core/alidade/experiment/new.cc "$licence\n$call"
 done
 for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//");' 'puts("x");' \
   'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'std::print("x");'; do
-  plant print core/alidade/run/new.cc "$licence\n$call"
+  plant print core/alidade/experiment/new.cc "$licence\n$call"
 done
 for file in sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
   plant exit "$file" "$licence\nabort();"
@@ -351,7 +351,7 @@ done
 for name in ceres_batch fixed_lag ceres_bundle image_writer image_tracks depth_target alidade_ceres_bundle.so; do
   plant named tools/alidade/compare/new.h "$licence\nif (entry.name == \"$name\") return;"
 done
-plant named core/alidade/run/new.h "$licence\n/// As of ceres_batch."
+plant named core/alidade/experiment/new.h "$licence\n/// As of ceres_batch."
 for flag in -march=native -ffast-math -Ofast -mavx2; do
   plant flags sensors/CMakeLists.txt "add_compile_options($flag)"
   plant flags cmake/AlidadeAddPlugin.cmake "  target_compile_options(x PRIVATE $flag)  # fast"
@@ -359,15 +359,15 @@ for flag in -march=native -ffast-math -Ofast -mavx2; do
   plant flags CMakePresets.json "\"CMAKE_CXX_FLAGS\": \"$flag\""
 done
 
-allow core/alidade/run/new.cc "$licence\n#include <yaml-cpp/yaml.h>\n#include <boost/dll.hpp>\n#include <spdlog/spdlog.h>\n#include <sys/stat.h>\n#include \"alidade/base/error.h\""
+allow core/alidade/experiment/new.cc "$licence\n#include <yaml-cpp/yaml.h>\n#include <boost/dll.hpp>\n#include <spdlog/spdlog.h>\n#include <sys/stat.h>\n#include \"alidade/base/error.h\""
 plant library core/alidade/base/number_text.h '#include <nlohmann/json_fwd.hpp>'
-plant library core/alidade/base/json.h '#include <nlohmann/json.hpp>'
-allow core/alidade/base/json.h '#include <nlohmann/json_fwd.hpp>'
-allow tests/core/base/json_test.cc '#include <nlohmann/json.hpp>'
-allow core/alidade/run/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
-allow core/alidade/run/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
-allow core/alidade/run/new.cc "$licence\nif (fork() == 0) _exit(0);"
-allow core/alidade/run/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kSlidingWindow);  // my_fixed_lag_s"
+plant library core/alidade/io/json.h '#include <nlohmann/json.hpp>'
+allow core/alidade/io/json.h '#include <nlohmann/json_fwd.hpp>'
+allow tests/core/io/json_test.cc '#include <nlohmann/json.hpp>'
+allow core/alidade/experiment/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
+allow core/alidade/experiment/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
+allow core/alidade/experiment/new.cc "$licence\nif (fork() == 0) _exit(0);"
+allow core/alidade/experiment/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kSlidingWindow);  // my_fixed_lag_s"
 allow plugins/csv/new.cc "$licence\nconst char* kName = \"ceres_batch\";"
 allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model/model.h\""
 allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "alidade/sweep/sweep.h"
 #include "bench/accuracy/bootstrap.h"
 #include "bench/accuracy/pair_series.h"

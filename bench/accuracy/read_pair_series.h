@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 #include "bench/accuracy/pair_series.h"
 
 namespace alidade::bench {

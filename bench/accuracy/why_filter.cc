@@ -21,9 +21,9 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/run.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"
-#include "alidade/run/run.h"
 #include "bench/speed/interleaved.h"
 
 namespace {

@@ -29,8 +29,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
-#include "alidade/filter/estimator.h"
-#include "alidade/host/in_process.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/plugin/in_process.h"
 #include "bench/speed/interleaved.h"
 #include "motion_models/quaternion_pose.h"
 #include "plugins/ceres/batch/kkt_covariance.h"

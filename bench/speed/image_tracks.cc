@@ -25,9 +25,9 @@
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/base/read_file.h"
-#include "alidade/run/estimator_guide.h"
-#include "alidade/run/experiment.h"
+#include "alidade/experiment/estimator_guide.h"
+#include "alidade/experiment/experiment.h"
+#include "alidade/io/read_file.h"
 #include "bench/speed/interleaved.h"
 #include "support/temporary_folder.h"
 

@@ -8,9 +8,9 @@
 #include <cstdio>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
-#include "alidade/host/in_process.h"
+#include "alidade/estimation/ekf.h"
 #include "alidade/model/model.h"
+#include "alidade/plugin/in_process.h"
 #include "bench/speed/interleaved.h"
 
 namespace alidade::bench {

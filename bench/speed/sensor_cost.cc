@@ -21,7 +21,7 @@
 #include <numbers>
 #include <vector>
 
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 #include "alidade/sweep/sweep.h"
 #include "bench/speed/interleaved.h"
 #include "plugins/ceres/bundle/geometry_manifold.h"

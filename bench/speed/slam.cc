@@ -39,7 +39,7 @@
 #include <vector>
 
 #include "alidade/base/random.h"
-#include "alidade/run/make_filter.h"
+#include "alidade/experiment/make_filter.h"
 #include "alidade/state/vector_kernels.h"
 #include "bench/speed/interleaved.h"
 #include "bench/speed/slam_peer.h"

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "alidade/base/statistics.h"
-#include "alidade/filter/ekf.h"
+#include "alidade/estimation/ekf.h"
 #include "alidade/model/static_ekf.h"
 #include "bench/speed/depth_step.h"
 #include "bench/speed/interleaved.h"

@@ -2,8 +2,8 @@
 //
 // A filter in a program of one's own: measurements as they come, the estimate when it is wanted.
 // Reads lines `t_s stream value` from standard input.
-#include <alidade/run/experiment.h>
-#include <alidade/run/make_filter.h>
+#include <alidade/experiment/experiment.h>
+#include <alidade/experiment/make_filter.h>
 
 #include <cstdio>
 #include <iostream>

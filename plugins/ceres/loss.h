@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "alidade/system/robust_loss.h"
+#include "alidade/estimation/robust_loss.h"
 
 namespace alidade::ceres_batch {
 

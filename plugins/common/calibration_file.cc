@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/base/read_file.h"
+#include "alidade/io/read_file.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "alidade/base/number_rows.h"
+#include "alidade/io/number_rows.h"
 
 /// The files next to a file of tracks, read along with it.
 namespace alidade {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "alidade/host/cpp_plugin.h"
-#include "alidade/host/plugin_file.h"
+#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 

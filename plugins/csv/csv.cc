@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/base/line_reader.h"
-#include "alidade/base/text_cell.h"
+#include "alidade/io/line_reader.h"
+#include "alidade/io/text_cell.h"
 #include "csv_calibration.h"
 #include "csv_layout.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "alidade/base/error.h"
-#include "alidade/base/text_cell.h"
+#include "alidade/io/text_cell.h"
 
 namespace alidade {
 

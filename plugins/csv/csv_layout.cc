@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/base/text_cell.h"
+#include "alidade/io/text_cell.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade {
 

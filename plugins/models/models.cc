@@ -15,8 +15,8 @@
 #include "alidade/base/error.h"
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
-#include "alidade/system/system.h"
+#include "alidade/estimation/system.h"
+#include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade {
 

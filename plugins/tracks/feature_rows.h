@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/base/number_rows.h"
+#include "alidade/io/number_rows.h"
 
 namespace alidade {
 

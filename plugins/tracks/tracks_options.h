@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "bench/accuracy/bootstrap.h"
 #include "bench/accuracy/pair_series.h"
 #include "bench/accuracy/read_pair_series.h"

@@ -10,8 +10,8 @@
 #include <map>
 
 #include "alidade/base/number_text.h"
+#include "alidade/experiment/run.h"
 #include "alidade/record/simulate.h"
-#include "alidade/run/run.h"
 #include "support/temporary_folder.h"
 
 namespace alidade {

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
-#include "alidade/host/in_process.h"
-#include "alidade/run/run.h"
+#include "alidade/estimation/ekf.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/in_process.h"
 #include "sensors/inverse_depth_feature.h"
 
 namespace alidade {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/run/experiment.h"
-#include "alidade/run/make_filter.h"
+#include "alidade/experiment/experiment.h"
+#include "alidade/experiment/make_filter.h"
 
 namespace alidade {
 namespace {

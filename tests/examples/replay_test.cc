@@ -21,8 +21,8 @@
 #include <vector>
 
 #include "alidade/base/number_text.h"
-#include "alidade/host/source.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/source.h"
 #include "drives.h"
 
 namespace alidade {

@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "alidade/filter/ekf.h"
-#include "alidade/run/run.h"
+#include "alidade/estimation/ekf.h"
+#include "alidade/experiment/run.h"
 #include "examples/09_static_depth/measurements.h"
 
 namespace alidade {

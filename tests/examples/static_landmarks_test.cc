@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "alidade/experiment/run.h"
 #include "alidade/model/static_ekf.h"
-#include "alidade/run/run.h"
 #include "motion_models/constant.h"
 #include "motion_models/quaternion_pose.h"
 #include "sensors/inverse_depth_feature.h"

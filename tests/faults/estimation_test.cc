@@ -6,8 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "alidade/filter/frame_loop.h"
-#include "alidade/filter/iekf.h"
+#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/iekf.h"
 #include "support/recording.h"
 #include "support/systems.h"
 

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "support/program.h"
 
 namespace alidade {

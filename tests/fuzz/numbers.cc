@@ -5,8 +5,8 @@
 #include <cstring>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_cell.h"
 #include "alidade/config/config.h"
+#include "alidade/io/text_cell.h"
 #include "fuzz.h"
 
 namespace alidade::fuzz {

@@ -20,8 +20,8 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
-#include "alidade/host/source.h"
+#include "alidade/plugin/plugin_host.h"
+#include "alidade/plugin/source.h"
 #include "support/program.h"
 
 namespace alidade {

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
-#include "alidade/filter/ekf.h"
-#include "alidade/filter/ukf.h"
-#include "alidade/host/in_process.h"
+#include "alidade/estimation/ekf.h"
+#include "alidade/estimation/ukf.h"
+#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 #include "support/model_maker.h"
 

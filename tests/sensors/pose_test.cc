@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 
 namespace alidade {

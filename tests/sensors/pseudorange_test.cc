@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "alidade/base/error.h"
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 
 namespace alidade {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 
 namespace alidade {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/host/in_process.h"
 #include "alidade/model/camera.h"
+#include "alidade/plugin/in_process.h"
 #include "support/landmarks.h"
 #include "support/model_checks.h"
 

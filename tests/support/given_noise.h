@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 
 /// Models of this process whose noise is given in place of their own, for tests.
 namespace alidade::testing {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
-#include "alidade/filter/ekf.h"
-#include "alidade/host/in_process.h"
+#include "alidade/estimation/ekf.h"
+#include "alidade/plugin/in_process.h"
 #include "support/landmark_sensors.h"
 
 /// Small systems with landmarks composed in C++, for tests.

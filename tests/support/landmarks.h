@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/host/in_process.h"
 #include "alidade/model/camera.h"
 #include "alidade/model/landmark.h"
+#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 
 /// Landmarks of every representation before a camera, and what tests of sensors of landmarks ask of

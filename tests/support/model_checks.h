@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "alidade/host/model_instance.h"
+#include "alidade/plugin/model_instance.h"
 #include "support/numeric_jacobian.h"
 
 /// What the tests of models ask of them, through the plugin ABI.

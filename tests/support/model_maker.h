@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/model_instance.h"
 #include "alidade/model/plugin.h"
+#include "alidade/plugin/model_instance.h"
 
 namespace alidade::testing {
 

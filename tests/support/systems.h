@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
-#include "alidade/host/in_process.h"
+#include "alidade/estimation/ekf.h"
+#include "alidade/plugin/in_process.h"
 #include "motion_models/constant_velocity.h"
 
 /// Small systems composed in C++, for tests.

@@ -7,8 +7,8 @@
 #include <cstring>
 #include <unordered_map>
 
-#include "alidade/base/read_file.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/read_file.h"
 
 namespace alidade {
 namespace fs = std::filesystem;

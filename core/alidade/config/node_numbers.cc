@@ -3,9 +3,9 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
 #include "alidade/config/tree.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {

@@ -8,8 +8,8 @@
 #include <sstream>
 #include <unordered_map>
 
-#include "alidade/base/utf8.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/utf8.h"
 
 namespace alidade::internal {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "alidade/base/follow_links.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/follow_links.h"
 
 namespace alidade {
 namespace fs = std::filesystem;

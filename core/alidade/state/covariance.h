@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
-#include "alidade/base/workspace.h"
+#include "alidade/state/eigen_alignment.h"
 #include "alidade/state/jacobian_rows.h"
 #include "alidade/state/outside_correlation.h"
+#include "alidade/state/workspace.h"
 
 namespace alidade {
 

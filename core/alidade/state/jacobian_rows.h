@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "alidade/base/eigen_alignment.h"
+#include "alidade/state/eigen_alignment.h"
 
 namespace alidade {
 

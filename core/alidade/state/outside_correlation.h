@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "alidade/base/workspace.h"
 #include "alidade/state/jacobian_rows.h"
+#include "alidade/state/workspace.h"
 
 namespace alidade {
 

@@ -13,7 +13,7 @@ double At(const ConstLowerTriangle& p, int i, int j) { return p(std::max(i, j), 
 
 /// L L' = A + d Var, d the least that the rounding of A asks for, in place of the lower triangle of
 /// A; `variances` are those that A comes from.
-void TakeRoot(internal::MatrixRef a, const Eigen::VectorXd& variances) {
+void TakeRoot(internal::MutableMatrix a, const Eigen::VectorXd& variances) {
   constexpr double kMost = 1e-3;
   const Eigen::MatrixXd before = a;
   const Eigen::VectorXd scale = (variances.array() > 0.0).select(variances, 1.0);

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
 #include "alidade/state/covariance.h"
+#include "alidade/state/eigen_alignment.h"
 #include "alidade/state/manifold.h"
 #include "alidade/state/postponed.h"
 

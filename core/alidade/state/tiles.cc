@@ -18,7 +18,7 @@ Strided ByColumns(const ConstMatrix& a) { return {a.data(), 1, a.outerStride()};
 Strided Transposed(const ConstMatrix& a) { return {a.data(), a.outerStride(), 1}; }
 
 /// C <- C + sign A B of the given depth.
-void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
+void Add(MutableMatrix& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
          bool lower = false) {
   BestVectorKernels().add_product(c.rows(), c.cols(), depth, a, b, c.data(), c.outerStride(), sign,
                                   lower);
@@ -26,24 +26,24 @@ void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, d
 
 }  // namespace
 
-void AddProduct(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
+void AddProduct(MutableMatrix c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
   Add(c, a.cols(), ByColumns(a), ByColumns(b), sign);
 }
 
-void AddProductWithTransposed(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b,
+void AddProductWithTransposed(MutableMatrix c, const ConstMatrix& a, const ConstMatrix& b,
                               double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(b), sign);
 }
 
-void AddOuterProduct(MatrixRef c, const ConstMatrix& a, double sign) {
+void AddOuterProduct(MutableMatrix c, const ConstMatrix& a, double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(a), sign, true);
 }
 
-void AddSymmetricProduct(MatrixRef c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
+void AddSymmetricProduct(MutableMatrix c, const ConstMatrix& a, const ConstMatrix& b, double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(b), sign, true);
 }
 
-void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrix& a) {
+void AddOuterProduct(MutableMatrix c, std::span<const int> rows, const ConstMatrix& a) {
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
       const int row = rows[static_cast<std::size_t>(i)], column = rows[static_cast<std::size_t>(j)];
@@ -52,7 +52,7 @@ void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrix& 
   }
 }
 
-void DivideByTransposed(const ConstMatrix& l, MatrixRef b) {
+void DivideByTransposed(const ConstMatrix& l, MutableMatrix b) {
   BestVectorKernels().divide_by_transposed(b.rows(), l.rows(), l.data(), l.outerStride(), b.data(),
                                            b.outerStride());
 }
@@ -61,15 +61,15 @@ void DivideByTransposed(const ConstMatrix& l, const Panels& b) {
   BestVectorKernels().divide_panels(b.rows, b.columns, l.data(), l.outerStride(), b.data);
 }
 
-void SubtractOuterProduct(MatrixRef c, const Panels& w) {
+void SubtractOuterProduct(MutableMatrix c, const Panels& w) {
   BestVectorKernels().subtract_outer_product(w.rows, w.columns, w.data, c.data(), c.outerStride());
 }
 
-void Multiply(const Panels& a, const ConstVectorRef& x, VectorRef product, double* squares) {
+void Multiply(const Panels& a, const ConstVector& x, MutableVector product, double* squares) {
   BestVectorKernels().multiply_panels(a.rows, a.columns, a.data, x.data(), product.data(), squares);
 }
 
-void Copy(const Panels& a, MatrixRef to) {
+void Copy(const Panels& a, MutableMatrix to) {
   for (Eigen::Index at = 0; at < a.rows; at += a.height) {
     const Eigen::Map<const Eigen::MatrixXd> panel(a.data + at * a.columns, a.height, a.columns);
     const Eigen::Index count = std::min<Eigen::Index>(a.height, a.rows - at);
@@ -82,7 +82,7 @@ Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m) {
   return {work.Take((n + height - 1) / height * height, m).data(), n, m, height};
 }
 
-void Divide(const ConstMatrix& l, MatrixRef b) {
+void Divide(const ConstMatrix& l, MutableMatrix b) {
   ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
     const Eigen::Index j = l.rows() - from_end - columns;
     AddProduct(b.middleCols(j, columns), b.rightCols(from_end),
@@ -96,7 +96,7 @@ void Divide(const ConstMatrix& l, MatrixRef b) {
   });
 }
 
-bool Joseph(MatrixRef p, const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r,
+bool Joseph(MutableMatrix p, const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r,
             Workspace& work) {
   const Workspace::Use use(work);
   const Eigen::Index n = p.rows(), m = h.rows();
@@ -114,7 +114,7 @@ bool Joseph(MatrixRef p, const ConstMatrix& k, const ConstMatrix& h, const Const
   return true;
 }
 
-bool Factorise(MatrixRef s) {
+bool Factorise(MutableMatrix s) {
   return BestVectorKernels().factorise(s.rows(), s.data(), s.outerStride());
 }
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/filter/support.h"
-#include "alidade/host/cpp_plugin.h"
+#include "alidade/estimation/support.h"
+#include "alidade/plugin/cpp_plugin.h"
 #include "condensed_run.h"
 #include "fixed_lag.h"
 #include "incremental_solve.h"

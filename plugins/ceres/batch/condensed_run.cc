@@ -7,9 +7,9 @@
 #include <numeric>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/rows.h"
+#include "alidade/estimation/rows.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade::ceres_batch {
 namespace {

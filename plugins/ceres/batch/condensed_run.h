@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/binding.h"
-#include "alidade/filter/estimator.h"
-#include "alidade/filter/timeline.h"
-#include "alidade/host/source.h"
+#include "alidade/estimation/binding.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/estimation/landmark_representation.h"
+#include "alidade/estimation/timeline.h"
+#include "alidade/plugin/source.h"
 #include "alidade/state/state.h"
-#include "alidade/system/landmark_representation.h"
 
 namespace alidade::ceres_batch {
 

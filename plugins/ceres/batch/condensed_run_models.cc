@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/first_values.h"
+#include "alidade/estimation/first_values.h"
 #include "alidade/model/geometry.h"
+#include "alidade/state/dense_algebra.h"
 #include "condensed_run.h"
 #include "plugins/ceres/difference.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/base/dense_algebra.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade::ceres_batch {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/filter/support.h"
-#include "alidade/host/cpp_plugin.h"
+#include "alidade/estimation/support.h"
+#include "alidade/plugin/cpp_plugin.h"
 
 namespace alidade::ceres_batch {
 

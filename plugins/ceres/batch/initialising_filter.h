@@ -5,7 +5,7 @@
 #include <iterator>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
+#include "alidade/estimation/ekf.h"
 
 namespace alidade::ceres_batch {
 

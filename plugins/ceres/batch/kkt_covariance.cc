@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "alidade/base/dense_algebra.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade::ceres_batch {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/base/dense_algebra.h"
+#include "alidade/state/dense_algebra.h"
 #include "condensed_run.h"
 
 /// The landmarks of a CondensedRun: how they are initialised in it, and where they cost least.

@@ -11,9 +11,9 @@
 #include <cmath>
 #include <optional>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/state/dense_algebra.h"
 #include "plugins/ceres/loss.h"
 
 namespace alidade::ceres_batch {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/host/cpp_plugin.h"
+#include "alidade/plugin/cpp_plugin.h"
 #include "condensed_run.h"
 
 namespace alidade::ceres_batch {

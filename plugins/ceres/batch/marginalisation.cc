@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "alidade/base/dense_algebra.h"
+#include "alidade/state/dense_algebra.h"
 #include "condensed_run.h"
 
 /// How the first frame of a CondensedRun becomes part of its prior.

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "alidade/base/dense_algebra.h"
-#include "alidade/system/landmark_representation.h"
+#include "alidade/estimation/landmark_representation.h"
+#include "alidade/state/dense_algebra.h"
 #include "condensed_run.h"
 
 /// A CondensedRun with landmarks as a problem in e alone, and the map that belongs to a solution.

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/state/dense_algebra.h"
 #include "kkt_covariance.h"
 
 namespace alidade::ceres_batch {

@@ -10,10 +10,10 @@
 #include <map>
 #include <memory>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/bundle/bundle.h"
-#include "alidade/host/cpp_plugin.h"
+#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/state/covariance.h"
+#include "alidade/state/dense_algebra.h"
 #include "geometry_manifold.h"
 #include "plugins/ceres/loss.h"
 #include "sensor_cost.h"

@@ -3,7 +3,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade {
 

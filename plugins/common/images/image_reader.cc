@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "alidade/base/error.h"
-#include "alidade/base/read_file.h"
+#include "alidade/io/read_file.h"
 #include "plugins/common/images/camera_size.h"
 
 namespace alidade {

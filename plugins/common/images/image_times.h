@@ -8,9 +8,9 @@
 #include <optional>
 #include <string>
 
-#include "alidade/base/number_rows.h"
 #include "alidade/base/timestamp.h"
 #include "alidade/config/config.h"
+#include "alidade/io/number_rows.h"
 #include "plugins/common/images/image_reader.h"
 
 namespace alidade {

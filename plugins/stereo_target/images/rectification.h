@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/base/read_file.h"
 #include "alidade/config/config.h"
+#include "alidade/io/read_file.h"
 
 namespace alidade {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/number_rows.h"
+#include "alidade/io/number_rows.h"
 
 /// The tables next to the images of a target, read along with them.
 namespace alidade {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/number_rows.h"
+#include "alidade/io/number_rows.h"
 #include "feature_tracker.h"
 #include "plugins/common/calibration_file.h"
 #include "plugins/common/companion_files.h"

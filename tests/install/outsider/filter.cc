@@ -2,9 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "alidade/estimation/ekf.h"
 #include "alidade/evaluate/trajectory.h"
-#include "alidade/filter/ekf.h"
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "alidade/host/plugin_host.h"
 #include "alidade/motion_models/constant_velocity.h"
+#include "alidade/plugin/plugin_host.h"
 #include "alidade/sensors/stereo_disparity.h"
 
 // 0 where a shipped model works as a plain struct and the installed library finds its plugins.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/compare/compare.h"
-#include "alidade/filter/rts.h"
+#include "alidade/estimation/rts.h"
 #include "batch_fixture.h"
 
 namespace alidade {

@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
-#include "alidade/filter/rts.h"
-#include "alidade/run/run.h"
+#include "alidade/estimation/rts.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/comma_locale.h"
 #include "support/landmark_models.h"

@@ -3,7 +3,7 @@
 // Batch and fixed lag over gaps that are split: noise that a model holds is one input of each gap.
 #include <cmath>
 
-#include "alidade/filter/rts.h"
+#include "alidade/estimation/rts.h"
 #include "batch_fixture.h"
 
 namespace alidade {

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "alidade/run/experiment.h"
+#include "alidade/experiment/experiment.h"
 #include "batch_landmarks_fixture.h"
 #include "plugins/scene/scene_fixture.h"
 

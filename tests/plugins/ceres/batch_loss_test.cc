@@ -2,7 +2,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 
 namespace alidade {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/inspect/plugin_listing.h"
-#include "alidade/run/run.h"
+#include "alidade/check/plugin_listing.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 
 namespace alidade {

@@ -6,8 +6,8 @@
 
 #include <string>
 
-#include "alidade/host/plugin_host.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
 
 namespace alidade {

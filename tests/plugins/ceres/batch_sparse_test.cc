@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "batch_landmarks_fixture.h"
 #include "support/driven.h"
 #include "support/manifold_models.h"

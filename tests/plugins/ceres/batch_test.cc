@@ -2,8 +2,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "alidade/inspect/plugin_listing.h"
-#include "alidade/run/run.h"
+#include "alidade/check/plugin_listing.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "plugins/depth_target/depth_target.h"
 #include "support/manifold_models.h"

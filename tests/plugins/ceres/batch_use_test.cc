@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A batch over what a filter accepted, and a batch in the place of truth.
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/recording.h"
 

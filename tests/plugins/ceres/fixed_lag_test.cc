@@ -3,7 +3,7 @@
 // The fixed-lag smoother against the batch, the Kalman filter, and itself before frames left it.
 #include <cmath>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/manifold_models.h"
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "alidade/host/in_process.h"
+#include "alidade/plugin/in_process.h"
 #include "plugins/ceres/bundle/geometry_manifold.h"
 #include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_disparity.h"

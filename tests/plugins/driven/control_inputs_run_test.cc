@@ -5,10 +5,10 @@
 #include <cmath>
 #include <sstream>
 
-#include "alidade/inspect/check.h"
-#include "alidade/inspect/explain.h"
+#include "alidade/check/check.h"
+#include "alidade/check/explain.h"
+#include "alidade/experiment/run.h"
 #include "alidade/replay/replay.h"
-#include "alidade/run/run.h"
 #include "plugins/host/host_fixture.h"
 #include "support/recording.h"
 

@@ -2,7 +2,7 @@
 //
 // Every shipped model, from its one struct: as a plugin under the engine and the batch, composed at
 // compile time, and under the checker. A model without a row fails.
-#include "alidade/inspect/check.h"
+#include "alidade/check/check.h"
 #include "every_model_fixture.h"
 
 namespace alidade::testing {

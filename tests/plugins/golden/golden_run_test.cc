@@ -7,10 +7,10 @@
 #include <map>
 #include <sstream>
 
-#include "alidade/base/sha256.h"
-#include "alidade/inspect/check.h"
-#include "alidade/inspect/plugin_listing.h"
-#include "alidade/run/run.h"
+#include "alidade/check/check.h"
+#include "alidade/check/plugin_listing.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/sha256.h"
 #include "golden_fixture.h"
 #include "support/recording.h"
 

@@ -2,7 +2,7 @@
 //
 // A plugin of a later minor version, later.c, in this host: what it need not understand it does
 // without, all else it refuses by name.
-#include "alidade/inspect/check.h"
+#include "alidade/check/check.h"
 #include "plugins/host/host_fixture.h"
 
 namespace alidade {

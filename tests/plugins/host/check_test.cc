@@ -2,7 +2,7 @@
 //
 // Every model of tests/faults/plugins/bad_models.cc has one fault: the check that is made for it
 // must find it and say so, and no other may.
-#include "alidade/inspect/check.h"
+#include "alidade/check/check.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -4,8 +4,8 @@
 // entry.
 #include <cmath>
 
-#include "alidade/host/plugin_host.h"
-#include "alidade/system/system.h"
+#include "alidade/estimation/system.h"
+#include "alidade/plugin/plugin_host.h"
 #include "host_fixture.h"
 
 namespace alidade {

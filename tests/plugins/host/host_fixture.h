@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/plugin_host.h"
+#include "alidade/plugin/plugin_host.h"
 #include "support/temporary_folder.h"
 
 namespace alidade {

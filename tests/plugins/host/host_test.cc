@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "alidade/host/cpp_plugin.h"
+#include "alidade/plugin/cpp_plugin.h"
 #include "host_fixture.h"
 
 namespace alidade {

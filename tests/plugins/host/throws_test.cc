@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // FAULTS 58: exceptions of plugins that are written against the C header, which forbids them.
-#include "alidade/base/log.h"
+#include "alidade/io/log.h"
 #include "host_fixture.h"
 
 namespace alidade {

@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/statistics.h"
-#include "alidade/host/plugin_host.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/plugin_host.h"
+#include "alidade/state/dense_algebra.h"
 #include "support/sanitized.h"
 
 namespace alidade {

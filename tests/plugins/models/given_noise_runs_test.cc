@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/plugin_host.h"
+#include "alidade/experiment/run.h"
 #include "alidade/model/geometry.h"
-#include "alidade/run/run.h"
+#include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
 #include "support/sanitized.h"
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/plugin_host.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
 #include "support/sanitized.h"
 

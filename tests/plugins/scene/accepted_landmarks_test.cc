@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "alidade/host/plugin_host.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/plugin/plugin_host.h"
 
 namespace alidade {
 namespace {

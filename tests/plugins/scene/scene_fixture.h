@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/param_reader.h"
+#include "alidade/plugin/param_reader.h"
 #include "plugins/scene/scene.h"
 
 namespace alidade::testing {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/param_reader.h"
+#include "alidade/plugin/param_reader.h"
 #include "plugins/tracks/tracks.h"
 #include "support/temporary_folder.h"
 

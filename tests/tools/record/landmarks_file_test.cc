@@ -9,9 +9,9 @@
 #include <cmath>
 
 #include "alidade/compare/finished_run.h"
+#include "alidade/experiment/map_metrics.h"
 #include "alidade/model/landmark.h"
 #include "alidade/record/landmarks_ply.h"
-#include "alidade/run/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
 

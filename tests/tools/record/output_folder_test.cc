@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/base/output_folder.h"
+#include "alidade/io/output_folder.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/sha256.h"
+#include "alidade/io/sha256.h"
 #include "alidade/record/report_html.h"
 #include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "alidade/base/words.h"
-#include "alidade/host/cpp_plugin.h"
-#include "alidade/host/plugin_file.h"
+#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/model_instance.h"
-#include "alidade/host/plugin_host.h"
-#include "alidade/system/robust_loss.h"
+#include "alidade/estimation/robust_loss.h"
+#include "alidade/plugin/model_instance.h"
+#include "alidade/plugin/plugin_host.h"
 
 /// Bundle adjustment: cameras and the points that they see, estimated together from the pixels.
 ///

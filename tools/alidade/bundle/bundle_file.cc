@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "alidade/base/read_file.h"
 #include "alidade/bundle/formats.h"
+#include "alidade/io/read_file.h"
 
 namespace alidade {
 namespace {

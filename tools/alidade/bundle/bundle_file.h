@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/bundle/bundle.h"
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 /// Files of bundle adjustment problems.
 ///

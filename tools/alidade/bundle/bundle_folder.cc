@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/output_folder.h"
+#include "alidade/io/json.h"
+#include "alidade/io/output_folder.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "alidade/base/error.h"
-#include "alidade/base/text_cell.h"
+#include "alidade/io/text_cell.h"
 
 namespace alidade::internal {
 

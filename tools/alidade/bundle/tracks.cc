@@ -4,10 +4,10 @@
 #include <map>
 #include <optional>
 
-#include "alidade/base/dense_algebra.h"
-#include "alidade/base/number_rows.h"
 #include "alidade/bundle/bundle_file.h"
+#include "alidade/io/number_rows.h"
 #include "alidade/model/geometry.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {

@@ -3,14 +3,14 @@
 #include <map>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
-#include "alidade/filter/built_in.h"
-#include "alidade/host/calibration.h"
-#include "alidade/run/named_estimator.h"
+#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/named_estimator.h"
+#include "alidade/io/text_table.h"
+#include "alidade/plugin/calibration.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {

@@ -6,9 +6,9 @@
 #include <functional>
 #include <set>
 
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/compare/distance.h"
+#include "alidade/io/text_table.h"
 
 namespace alidade {
 

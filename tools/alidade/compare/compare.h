@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "alidade/compare/over_runs.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "alidade/sweep/sweep.h"
 
 /// Estimators over the same data, compared, and where their difference comes from

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "alidade/filter/estimator.h"
+#include "alidade/estimation/estimator.h"
 
 namespace alidade::internal {
 

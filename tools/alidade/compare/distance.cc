@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/base/dense_algebra.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade::internal {
 namespace {

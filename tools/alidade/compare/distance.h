@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "alidade/base/similarity.h"
+#include "alidade/experiment/similarity.h"
 #include "alidade/record/estimate_series.h"
 
 namespace alidade::internal {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/joint_nees.h"
 #include "alidade/record/errors_file.h"
-#include "alidade/run/joint_nees.h"
-#include "alidade/system/truth_match.h"
 
 namespace alidade::internal {
 namespace {

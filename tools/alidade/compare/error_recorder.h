@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "alidade/compare/over_runs.h"
-#include "alidade/run/cramer_rao.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/cramer_rao.h"
+#include "alidade/experiment/run.h"
 
 namespace alidade::internal {
 

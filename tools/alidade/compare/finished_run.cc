@@ -8,10 +8,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "alidade/base/number_rows.h"
-#include "alidade/base/read_file.h"
-#include "alidade/base/text_cell.h"
 #include "alidade/compare/json_node.h"
+#include "alidade/io/number_rows.h"
+#include "alidade/io/read_file.h"
+#include "alidade/io/text_cell.h"
 
 namespace alidade::internal {
 namespace {

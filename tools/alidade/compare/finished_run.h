@@ -8,9 +8,9 @@
 
 #include "alidade/compare/cpu_clock.h"
 #include "alidade/compare/over_runs.h"
+#include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
 #include "alidade/record/run_json.h"
-#include "alidade/run/run.h"
 
 /// Runs as far as they are compared, from memory or from their folders.
 namespace alidade::internal {

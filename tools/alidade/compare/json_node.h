@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/base/json.h"
+#include "alidade/io/json.h"
 
 namespace alidade::internal {
 

@@ -5,14 +5,14 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/output_folder.h"
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/compare/compare.h"
 #include "alidade/compare/section.h"
-#include "alidade/run/metric_rows.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/json.h"
+#include "alidade/io/output_folder.h"
+#include "alidade/io/text_table.h"
 
 namespace alidade {
 

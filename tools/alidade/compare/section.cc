@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/compare/section.h"
 
-#include "alidade/base/text_table.h"
+#include "alidade/io/text_table.h"
 #include "alidade/record/report_html.h"
 
 namespace alidade::internal {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/compare/compare.h"
-#include "alidade/run/metric_rows.h"
+#include "alidade/experiment/metric_rows.h"
 
 namespace alidade::internal {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/figure_script.h"
 
 namespace alidade::internal {

@@ -3,8 +3,8 @@
 
 #include <functional>
 
-#include "alidade/base/output_folder.h"
 #include "alidade/compare/compare.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/record/figures.h"
 
 namespace alidade::internal {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 
-#include "alidade/base/read_file.h"
 #include "alidade/compare/compare.h"
 #include "alidade/compare/seed_figures.h"
+#include "alidade/io/read_file.h"
 #include "alidade/record/embedded.h"
 #include "alidade/record/report_html.h"
 

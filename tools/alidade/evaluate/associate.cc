@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_cell.h"
 #include "alidade/evaluate/evaluate.h"
+#include "alidade/io/text_cell.h"
 
 namespace alidade {
 namespace {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/statistics.h"
 #include "alidade/evaluate/errors.h"
 #include "alidade/evaluate/warnings.h"
 #include "alidade/model/geometry.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {

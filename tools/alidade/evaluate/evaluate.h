@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
-#include "alidade/base/similarity.h"
 #include "alidade/evaluate/trajectory.h"
+#include "alidade/experiment/similarity.h"
+#include "alidade/state/eigen_alignment.h"
 
 namespace alidade {
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <map>
 
-#include "alidade/base/number_rows.h"
 #include "alidade/base/statistics.h"
 #include "alidade/evaluate/evaluate.h"
+#include "alidade/io/number_rows.h"
 
 namespace alidade {
 namespace {

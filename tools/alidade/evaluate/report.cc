@@ -7,11 +7,11 @@
 #include <set>
 #include <utility>
 
-#include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
-#include "alidade/run/metric_rows.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/json.h"
+#include "alidade/io/text_table.h"
 
 namespace alidade {
 namespace {

@@ -8,9 +8,9 @@
 #include <numeric>
 #include <optional>
 
-#include "alidade/base/dense_algebra.h"
-#include "alidade/base/number_rows.h"
 #include "alidade/base/number_text.h"
+#include "alidade/io/number_rows.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {

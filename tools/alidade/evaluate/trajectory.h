@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
+#include "alidade/state/eigen_alignment.h"
 
 namespace alidade {
 

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "alidade/base/dense_algebra.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/evaluate/errors.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/contents.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/filter/estimator.h"
+#include "alidade/estimation/estimator.h"
 
 namespace alidade::internal {
 namespace {

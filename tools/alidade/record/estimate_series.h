@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/system.h"
 #include "alidade/state/state.h"
-#include "alidade/system/system.h"
 
 /// The estimates of a whole run, to be compared with those of another estimator.
 namespace alidade::internal {

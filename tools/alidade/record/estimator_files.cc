@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
+#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/frame_innovation.h"
 #include "alidade/record/estimate_series.h"
-#include "alidade/run/frame_innovation.h"
 #include "alidade/state/element_names.h"
-#include "alidade/system/truth_match.h"
 
 namespace alidade::internal {
 namespace {

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/errors_file.h"
 #include "alidade/record/pose_file.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

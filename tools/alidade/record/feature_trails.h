@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "alidade/filter/estimator.h"
+#include "alidade/estimation/estimator.h"
 #include "alidade/record/run_view.h"
 
 namespace alidade::internal {

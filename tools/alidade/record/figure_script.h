@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade::internal {
 

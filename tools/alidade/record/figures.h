@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/output_folder.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"

@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "alidade/base/json.h"
-#include "alidade/run/experiment.h"
+#include "alidade/experiment/experiment.h"
+#include "alidade/io/json.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/run/run.h"
-#include "alidade/system/system.h"
+#include "alidade/estimation/system.h"
+#include "alidade/experiment/run.h"
 
 namespace alidade {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/images.h"
 
-#include "alidade/host/cpp_plugin.h"
-#include "alidade/host/plugin_file.h"
+#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 #include "alidade/record/run_view.h"
 
 namespace alidade {

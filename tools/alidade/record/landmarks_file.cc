@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/io/csv_file.h"
 
 namespace alidade::internal {
 

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/output_folder.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/record/contents.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

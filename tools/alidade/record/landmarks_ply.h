@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/system/landmarks.h"
+#include "alidade/estimation/landmarks.h"
 
 namespace alidade::internal {
 

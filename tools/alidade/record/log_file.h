@@ -6,8 +6,8 @@
 #include <string>
 #include <thread>
 
-#include "alidade/base/log.h"
-#include "alidade/base/output_folder.h"
+#include "alidade/io/log.h"
+#include "alidade/io/output_folder.h"
 
 namespace alidade::internal {
 

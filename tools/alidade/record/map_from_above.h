@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "alidade/estimation/landmarks.h"
 #include "alidade/record/run_view.h"
-#include "alidade/system/landmarks.h"
 
 namespace alidade::internal {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "alidade/base/error.h"
-#include "alidade/base/output_file.h"
+#include "alidade/io/output_file.h"
 
 namespace alidade::internal {
 

@@ -9,10 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "alidade/base/json.h"
-#include "alidade/base/log.h"
-#include "alidade/base/output_folder.h"
-#include "alidade/base/read_file.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/json.h"
+#include "alidade/io/log.h"
+#include "alidade/io/output_folder.h"
+#include "alidade/io/read_file.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
@@ -25,7 +26,6 @@
 #include "alidade/record/timing_file.h"
 #include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/run/metric_rows.h"
 
 namespace alidade {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 
 namespace alidade {
 

@@ -2,11 +2,11 @@
 #include "alidade/record/report_html.h"
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_table.h"
-#include "alidade/base/utf8.h"
 #include "alidade/base/words.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/text_table.h"
+#include "alidade/io/utf8.h"
 #include "alidade/record/embedded.h"
-#include "alidade/run/metric_rows.h"
 
 namespace alidade::internal {
 namespace {

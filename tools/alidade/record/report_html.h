@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/run.h"
 #include "alidade/record/figures.h"
 #include "alidade/record/run_json.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

@@ -3,11 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "alidade/base/csv_file.h"
-#include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
-#include "alidade/run/metric_rows.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/csv_file.h"
+#include "alidade/io/json.h"
 
 namespace alidade::internal {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

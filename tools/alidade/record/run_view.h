@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
-#include "alidade/host/source.h"
+#include "alidade/plugin/source.h"
 
 namespace alidade {
 

@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/estimation/truth_match.h"
 #include "alidade/record/feature_trails.h"
 #include "alidade/record/images.h"
 #include "alidade/record/map_from_above.h"
 #include "alidade/record/partial_file.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/state/element_names.h"
-#include "alidade/system/truth_match.h"
 
 namespace alidade {
 namespace {

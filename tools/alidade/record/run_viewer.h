@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 
 namespace alidade {
 

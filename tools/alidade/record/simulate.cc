@@ -9,8 +9,8 @@
 #include <optional>
 #include <set>
 
-#include "alidade/base/csv_file.h"
-#include "alidade/base/json.h"
+#include "alidade/io/csv_file.h"
+#include "alidade/io/json.h"
 #include "alidade/record/images.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/state/element_names.h"

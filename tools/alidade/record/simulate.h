@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
+#include "alidade/plugin/plugin_host.h"
 
 namespace alidade {
 

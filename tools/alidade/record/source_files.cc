@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include "alidade/estimation/truth_match.h"
 #include "alidade/state/element_names.h"
-#include "alidade/system/truth_match.h"
 
 namespace alidade::internal {
 namespace {

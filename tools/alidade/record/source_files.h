@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/experiment/implied_state.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/pose_file.h"
-#include "alidade/run/implied_state.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
-#include "alidade/run/run.h"
 
 namespace alidade::internal {
 

@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <string_view>
 
-#include "alidade/base/sha256.h"
-#include "alidade/host/instruction_sets.h"
+#include "alidade/io/sha256.h"
+#include "alidade/plugin/instruction_sets.h"
 #include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {

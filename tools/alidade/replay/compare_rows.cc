@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <fstream>
 
-#include "alidade/base/output_file.h"
+#include "alidade/io/output_file.h"
 
 namespace alidade::internal {
 namespace {

@@ -9,9 +9,9 @@
 #include <system_error>
 
 #include "alidade/base/error.h"
-#include "alidade/base/json.h"
-#include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
+#include "alidade/io/json.h"
+#include "alidade/io/read_file.h"
 #include "alidade/replay/compare_rows.h"
 
 namespace alidade::internal {

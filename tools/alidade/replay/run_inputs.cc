@@ -9,11 +9,11 @@
 #include <sstream>
 #include <system_error>
 
-#include "alidade/base/json.h"
-#include "alidade/base/output_file.h"
-#include "alidade/base/read_file.h"
-#include "alidade/base/sha256.h"
 #include "alidade/base/words.h"
+#include "alidade/io/json.h"
+#include "alidade/io/output_file.h"
+#include "alidade/io/read_file.h"
+#include "alidade/io/sha256.h"
 #include "alidade/replay/build_ids.h"
 #include "alidade/replay/compare_rows.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
+#include "alidade/plugin/plugin_host.h"
 
 /// What a run folder was made from: `inputs.json`. Next to `config.resolved.yaml` it has all that
 /// it takes to make the same bytes again.

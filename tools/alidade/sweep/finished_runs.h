@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "alidade/base/output_folder.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/sweep/sweep.h"
 
 namespace alidade::internal {

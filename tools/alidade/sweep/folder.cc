@@ -8,11 +8,11 @@
 #include <system_error>
 #include <unordered_map>
 
-#include "alidade/base/csv_file.h"
-#include "alidade/base/json.h"
-#include "alidade/base/output_folder.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/csv_file.h"
+#include "alidade/io/json.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/replay/run_inputs.h"
-#include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"

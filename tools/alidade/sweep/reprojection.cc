@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "alidade/base/csv_file.h"
+#include "alidade/experiment/frame_innovation.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/figures.h"
-#include "alidade/run/frame_innovation.h"
 #include "alidade/sweep/value_labels.h"
 
 namespace alidade::internal {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/base/output_folder.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/sweep/sweep.h"
 
 /// The reprojection error over the frames of a varied sweep.

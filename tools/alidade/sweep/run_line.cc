@@ -5,8 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
+#include "alidade/io/json.h"
 
 namespace alidade::internal {
 namespace {

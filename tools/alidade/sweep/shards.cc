@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "alidade/base/json.h"
-#include "alidade/base/output_folder.h"
-#include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
+#include "alidade/io/json.h"
+#include "alidade/io/output_folder.h"
+#include "alidade/io/read_file.h"
 #include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/finished_runs.h"

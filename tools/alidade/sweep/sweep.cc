@@ -9,7 +9,7 @@
 #include <system_error>
 #include <thread>
 
-#include "alidade/base/log.h"
+#include "alidade/io/log.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/processors.h"
 #include "alidade/sweep/reprojection.h"

@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "alidade/base/statistics.h"
-#include "alidade/run/run.h"
+#include "alidade/experiment/run.h"
 #include "alidade/sweep/named_values.h"
 
 namespace alidade {
 
 namespace internal {
 class FinishedRuns;  // in alidade/sweep/finished_runs.h
-class OutputFolder;  // in alidade/base/output_folder.h
+class OutputFolder;  // in alidade/io/output_folder.h
 }  // namespace internal
 
 /// One of so many equal shares of the seeds, in order; counted from 1.

@@ -5,9 +5,9 @@
 #include <string_view>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
-#include "alidade/run/metric_rows.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/text_table.h"
 
 namespace alidade::internal {
 namespace {

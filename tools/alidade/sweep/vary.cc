@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
+#include "alidade/io/text_table.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/sweep_config.h"
 

@@ -10,11 +10,11 @@
 #include <limits>
 #include <optional>
 
-#include "alidade/base/csv_file.h"
 #include "alidade/base/number_text.h"
+#include "alidade/experiment/metric_rows.h"
+#include "alidade/io/csv_file.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/figures.h"
-#include "alidade/run/metric_rows.h"
 #include "alidade/sweep/table.h"
 #include "alidade/sweep/value_labels.h"
 

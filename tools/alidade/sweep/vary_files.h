@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "alidade/base/output_folder.h"
+#include "alidade/io/output_folder.h"
 #include "alidade/sweep/sweep.h"
 
 namespace alidade::internal {

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "alidade/host/abi_read.h"
+#include "alidade/plugin/abi_read.h"
 #include "plugins/golden/golden_fixture.h"
 
 namespace alidade {

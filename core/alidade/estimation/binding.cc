@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/binding.h"
+
+#include "alidade/base/error.h"
+#include "alidade/state/small_kernels.h"
+
+namespace alidade::internal {
+namespace {
+
+/// Lays a row of H out as wide as P, where no two roles have the same block.
+void MakeWhole(SensorPlace& place, int size) {
+  for (std::size_t i = 0; i < place.parts.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (place.parts[i].offset == place.parts[j].offset) return;
+    }
+  }
+  place.whole = true;
+  place.width = size;
+  std::size_t part = 0;
+  for (int& column : place.columns) {
+    if (column < 0) continue;
+    column = place.parts[part].column = place.parts[part].offset;
+    ++part;
+  }
+}
+
+/// Adds a role: a block's place, with a Jacobian or without.
+void AddRole(SensorPlace& place, const Block& block, bool jacobian, bool considered) {
+  place.values.push_back(block.value_offset);
+  place.columns.push_back(-1);
+  if (!jacobian || block.tangent_offset < 0) return;
+  const int size = block.geometry().tangent;
+  place.columns.back() = place.width;
+  place.parts.push_back({block.tangent_offset, size, place.width});
+  place.consider.push_back(considered);
+  place.width += size;
+}
+
+SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool small) {
+  SensorPlace place;
+  for (const RoleBinding& role : sensor.roles) {
+    const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
+    AddRole(place, block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
+  }
+  if (small && !sensor.model.has_landmark()) MakeWhole(place, initial.covariance().size());
+  place.strides.assign(sensor.roles.size(), place.width);
+  return place;
+}
+
+MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
+  MotionPlace place;
+  place.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
+  int column = 0;
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    const int size = block.geometry().tangent, offset = block.tangent_offset;
+    place.values.push_back(block.value_offset);
+    for (int k = 0; k < size; ++k) place.at.push_back(offset < 0 ? -1 : offset + k);
+    if (offset < 0) continue;
+    if (!place.parts.empty() && place.parts.back().offset + place.parts.back().size == offset) {
+      place.parts.back().size += size;
+    } else {
+      place.parts.push_back({offset, size, column});
+    }
+    column += size;
+  }
+  return place;
+}
+
+}  // namespace
+
+void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
+                              const std::vector<BlockId>& blocks) {
+  values.resize(first);
+  columns.resize(first);
+  for (const BlockId id : blocks) AddRole(*this, layout[id], true, false);
+  strides.assign(values.size(), width);
+}
+
+Binding::Binding(System of, const std::vector<StreamInfo>& from)
+    : system(std::move(of)),
+      streams(from),
+      initial(system.InitialState(true)),
+      stream_of_sensor(system.sensors.size(), -1) {
+  // Landmarks come behind: then P has no size of its own.
+  const bool small = IsSmall(initial.covariance()) && !system.landmarks;
+  for (const SensorBinding& sensor : system.sensors) {
+    sensor_places.push_back(PlaceOf(sensor, initial, small));
+  }
+  for (const MotionBinding& motion : system.motions) {
+    motion_places.push_back(PlaceOf(motion, initial.layout()));
+  }
+  for (std::size_t i = 0; i < system.sensors.size(); ++i) {
+    for (std::size_t s = 0; s < streams.size(); ++s) {
+      if (streams[s].name != system.sensors[i].stream) continue;
+      ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model.measurement().geometry.ambient);
+      ALIDADE_EXPECTS(streams[s].known == system.sensors[i].model.known_size());
+      stream_of_sensor[i] = static_cast<int>(s);
+    }
+  }
+}
+
+}  // namespace alidade::internal

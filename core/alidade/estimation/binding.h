@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "alidade/estimation/system.h"
+#include "alidade/plugin/source.h"
+#include "alidade/state/state.h"
+
+namespace alidade::internal {
+
+/// How a sensor touches the state, by places in x and P. The roles of a landmark, which come last,
+/// have theirs where a measurement names it.
+struct SensorPlace {
+  std::vector<int> values;          ///< by role: of its value in x; -1: it has none
+  std::vector<int> columns;         ///< by role: in a row of H; -1: no Jacobian
+  std::vector<int> strides;         ///< for the model: `width` for each role
+  std::vector<JacobianPart> parts;  ///< of a row of H
+  std::vector<bool> consider;       ///< of the parts
+  int width = 0;                    ///< of a row of H
+  bool whole = false;               ///< a row of H is as wide as P, with its columns
+
+  /// Gives its last roles, from `first` on, the places of the blocks of a landmark.
+  void PutLandmark(std::size_t first, const StateLayout& layout,
+                   const std::vector<BlockId>& blocks);
+};
+
+/// How a motion model moves the state, by places in x and P.
+struct MotionPlace {
+  std::vector<int> values;          ///< by block: in x
+  std::vector<JacobianPart> parts;  ///< of F, without the rows that are not in P
+  std::vector<int> at;              ///< in P, of each row of F; -1: not in P
+  bool holds = false;               ///< its noise is discrete
+};
+
+/// A system on its layout: which stream each sensor reads, and where its blocks and those of the
+/// motion models lie. Blocks of the system have their places from the start, also before they have
+/// a value, and never move; landmarks lie behind them.
+struct Binding {
+  /// `streams` are the source's, in the order of Measurement::stream. ContractViolation where a
+  /// sensor's stream has another size than it measures.
+  Binding(System system, const std::vector<StreamInfo>& streams);
+
+  const System system;
+  const std::vector<StreamInfo> streams;
+  const State initial;  ///< with a place for every block that has a prior
+  std::vector<SensorPlace> sensor_places;
+  std::vector<MotionPlace> motion_places;
+  std::vector<int> stream_of_sensor;  ///< -1: the source has none of that name
+};
+
+}  // namespace alidade::internal

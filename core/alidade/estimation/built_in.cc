@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/built_in.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "alidade/base/number_text.h"
+#include "alidade/estimation/iekf.h"
+#include "alidade/estimation/rts.h"
+#include "alidade/estimation/square_root_ekf.h"
+#include "alidade/estimation/ukf.h"
+#include "alidade/model/params.h"
+#include "alidade/plugin/param_reader.h"
+
+namespace alidade::internal {
+namespace {
+
+/// What every recursive filter reads.
+EkfOptions ReadCommon(Params& p) {
+  EkfOptions options;
+  options.gate = p.NumberOrNone("gate", "", "probability with which a measurement that fits passes",
+                                {0.0, 1.0, true, true})
+                     .value_or(options.gate);
+  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
+                                            "how the measurements of one timestamp make updates",
+                                            static_cast<int>(options.fuse)));
+  options.max_dt_s =
+      p.NumberOrNone("max_dt_s", "s", "longer gaps are stepped in equal parts", kPositive)
+          .value_or(options.max_dt_s);
+  return options;
+}
+
+EkfOptions ReadRecovering(Params& p) {
+  EkfOptions options = ReadCommon(p);
+  options.rejection_recovery = static_cast<RejectionRecovery>(p.Choice(
+      "rejection_recovery.action", {"reset", "inflate", "none"},
+      "what is done after so many rejections", static_cast<int>(options.rejection_recovery)));
+  options.rejection_recovery_after =
+      p.Integer("rejection_recovery.after", "rejections of one sensor in a row", 1, 1'000'000,
+                options.rejection_recovery_after);
+  options.max_covariance_repairs = p.Integer(
+      "max_covariance_repairs", "most repairs of a covariance; the next one ends the estimator", 0,
+      1'000'000, options.max_covariance_repairs);
+  return options;
+}
+
+EkfOptions ReadEkf(Params& p) {
+  EkfOptions options = ReadRecovering(p);
+  options.jacobian = static_cast<JacobianPolicy>(p.Choice(
+      "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
+      static_cast<int>(options.jacobian)));
+  options.covariance = static_cast<CovarianceForm>(
+      p.Choice("covariance", {"full", "compressed", "auto"},
+               "how landmarks that are not measured for a while are carried",
+               static_cast<int>(options.covariance)));
+  return options;
+}
+
+IekfOptions ReadIekf(Params& p) {
+  IekfOptions options{ReadRecovering(p)};
+  options.max_iterations = p.Integer("max_iterations", "most linearisations of an update", 2, 1000,
+                                     options.max_iterations);
+  options.tolerance = p.Number(
+      "tolerance", "", "step, in posterior standard deviations, at which an update has converged",
+      {0.0, 1.0, true, false}, options.tolerance);
+  return options;
+}
+
+UkfOptions ReadUkf(Params& p) {
+  UkfOptions options;
+  options.alpha = p.Number("alpha", "", "spread of the sigma points",
+                           {UkfOptions::kLeastAlpha, 1.0, false, false}, options.alpha);
+  options.beta = p.NonNegative("beta", "", "weight of what the centre adds; 2: best for a Gaussian",
+                               options.beta);
+  options.kappa =
+      p.NonNegative("kappa", "", "spread beyond the number of directions", options.kappa);
+  options.filter = ReadCommon(p);
+  return options;
+}
+
+Description DescribeCommon(const EkfOptions& options) { return {options, {}}; }
+Description DescribeEkf(const EkfOptions& options) {
+  const bool latest = options.jacobian == JacobianPolicy::kLatest;
+  constexpr const char* kForms[] = {
+      "full", "compressed: landmarks that are not measured are postponed",
+      "auto: landmarks that are not measured are postponed where that takes less time"};
+  return {options,
+          {{"jacobian", latest ? "latest: H at the estimate"
+                               : "first_estimate: H where stationary blocks started from"},
+           {"covariance", kForms[static_cast<int>(options.covariance)]}}};
+}
+Description DescribeIekf(const IekfOptions& options) {
+  return {options,
+          {{"max_iterations", std::to_string(options.max_iterations)},
+           {"tolerance", NumberText(options.tolerance) + " sigma of the posterior"}}};
+}
+Description DescribeUkf(const UkfOptions& options) {
+  return {options.filter,
+          {{"alpha, beta, kappa", NumberText(options.alpha) + ", " + NumberText(options.beta) +
+                                      ", " + NumberText(options.kappa)}}};
+}
+
+/// A type whose options `read` reads, an absent key as the default, and `describe` puts into words.
+template <class Filter, class Options>
+EstimatorType TypeOf(const char* name, const char* doc, Options (*read)(Params&),
+                     Description (*describe)(const Options&),
+                     EstimatorKind kind = EstimatorKind::kFilter) {
+  const auto options_of = [=](const Node& entry) {
+    ParamReader reader(entry, std::string("estimator '") + name + "'");
+    Params params(&reader.host());
+    const Options options = read(params);
+    reader.Check();
+    return options;
+  };
+  const auto maker_of = [=](const Node& entry) {
+    return [options = options_of(entry)](const System& system,
+                                         const std::vector<StreamInfo>& streams) {
+      return std::make_unique<Filter>(system, options, streams);
+    };
+  };
+  const auto schema = [=] {
+    ParamRecorder recorder;
+    recorder.Run([&] {
+      Params params(&recorder.host());
+      static_cast<void>(read(params));
+    });
+    return recorder.Result();
+  };
+  const auto description_of = [=](const Node& entry) { return describe(options_of(entry)); };
+  return {name, doc, Filter::kSupport, kind, maker_of, schema, description_of};
+}
+
+}  // namespace
+
+const std::vector<EstimatorType>& EstimatorTypes() {
+  static const std::vector<EstimatorType> types = {
+      TypeOf<Ekf>("ekf", "Extended Kalman filter.", ReadEkf, DescribeEkf),
+      TypeOf<Iekf>("iekf", "Iterated extended Kalman filter.", ReadIekf, DescribeIekf),
+      TypeOf<RtsSmoother>("rts", "Fixed-interval smoother after an extended Kalman filter.",
+                          ReadCommon, DescribeCommon, EstimatorKind::kSmoother),
+      TypeOf<SquareRootEkf>("square_root_ekf",
+                            "Extended Kalman filter that carries a square root of P.", ReadCommon,
+                            DescribeCommon),
+      TypeOf<Ukf>("ukf", "Unscented Kalman filter.", ReadUkf, DescribeUkf),
+  };
+  return types;
+}
+
+const EstimatorType* FindEstimatorType(std::string_view name) {
+  const auto& types = EstimatorTypes();
+  const auto found = std::ranges::find_if(types, [&](const auto& t) { return t.name == name; });
+  return found == types.end() ? nullptr : &*found;
+}
+
+}  // namespace alidade::internal

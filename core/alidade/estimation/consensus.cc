@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/consensus.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "alidade/base/random.h"
+#include "alidade/base/statistics.h"
+#include "alidade/state/projection.h"
+#include "alidade/state/small_kernels.h"
+#include "alidade/state/tiles.h"
+
+namespace alidade::internal {
+
+Consensus::Consensus(const System& system) {
+  for (const SensorBinding& sensor : system.sensors) {
+    const int dof = sensor.model.measurement().geometry.tangent;
+    const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
+    support_.push_back(ChiSquareQuantile(ransac.inlier_probability, dof));
+    rescue_.push_back(ChiSquareQuantile(ransac.rescue_probability, dof));
+  }
+}
+
+bool Consensus::IsAsked(std::span<Row* const> rows) {
+  return std::ranges::any_of(
+      rows, [](const Row* row) { return row->binding->outlier_rejection.has_value(); });
+}
+
+void Consensus::Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
+                      std::vector<Row*>& agreed, std::vector<Row*>& rest) {
+  matches_.clear();
+  for (Row* const row : rows) {
+    (row->binding->outlier_rejection ? matches_ : agreed).push_back(row);
+  }
+  FindBest(f, seed);
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    (best_[i] != 0 ? agreed : rest).push_back(matches_[i]);
+  }
+}
+
+/// The best support, in best_.
+void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
+  Random random(seed);
+  order_.resize(matches_.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  best_.assign(matches_.size(), 0);
+  std::ptrdiff_t most = 0;
+  double failure = 1.0;  // the least that a sensor allows
+  for (const Row* const row : matches_) {
+    failure = std::min(failure, 1.0 - row->binding->outlier_rejection->confidence);
+  }
+  double tries = static_cast<double>(order_.size());
+  for (std::size_t k = 0; static_cast<double>(k) < tries; ++k) {
+    const auto left = static_cast<double>(order_.size() - k);
+    std::swap(order_[k], order_[k + static_cast<std::size_t>(left * random.Uniform())]);
+    FindSupport(f, order_[k]);
+    ++f.report.landmarks.hypotheses;
+    const std::ptrdiff_t count = std::ranges::count(agrees_, 1);
+    if (count <= most) continue;
+    most = count;
+    best_ = agrees_;
+    const double share = static_cast<double>(count) / static_cast<double>(order_.size());
+    const double needed = share < 1.0 ? std::log(failure) / std::log1p(-share) : 1.0;
+    tries = std::min(tries, needed);
+  }
+}
+
+/// Which of the matches lie within their noise of what the state predicts that one of them corrects
+/// by itself, as an update would: consider states stay, and known roles are seen as they are.
+void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
+  const Workspace::Use use(f.work);
+  const Row& one = *matches_[hypothesis];
+  const MeasurementReport& own = *one.report;
+  const Eigen::Index n = f.size(), m = own.dof;
+  const std::span<Row* const> itself = std::span(matches_).subspan(hypothesis, 1);
+  Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
+  Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
+  s = Eigen::Map<const RowMajor>(one.R.data(), m, m);
+  Project(f.state.covariance(), one.jacobian(), pht.data(), s.data());
+  y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
+  ForEachConsidered(f, itself, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
+    pht.block(offset, at, size, k).setZero();
+  });
+  Factorise(s);  // positive definite: it has passed the gate
+  s.triangularView<Eigen::Lower>().solveInPlace(y);
+  s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+  dx.noalias() = pht * y;
+  f.state.Retract(dx.data(), f.moved);
+  agrees_.assign(matches_.size(), 0);
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    Row& row = *matches_[i];
+    const MeasurementReport& entry = *row.report;
+    h_.resize(entry.z.size());
+    r_.resize(static_cast<std::size_t>(entry.dof));
+    if (PredictAt(f, row, f.moved, h_.data()) != Outcome::kAccepted) continue;
+    row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
+    work_.resize(r_.size() * (r_.size() + 1));
+    const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, work_.data());
+    agrees_[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
+  }
+}
+
+}  // namespace alidade::internal

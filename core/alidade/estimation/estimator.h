@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/base/timestamp.h"
+#include "alidade/estimation/landmarks.h"
+#include "alidade/model/status.h"
+#include "alidade/plugin/source.h"
+#include "alidade/state/state.h"
+
+namespace alidade {
+
+/// What became of one measurement.
+enum class Outcome {
+  kAccepted,     ///< also while the frame goes on, as long as nothing speaks against it
+  kInitialised,  ///< consumed to initialise a block
+  kGated,
+  kOutOfDomain,  ///< h is not defined at the prediction
+  kInvalid,      ///< of no use: beyond the sensor's limits, or its covariance is none
+  kNotFinite,    ///< it is itself, its h, H, R or S, or the update, which was rolled back
+  kNotPd,        ///< the update would have lost positive definiteness, and was rolled back
+  kStale,        ///< older than the state
+  kNotReady,     ///< a block it needs has no value yet
+  kFailed,       ///< the plugin failed
+  kEnded,        ///< not looked at: the estimator has nothing left to go on with
+};
+inline constexpr int kOutcomes = static_cast<int>(Outcome::kEnded) + 1;
+const char* ToString(Outcome outcome);
+/// What a model's status means for the measurement; kOk is kAccepted.
+Outcome OutcomeOf(Status status);
+
+/// All that is known of one measurement; m = dof, its tangent size. Empty: not reached.
+struct MeasurementReport {
+  int sensor = -1;  ///< index into System::sensors
+  Outcome outcome = Outcome::kAccepted;
+  std::int64_t landmark = -1;
+  int dof = 0;
+  double nis = 0.0;                ///< r' S^-1 r, not divided by dof; S without the loss
+  std::vector<double> z, h;        ///< ambient
+  std::vector<double> innovation;  ///< r = z (-) h, m
+  std::vector<double> s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
+  /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
+  /// unless accepted.
+  std::vector<double> gain;
+
+  /// Makes it that of a new measurement, nothing reached yet. The memory is kept.
+  void Reset(int of_sensor, std::int64_t of_landmark, int of_dof) {
+    sensor = of_sensor;
+    landmark = of_landmark;
+    dof = of_dof;
+    outcome = Outcome::kAccepted;
+    nis = 0.0;
+    for (std::vector<double>* part : {&z, &h, &innovation, &s, &gain}) part->clear();
+  }
+};
+
+/// Something that happened to the filter, worth a line to its user.
+struct Event {
+  Timestamp timestamp = kNoTimestamp;
+  std::string kind;  ///< one word: diverged, rejection_recovery, conditioning, not_finite, ...
+  std::string text;
+  bool divergence = false;  ///< the estimator diverged or failed by this
+};
+
+/// Parts of the work of a frame, in its order; see Filter.
+enum class FramePart { kStep, kEvaluate, kGate, kUpdate, kLandmarks };
+inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
+
+/// What one frame did. Filled again and again without allocating.
+class UpdateReport {
+ public:
+  std::span<const MeasurementReport> measurements() const { return {pool_.data(), count_}; }
+  std::span<MeasurementReport> measurements() { return {pool_.data(), count_}; }
+  /// One more; references to the others end.
+  MeasurementReport& Add() {
+    const auto next = pool_.begin() + static_cast<std::ptrdiff_t>(count_++);
+    return next == pool_.end() ? pool_.emplace_back() : *next;
+  }
+  void Clear() {
+    stale = false;
+    inputs.clear();
+    landmarks = {};
+    removed_landmarks.clear();
+    spent_s = {};
+    ClearMeasurements();
+    events.clear();
+  }
+  void ClearMeasurements() { count_ = 0; }
+
+  bool stale = false;       ///< the frame is older than the state, which stays as it was
+  std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
+  std::vector<Event> events;
+  LandmarkCounts landmarks;
+  /// Those that the frame removed from the state, as they were then. Those of a batch are not here.
+  std::vector<LandmarkEstimate> removed_landmarks;
+  /// Time of the wall clock, by FramePart: of filters with landmarks; others take too little.
+  std::array<double, kFrameParts> spent_s{};
+
+ private:
+  std::vector<MeasurementReport> pool_;  ///< the first count_ are in use
+  std::size_t count_ = 0;
+};
+
+/// An estimator over one system. It takes values and returns values: it neither reads files nor
+/// prints nor exits.
+class Estimator {
+ public:
+  /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
+  using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
+
+  virtual ~Estimator() = default;
+  /// Sets the time of the initial state.
+  virtual void Start(Timestamp timestamp) = 0;
+  /// Steps to the frame's timestamp and uses those of its measurements that a sensor is bound to.
+  /// The report is good until the next call.
+  virtual const UpdateReport& Process(const Frame& frame) = 0;
+  /// True where an estimate depends on later frames too (a smoother, a batch): state() after
+  /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
+  virtual bool offline() const { return false; }
+  /// Once, after the last frame: the estimates of all frames, in their order. The events of the
+  /// smoothing itself come with the last report. Errors: where there is nothing to emit, or not
+  /// all, failed() turns true and the text of the error says why; whatever `emit` throws.
+  virtual void Smooth(const Emit& /*emit*/) {}
+  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
+  /// of kStopped. A null function never stops.
+  virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
+  /// A copy, whose every result from here on has the bits that this one's would have; null: it
+  /// cannot be copied.
+  virtual std::unique_ptr<Estimator> Clone() const { return nullptr; }
+  virtual const State& state() const = 0;
+  /// The landmarks in the state, by id.
+  virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
+  virtual Timestamp timestamp() const = 0;
+  /// True once the filter left the domain of its sensors or lost its numbers; see the events.
+  virtual bool diverged() const = 0;
+  /// True where there is nothing left to go on with (not finite, unrecoverable).
+  virtual bool failed() const = 0;
+};
+
+}  // namespace alidade

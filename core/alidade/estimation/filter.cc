@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/filter.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
+#include "alidade/base/words.h"
+#include "alidade/estimation/frame_loop.h"
+
+namespace alidade {
+
+using internal::FrameLoop;
+
+namespace {
+
+[[noreturn]] void RefuseName(const char* what, std::string_view name,
+                             const std::vector<std::string>& known) {
+  throw Error(ExitCode::kBadConfig, "no " + std::string(what) + " '" + std::string(name) +
+                                        "'; the filter has " + internal::Join(known));
+}
+
+void CheckKnown(const std::string& what, int size, const std::vector<double>& known) {
+  if (std::ssize(known) == size) return;
+  throw Error(ExitCode::kBadData, what + " takes " + std::to_string(size) +
+                                      " known numbers with a measurement, not " +
+                                      std::to_string(known.size()));
+}
+
+/// Index of the sensor, which takes as many known numbers.
+int FindSensor(const System& system, std::string_view name, const std::vector<double>& known) {
+  const int index = system.FindSensor(name);
+  if (index < 0) RefuseName("sensor", name, internal::NamesOf(system.sensors));
+  CheckKnown("sensor '" + std::string(name) + '\'',
+             system.sensors[static_cast<std::size_t>(index)].model.known_size(), known);
+  return index;
+}
+
+void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
+                  const Reading& one) {
+  if (one.stream < 0 || one.stream >= std::ssize(streams)) {
+    throw Error(ExitCode::kBadData, "no stream " + std::to_string(one.stream) +
+                                        "; the filter has " + std::to_string(streams.size()));
+  }
+  const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
+  if (std::ssize(one.values) != stream.size) {
+    throw Error(ExitCode::kBadData, "stream '" + stream.name + "' has " +
+                                        std::to_string(stream.size) + " values at a time, not " +
+                                        std::to_string(one.values.size()));
+  }
+  CheckKnown("stream '" + stream.name + '\'', stream.known, one.known);
+  for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.stream != stream.name) continue;
+    const Geometry& geometry = sensor.model.measurement().geometry;
+    const double defect = DistanceFrom(geometry, one.values.data());
+    if (defect > kUnitTolerance) {
+      throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
+                                          "' are not of unit length: it is off by " +
+                                          internal::RoundedText(defect, 4));
+    }
+    const int m = geometry.tangent;
+    if (one.covariance.empty() || std::ssize(one.covariance) == m * m) continue;
+    throw Error(ExitCode::kBadData, "the covariance of stream '" + stream.name + "' has " +
+                                        std::to_string(one.covariance.size()) + " numbers, not " +
+                                        std::to_string(m * m));
+  }
+}
+
+}  // namespace
+
+Filter::Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+               std::unique_ptr<internal::Method> method)
+    : loop_(std::make_unique<FrameLoop>(std::move(system), options, streams, std::move(method))) {}
+
+void Filter::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
+
+const UpdateReport& Filter::Process(const Frame& frame) {
+  loop_->Process(frame);
+  return loop_->f.report;
+}
+
+const System& Filter::system() const { return loop_->f.binding->system; }
+const State& Filter::state() const { return loop_->f.state; }
+Timestamp Filter::timestamp() const { return loop_->f.timestamp; }
+bool Filter::diverged() const { return loop_->f.health.diverged; }
+bool Filter::failed() const { return loop_->f.health.ended; }
+
+std::vector<LandmarkEstimate> Filter::landmarks() const {
+  if (!loop_->landmarks) return {};
+  return loop_->landmarks->Estimates(loop_->f.state);
+}
+
+int Filter::stream(std::string_view name) const {
+  const std::vector<StreamInfo>& streams = loop_->f.binding->streams;
+  const auto found = std::ranges::find(streams, name, &StreamInfo::name);
+  if (found == streams.end()) RefuseName("stream", name, internal::NamesOf(streams));
+  return static_cast<int>(found - streams.begin());
+}
+
+BlockId Filter::block(std::string_view name) const {
+  const BlockId id = system().layout.Find(name);
+  if (id < 0) RefuseName("block", name, internal::NamesOf(system().layout.blocks()));
+  return id;
+}
+
+const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>& readings) {
+  Frame frame;
+  frame.timestamp = timestamp;
+  for (const Reading& one : readings) {
+    CheckReading(loop_->f.binding->streams, system(), one);
+    frame.measurements.push_back(
+        {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
+  }
+  return Process(frame);
+}
+
+State Filter::At(Timestamp timestamp) const {
+  FrameLoop later(*loop_);
+  later.Process({timestamp, {}});
+  later.f.state.Recall();
+  return std::move(later.f.state);
+}
+
+std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp timestamp,
+                                         std::int64_t landmark,
+                                         const std::vector<double>& known) const {
+  const int index = FindSensor(system(), sensor, known);
+  FrameLoop later(*loop_);
+  later.Process({timestamp, {}});
+  return later.Expect(index, landmark, known);
+}
+
+std::vector<std::optional<Prediction>> Filter::ExpectEach(
+    std::string_view sensor, Timestamp timestamp,
+    const std::vector<std::int64_t>& landmarks) const {
+  const int index = FindSensor(system(), sensor, {});
+  std::vector<std::optional<Prediction>> each;
+  if (landmarks.empty()) return each;
+  FrameLoop later(*loop_);
+  later.Process({timestamp, {}});
+  for (const std::int64_t landmark : landmarks) each.push_back(later.Expect(index, landmark, {}));
+  return each;
+}
+
+}  // namespace alidade

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "alidade/base/indirect.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/estimation/system.h"
+
+namespace alidade {
+
+/// How the measurements of one timestamp are put into updates.
+enum class Fuse {
+  kJoint,           ///< one stacked update
+  kPerSensor,       ///< one update for each sensor, in the order of the config
+  kPerMeasurement,  ///< one update for each measurement, in the order of the sensors
+};
+
+/// What happens after `rejection_recovery_after` consecutive rejections of one sensor.
+enum class RejectionRecovery {
+  kReset,    ///< re-initialise its blocks from the measurement where it can, else inflate
+  kInflate,  ///< multiply the covariance of its blocks by 100
+  kNone,
+};
+
+/// Where H is taken for the blocks of stationary motion models (`constant`) [Huang2010].
+enum class JacobianPolicy {
+  kLatest,         ///< their estimate
+  kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
+};
+
+/// How an Ekf carries landmarks that are not measured for a while.
+enum class CovarianceForm {
+  kFull,        ///< as all others
+  kCompressed,  ///< postponed, exactly: see Postponed
+  kAuto,        ///< postponed where that takes less time, and can be done
+};
+
+/// What the Kalman filters have in common to choose.
+struct EkfOptions {
+  /// Probability with which a measurement that fits passes the gate; 1: no gate (`gate: none`).
+  double gate = 1.0;
+  Fuse fuse = Fuse::kJoint;
+  JacobianPolicy jacobian = JacobianPolicy::kLatest;
+  CovarianceForm covariance = CovarianceForm::kFull;  ///< of an Ekf
+  RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
+  int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
+  int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends
+  /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
+  double max_dt_s = std::numeric_limits<double>::infinity();
+};
+
+namespace internal {
+
+class FrameLoop;
+class Method;
+
+inline EkfOptions WithoutRecovery(EkfOptions options) {
+  options.rejection_recovery = RejectionRecovery::kNone;
+  return options;
+}
+
+}  // namespace internal
+
+/// A value of one stream, as it comes.
+struct Reading {
+  int stream = 0;  ///< Filter::stream
+  std::vector<double> values;
+  std::int64_t landmark = -1;
+  std::vector<double> covariance = {};  ///< row-major, overrides the model's noise; empty: none
+  std::vector<double> known = {};       ///< as many as its sensors take; mostly none
+};
+
+/// What a sensor would measure.
+struct Prediction {
+  std::vector<double> z;  ///< h, ambient
+  Eigen::MatrixXd s;      ///< S = H P H' + R, m x m
+};
+
+/// A recursive estimator over one system: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
+/// snapshot of it, and goes on by itself. What was moved from may be assigned to or destroyed, no
+/// more.
+///
+/// What a frame goes through:
+///
+///   step         to its timestamp, in parts where a control input changes or a gap is longer than
+///                max_dt_s; noise that a model holds is held up to the next update
+///   initialise   blocks that wait for one of its measurements
+///   predict      h, r and S of each measurement, all of a group at the same state
+///   gate         each by itself: r' S^-1 r against chi-square; robust losses; consensus
+///   correct      one stacked update by those that pass: all of it happens or nothing
+///   recover      from a covariance that is not positive semi-definite, and from sensors that are
+///                rejected again and again
+///   landmarks    are counted, pruned, converted and initialised
+///
+/// Control inputs of the frame act from its timestamp on. An update is a transaction: what would
+/// leave the state not finite or not positive definite is rolled back and reported.
+///
+/// Live use: Push measurements by the names of their streams as they come, ask At for the estimate
+/// at any later time, and Expect for what a sensor will see then; neither changes the filter.
+///
+/// Threads: as a value of the standard library. Const members may be called from several threads at
+/// once, while none calls another one; a copy belongs to whoever has it. What copies share, the
+/// system and its models, does not change, and models may be called from several threads.
+class Filter : public Estimator {
+ public:
+  // By frames.
+  void Start(Timestamp timestamp) override;
+  const UpdateReport& Process(const Frame& frame) override;
+  std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
+  /// Without the landmarks that a compressed covariance has postponed; At has them too.
+  const State& state() const override;
+  std::vector<LandmarkEstimate> landmarks() const override;
+  Timestamp timestamp() const override;
+  bool diverged() const override;
+  bool failed() const override;
+
+  const System& system() const;
+
+  // Live.
+  /// Index of a stream, for Reading::stream. Error kBadConfig where there is none.
+  int stream(std::string_view name) const;
+  /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
+  BlockId block(std::string_view name) const;
+  /// Process, of what came at one timestamp. The report is good until the next call. Errors, and
+  /// nothing has changed: kBadData for a stream that is not there, values, a covariance or known
+  /// numbers of another size than its sensors take, or a quaternion or direction whose length is
+  /// off by more than 1e-3.
+  const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
+  /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
+  /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
+  State At(Timestamp timestamp) const;
+  /// What the sensor of that name will measure at `timestamp`, of the landmark of that id where it
+  /// measures landmarks, with `known` where it takes known numbers. Nothing where h is not defined
+  /// or not finite there, S is not positive definite, or a block or the landmark has no value yet.
+  /// Errors: kBadConfig where there is no such sensor, kBadData where it takes another number of
+  /// known numbers.
+  std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
+                                   std::int64_t landmark = -1,
+                                   const std::vector<double>& known = {}) const;
+  /// The same of each of the landmarks, of a sensor that takes no known numbers; the state is
+  /// stepped once for all.
+  std::vector<std::optional<Prediction>> ExpectEach(
+      std::string_view sensor, Timestamp timestamp,
+      const std::vector<std::int64_t>& landmarks) const;
+
+ protected:
+  /// @cond
+  /// `streams` are the source's, in the order of Measurement::stream.
+  Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+         std::unique_ptr<internal::Method> method);
+  internal::FrameLoop& loop() { return *loop_; }
+  const internal::FrameLoop& loop() const { return *loop_; }
+  /// @endcond
+
+ private:
+  Indirect<internal::FrameLoop> loop_;
+};
+
+}  // namespace alidade

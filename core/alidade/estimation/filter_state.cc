@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/filter_state.h"
+
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+#include "alidade/estimation/rows.h"
+
+namespace alidade::internal {
+namespace {
+
+/// `block = value, ...` for the given blocks that have one.
+std::string Describe(const State& state, std::span<const BlockId> blocks) {
+  std::string text;
+  for (const BlockId id : blocks) {
+    if (id < 0 || !state.layout()[id].present) continue;
+    const Block& block = state.layout()[id];
+    text += (text.empty() ? "" : ", ") + block.name + " =";
+    for (int i = 0; i < block.geometry().ambient; ++i) {
+      text += ' ' + RoundedText(state.value(id)[i], 6);
+    }
+  }
+  return text;
+}
+
+void NoteDivergence(FilterState& f, const char* kind, std::string text) {
+  f.health.diverged = true;
+  Note(f, kind, std::move(text)).divergence = true;
+}
+
+}  // namespace
+
+FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates)
+    : binding(std::move(of)),
+      state(binding->initial),
+      motions(*binding),
+      first_estimates(binding->system.layout.blocks().size()),
+      keeps_first_estimates_(keeps_first_estimates) {
+  health.out_of_domain.assign(binding->sensor_places.size(), 0);
+  health.inflated = health.out_of_domain;
+  Activate();
+}
+
+void FilterState::Activate() {
+  const std::size_t count = binding->system.layout.blocks().size();
+  ++blocks.activations;
+  blocks.waiting = blocks.considering = false;
+  blocks.gain_rows.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Block& block = state.layout()[static_cast<BlockId>(i)];
+    blocks.waiting |= !block.present;
+    blocks.considering |= block.present && block.status == BlockStatus::kConsider;
+    for (int k = 0; block.has_covariance() && k < block.geometry().tangent; ++k) {
+      blocks.gain_rows.push_back(block.tangent_offset + k);
+    }
+  }
+  motions.Activate(state.layout());
+  if (keeps_first_estimates_) KeepFirstEstimates();
+}
+
+/// The values of stationary blocks that have none noted yet.
+void FilterState::KeepFirstEstimates() {
+  for (const MotionBinding& motion : binding->system.motions) {
+    if (!motion.model.stationary()) continue;
+    for (const BlockId id : motion.blocks) {
+      const Block& block = state.layout()[id];
+      std::vector<double>& first = first_estimates[static_cast<std::size_t>(id)];
+      if (!block.has_covariance() || !first.empty()) continue;
+      first.assign(state.value(id), state.value(id) + block.geometry().ambient);
+    }
+  }
+}
+
+Event& Note(FilterState& f, const char* kind, std::string text) {
+  f.report.events.push_back({f.timestamp, kind, std::move(text)});
+  return f.report.events.back();
+}
+
+void NotePluginFailure(FilterState& f, const Row& row) {
+  Note(f, "plugin_failed", "sensor '" + row.binding->name + "': " + row.model->error_text());
+}
+
+void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
+  const SensorBinding& sensor = *row.binding;
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  char& said = f.health.out_of_domain[static_cast<std::size_t>(row.sensor)];
+  // A landmark behind the camera, say, is no divergence.
+  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;
+  said = 1;
+  std::vector<BlockId> blocks;
+  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
+  NoteDivergence(f, "diverged",
+                 "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
+}
+
+void End(FilterState& f, const char* kind, const std::string& what) {
+  f.health.ended = true;
+  std::vector<BlockId> all(f.binding->system.layout.blocks().size());
+  std::iota(all.begin(), all.end(), 0);
+  std::string text =
+      what + "; last good state at " + SecondsText(f.timestamp) + ": " + Describe(f.state, all);
+  if (f.health.last_used.sensor >= 0) {
+    text += "; last measurement used: sensor '" +
+            f.binding->system.sensors[static_cast<std::size_t>(f.health.last_used.sensor)].name +
+            "' at " + SecondsText(f.health.last_used.timestamp) + ", z =";
+    for (const double z : f.health.last_used.z) text += ' ' + RoundedText(z, 6);
+  }
+  NoteDivergence(f, kind, std::move(text));
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/first_values.h"
+
+#include <algorithm>
+
+#include "alidade/base/all_finite.h"
+
+namespace alidade::internal {
+namespace {
+
+bool IsMissing(const FilterState& f, const RoleBinding& role) {
+  return role.block >= 0 && !f.state.layout()[role.block].present;
+}
+
+/// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
+bool IsAwaited(const FilterState& f, const Row& row) {
+  const SensorBinding& sensor = *row.binding;
+  const int index = sensor.model.inverse().role;
+  if (row.report->outcome != Outcome::kAccepted || index < 0) return false;
+  const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
+  const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
+  const auto waits = [&](const Prior& prior) {
+    return prior.block == target.block && prior.from == sensor.name;
+  };
+  return missing(target) && std::ranges::count_if(sensor.roles, missing) == 1 &&
+         std::ranges::any_of(f.binding->system.priors, waits);
+}
+
+}  // namespace
+
+Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
+                 const Measurement& measurement, const double* prior,
+                 std::vector<const double*>& roles, Inverse& inverse) {
+  const SensorModel& model = sensor.model;
+  const auto first = static_cast<std::size_t>(model.inverse().role);
+  const auto count = static_cast<std::size_t>(model.inverse().count);
+  const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
+  int rows = 0, size = 0, columns = 0, most = 0;
+  for (const Space& target : targets) {
+    rows += target.geometry.tangent;
+    size += target.geometry.ambient;
+  }
+  for (const Space& role : model.roles()) most += role.geometry.tangent;
+  std::fill_n(roles.begin() + model.inverse().role, count, nullptr);
+  inverse.from.clear();
+  inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most),
+                         kNotWritten);
+  inverse.of_role.assign(roles.size(), nullptr);
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (roles[i] == nullptr || place.columns[i] < 0) continue;
+    inverse.from.push_back(sensor.roles[i].block);
+    inverse.of_role[i] = inverse.by_role.data() + rows * columns;
+    columns += model.roles()[i].geometry.tangent;
+  }
+  inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
+  inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
+  inverse.by_prior.setConstant(rows, model.inverse().prior_size, kNotWritten);
+  const Status status = model.Initialise(
+      roles.data(), measurement.values.data(), prior, inverse.y.data(), inverse.of_role.data(),
+      inverse.by_z.data(), inverse.by_prior.data(), measurement.known.data());
+  if (status != Status::kOk) return OutcomeOf(status);
+  inverse.by_x.resize(rows, columns);
+  Eigen::Index column = 0;
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (inverse.of_role[i] == nullptr) continue;
+    const int width = model.roles()[i].geometry.tangent;
+    inverse.by_x.middleCols(column, width) =
+        Eigen::Map<const RowMajor>(inverse.of_role[i], rows, width);
+    column += width;
+  }
+  double* y = inverse.y.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    targets[i].geometry.Normalise(y);
+    roles[first + i] = y;
+    y += targets[i].geometry.ambient;
+  }
+  const bool finite = AllFinite(inverse.y) && inverse.by_x.allFinite() &&
+                      inverse.by_z.allFinite() && inverse.by_prior.allFinite();
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+bool IsReady(const FilterState& f, const Row& row) {
+  return std::ranges::none_of(row.binding->roles,
+                              [&](const RoleBinding& role) { return IsMissing(f, role); });
+}
+
+Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
+  RolesAt(f, row, f.state.values());
+  Outcome outcome =
+      InvertAt(*row.binding, *row.place, *row.measurement,
+               prior == nullptr ? nullptr : &prior->inverse_distance, row.roles, inverse);
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  if (outcome != Outcome::kAccepted) {
+    return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
+  }
+  const int m = row.report->dof;
+  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
+  const RowMajor& jp = inverse.by_prior;
+  inverse.by_z_r.noalias() = inverse.by_z * r;
+  inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
+  if (prior != nullptr) {
+    inverse.own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
+  }
+  return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
+  Inverse inverse;
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (Row& row : rows) {
+      if (!IsAwaited(f, row)) continue;
+      row.report->outcome = Invert(f, row, nullptr, inverse);
+      if (row.report->outcome != Outcome::kAccepted) continue;
+      Initialise(f, row, inverse);
+      row.report->outcome = Outcome::kInitialised;
+      progress = true;
+    }
+  }
+  for (const Row& row : rows) {
+    Outcome& outcome = row.report->outcome;
+    if (outcome == Outcome::kAccepted && !IsReady(f, row)) outcome = Outcome::kNotReady;
+  }
+}
+
+void Initialise(FilterState& f, const Row& row, const Inverse& inverse) {
+  const SensorBinding& sensor = *row.binding;
+  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.inverse().role)].block;
+  f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
+  f.first_estimates[static_cast<std::size_t>(id)].clear();
+  f.Activate();
+  f.motions.EndInterval();
+}
+
+}  // namespace alidade::internal

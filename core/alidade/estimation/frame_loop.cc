@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/frame_loop.h"
+
+#include <utility>
+
+#include "alidade/base/error.h"
+#include "alidade/estimation/first_values.h"
+#include "alidade/estimation/linear.h"
+
+namespace alidade::internal {
+
+FrameLoop::FrameLoop(System system, const EkfOptions& options,
+                     const std::vector<StreamInfo>& streams, std::unique_ptr<Method> by)
+    : f(std::make_shared<const Binding>(std::move(system), streams),
+        options.jacobian == JacobianPolicy::kFirstEstimate),
+      method(std::move(by)),
+      options_(options),
+      time_(f.binding->system, streams, options.max_dt_s),
+      gate_(f.binding->system, options),
+      consensus_(f.binding->system),
+      recovery_(options),
+      compression_(f.binding->system, options) {
+  ALIDADE_EXPECTS(options.covariance == CovarianceForm::kFull ||
+                  dynamic_cast<const Linear*>(&*method) != nullptr);
+  if (f.binding->system.landmarks) {
+    landmarks.emplace(*f.binding);
+    landmarks->AddKnown(f);
+  }
+  method->Begin(f);
+}
+
+/// fast_.path is null afterwards where Run is the only way.
+void FrameLoop::MakeFastPath() {
+  const bool apt =
+      options_.fuse == Fuse::kJoint && dynamic_cast<const Linear*>(&*method) != nullptr;
+  fast_.path = apt ? FastPath::For(f, time_, gate_) : nullptr;
+  fast_.made_at = f.blocks.activations;
+}
+
+void FrameLoop::Process(const Frame& frame) {
+  f.report.Clear();
+  if (fast_.made_at != f.blocks.activations) MakeFastPath();
+  took_fast_path = fast_.path != nullptr && fast_.path->Process(frame);
+  if (!took_fast_path) Run(frame);  // steps no further if that did, and starts the entries anew
+  if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
+  for (Event& event : f.report.events) event.timestamp = frame.timestamp;
+}
+
+/// What a frame goes through.
+void FrameLoop::Run(const Frame& frame) {
+  if (landmarks) since_ = std::chrono::steady_clock::now();
+  if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
+  f.report.stale = frame.timestamp < f.timestamp;
+  if (!f.report.stale && !f.health.ended) StepTo(frame.timestamp);
+  Spent(FramePart::kStep);
+  std::optional<Outcome> refused;
+  if (f.health.ended) refused = Outcome::kEnded;
+  if (f.report.stale) refused = Outcome::kStale;
+  rows_.Collect(frame, *f.binding, f.report, refused);
+  if (refused) return;
+  const std::span<Row> all = rows_.all();
+  for (const Row& row : all) {
+    if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  }
+  if (f.blocks.waiting) InitialiseWaiting(f, all);
+  if (landmarks) landmarks->Attach(f, all);
+  UpdateInGroups(all);
+  recovery_.RepairCovariance(f, all);
+  if (f.health.ended) return;
+  for (Row& row : all) {
+    if (landmarks && row.binding->model.has_landmark()) continue;  // its rejections do not count
+    if (gate_.Count(f, *row.report)) recovery_.Recover(f, row);
+  }
+  Spent(FramePart::kUpdate);
+  if (!landmarks) return;
+  landmarks->Maintain(f, all);
+  compression_.Apply(f, *landmarks, all);
+  Spent(FramePart::kLandmarks);
+}
+
+/// The time since the last part goes to this one, in the report.
+void FrameLoop::Spent(FramePart part) {
+  if (!landmarks) return;
+  const auto now = std::chrono::steady_clock::now();
+  f.report.spent_s[static_cast<std::size_t>(part)] +=
+      std::chrono::duration<double>(now - since_).count();
+  since_ = now;
+}
+
+/// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
+/// before, and the filter has ended.
+void FrameLoop::StepTo(Timestamp timestamp) {
+  while (f.timestamp < timestamp) {
+    time_.UseInputs(f.timestamp, f.motions, f.report.events);
+    Timeline::Piece piece;
+    Trouble trouble = time_.First(f.timestamp, timestamp, f.report.events, piece);
+    for (Timestamp i = 1; i <= piece.steps && !trouble; ++i) {
+      trouble = method->Step(f, piece.dt_s);
+      if (trouble) break;
+      f.motions.CountStep();
+      f.timestamp = piece.EndOf(i);
+    }
+    if (trouble) return End(f, trouble.kind, trouble.text);
+  }
+}
+
+/// The updates of a frame, group by group.
+void FrameLoop::UpdateInGroups(std::span<Row> all) {
+  std::vector<Row*>& group = groups_.group;
+  group.clear();
+  for (Row& row : all) {
+    if (row.report->outcome != Outcome::kAccepted) continue;
+    const bool apart =
+        options_.fuse == Fuse::kPerMeasurement ||
+        (options_.fuse == Fuse::kPerSensor && !group.empty() && group.back()->sensor != row.sensor);
+    if (apart) {
+      Update(group);
+      group.clear();
+    }
+    group.push_back(&row);
+  }
+  Update(group);
+}
+
+/// One update by those of a group that pass; with a consensus a second one by those it rescues.
+void FrameLoop::Update(std::span<Row* const> group) {
+  PredictAndGate(group, groups_.passed);
+  if (!landmarks || !Consensus::IsAsked(groups_.passed)) {
+    Correct(groups_.passed);
+    return;
+  }
+  groups_.agreed.clear();
+  groups_.rest.clear();
+  consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
+                   groups_.agreed, groups_.rest);
+  Spent(FramePart::kGate);
+  if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
+    for (Row* const row : groups_.rest) {
+      row->report->outcome = groups_.agreed.front()->report->outcome;
+    }
+    return;
+  }
+  PredictAndGate(groups_.rest, groups_.passed);
+  std::erase_if(groups_.passed, [&](const Row* row) {
+    if (consensus_.Rescues(*row)) return false;
+    row->report->outcome = Outcome::kGated;
+    return true;
+  });
+  if (Correct(groups_.passed)) {
+    f.report.landmarks.rescued += static_cast<int>(groups_.passed.size());
+  }
+}
+
+/// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
+void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed) {
+  passed.clear();
+  for (Row* const row : group) row->report->outcome = method->Predict(f, *row);
+  Spent(FramePart::kEvaluate);
+  for (Row* const row : group) {
+    Outcome& outcome = row->report->outcome;
+    if (outcome == Outcome::kAccepted) outcome = gate_.Pass(f, *row);
+    if (outcome == Outcome::kAccepted) passed.push_back(row);
+  }
+  Spent(FramePart::kGate);
+}
+
+/// False where there is no update.
+bool FrameLoop::Correct(std::span<Row* const> rows) {
+  if (rows.empty()) return false;
+  for (Row* const row : rows) Gate::Weigh(*row);
+  const Outcome outcome = method->Correct(f, rows);
+  Spent(FramePart::kUpdate);
+  if (outcome == Outcome::kNotPd) {
+    Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
+  } else if (outcome == Outcome::kNotFinite) {
+    Note(f, "not_finite", "the update is not finite; rolled back");
+  }
+  for (const Row* const row : rows) {
+    if (row->report->outcome == Outcome::kAccepted) row->report->outcome = outcome;
+  }
+  if (outcome != Outcome::kAccepted) return false;
+  f.motions.EndInterval();
+  const Row& last = *rows.back();
+  f.health.last_used.sensor = last.sensor;
+  f.health.last_used.timestamp = last.measurement->timestamp;
+  f.health.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+  return true;
+}
+
+std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
+                                            const std::vector<double>& known) {
+  if (f.health.ended || f.report.stale) return std::nullopt;
+  Measurement one;
+  one.landmark = landmark;
+  one.known = known;
+  const Geometry& geometry =
+      f.binding->system.sensors[static_cast<std::size_t>(sensor)].model.measurement().geometry;
+  one.values.resize(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(one.values.data());
+  Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);
+  if (landmarks) landmarks->Attach(f, {&row, 1});
+  if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
+      PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
+    return std::nullopt;
+  }
+  row.report->z = one.values;  // as if it measured what it expects
+  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
+  const Outcome outcome = gate_.Pass(f, row);  // gated: h at the estimate lies far from its mean
+  if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
+  const Eigen::Index m = row.report->dof;
+  return Prediction{row.report->h, Eigen::Map<const RowMajor>(row.report->s.data(), m, m)};
+}
+
+}  // namespace alidade::internal

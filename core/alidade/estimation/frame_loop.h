@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/base/indirect.h"
+#include "alidade/estimation/compression.h"
+#include "alidade/estimation/consensus.h"
+#include "alidade/estimation/fast_path.h"
+#include "alidade/estimation/filter.h"
+#include "alidade/estimation/gate.h"
+#include "alidade/estimation/landmark_map.h"
+#include "alidade/estimation/method.h"
+#include "alidade/estimation/recovery.h"
+#include "alidade/estimation/rows.h"
+#include "alidade/estimation/timeline.h"
+
+namespace alidade::internal {
+
+/// What a filter is made of, and what a frame goes through there:
+///
+///   plain frames of few states      FastPath::Process, all but the inputs; any other, Run:
+///   step         StepTo             Timeline::First, Method::Step
+///   collect                         Rows::Collect: one row for each measurement and sensor
+///   initialise                      InitialiseWaiting, LandmarkMap::Attach
+///   group        UpdateInGroups     Update of each group by itself, as `fuse` has them:
+///   predict      PredictAndGate     Method::Predict of each row
+///   gate                            Gate::Pass of each row; Consensus::Split
+///   correct      Correct            Gate::Weigh, Method::Correct
+///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
+///   landmarks                       LandmarkMap::Maintain, Compression::Apply
+///   inputs                          Timeline::TakeInputs: they act from here on
+///
+/// Parts point to the binding, which copies share, and not into one another; only the fast path
+/// does, and a copy makes its own. So a copy is a filter by itself.
+class FrameLoop {
+ public:
+  FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+            std::unique_ptr<Method> method);
+  FrameLoop(const FrameLoop&) = default;
+  FrameLoop& operator=(const FrameLoop&) = delete;  // it would keep a fast path into another x
+
+  /// All that Filter::Process does. The report is in f.
+  void Process(const Frame& frame);
+  /// What the sensor, an index into System::sensors, would measure now; as Filter::Expect.
+  std::optional<Prediction> Expect(int sensor, std::int64_t landmark,
+                                   const std::vector<double>& known);
+
+  FilterState f;
+  Indirect<Method> method;
+  std::optional<LandmarkMap> landmarks;  ///< where the system has any
+  bool took_fast_path = false;           ///< the last frame; for tests
+
+ private:
+  void MakeFastPath();
+  void Run(const Frame& frame);
+  void StepTo(Timestamp timestamp);
+  void UpdateInGroups(std::span<Row> rows);
+  void Update(std::span<Row* const> group);
+  void PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed);
+  bool Correct(std::span<Row* const> rows);
+  void Spent(FramePart part);
+
+  /// The fast path, as long as the blocks are those that it was made for.
+  struct CurrentPath {
+    std::unique_ptr<FastPath> path;
+    int made_at = -1;  ///< FilterState::blocks.activations
+  };
+  /// One group of rows, and what becomes of it.
+  struct Groups {
+    std::vector<Row*> group, passed, agreed, rest;
+  };
+
+  EkfOptions options_;
+  Timeline time_;
+  Gate gate_;
+  Consensus consensus_;
+  Recovery recovery_;
+  Compression compression_;
+  std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
+  Scratch<Rows> rows_;
+  Scratch<Groups> groups_;
+  Scratch<CurrentPath> fast_;
+};
+
+}  // namespace alidade::internal

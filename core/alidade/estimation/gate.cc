@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/gate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
+#include "alidade/state/small_kernels.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
+bool IsRejected(const MeasurementReport& entry) {
+  const Outcome outcome = entry.outcome;
+  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
+         outcome == Outcome::kNotPd || (outcome == Outcome::kNotFinite && !entry.h.empty());
+}
+
+}  // namespace
+
+Gate::Gate(const System& system, const EkfOptions& options)
+    : warned_(system.sensors.size(), false),
+      rejections_(system.sensors.size(), 0),
+      most_rejections_(options.rejection_recovery == RejectionRecovery::kNone
+                           ? 0
+                           : options.rejection_recovery_after) {
+  for (const SensorBinding& sensor : system.sensors) {
+    thresholds_.push_back(
+        options.gate < 1.0
+            ? ChiSquareQuantile(options.gate, sensor.model.measurement().geometry.tangent)
+            : std::numeric_limits<double>::infinity());
+  }
+}
+
+Outcome Gate::Pass(FilterState& f, Row& row) {
+  MeasurementReport& entry = *row.report;
+  if (!AllFinite(entry.s) || !AllFinite(row.H) || !AllFinite(entry.innovation)) {
+    entry.s.clear();
+    Note(f, "not_finite",
+         "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
+    return Outcome::kNotFinite;
+  }
+  CheckConditioning(f, row);
+  const auto m = static_cast<std::size_t>(entry.dof);
+  memory_.resize(m * (m + 1));
+  entry.nis =
+      SquaredMahalanobis(entry.s.data(), entry.innovation.data(), entry.dof, memory_.data());
+  if (std::isnan(entry.nis)) {
+    entry.nis = 0.0;
+    Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
+    return Outcome::kNotPd;
+  }
+  if (!(entry.nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
+  row.weight = Weight(row.binding->loss, std::sqrt(entry.nis));
+  const double widest = *std::ranges::max_element(row.R) / row.weight;
+  return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
+}
+
+void Gate::Weigh(Row& row) {
+  if (row.weight == 1.0) return;
+  for (std::size_t i = 0; i < row.R.size(); ++i) {
+    const double widened = row.R[i] / row.weight;
+    row.report->s[i] += widened - row.R[i];
+    row.R[i] = widened;
+  }
+}
+
+/// Of a measurement that was not accepted. Whether its sensor has to recover.
+bool Gate::CountRejection(const MeasurementReport& entry) {
+  if (most_rejections_ == 0 || !IsRejected(entry)) return false;
+  int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
+  if (++count < most_rejections_) return false;
+  count = 0;
+  return true;
+}
+
+/// Warns once for each sensor whose noise vanishes compared with H P H'.
+void Gate::CheckConditioning(FilterState& f, const Row& row) {
+  const auto sensor = static_cast<std::size_t>(row.sensor);
+  if (warned_[sensor]) return;
+  const auto m = static_cast<std::size_t>(row.report->dof);
+  double noise = 0.0, total = 0.0;
+  bool tiny = false;
+  for (std::size_t i = 0; i < m && !tiny; ++i) {
+    noise = row.R[i * m + i];
+    total = row.report->s[i * m + i];
+    tiny = Vanishes(noise, total);
+  }
+  if (!tiny) return;
+  warned_[sensor] = true;
+  Note(f, "conditioning",
+       "sensor '" + row.binding->name + "': noise variance " + RoundedText(noise, 3) +
+           " vanishes compared with H P H' = " + RoundedText(total - noise, 3) +
+           "; S is badly conditioned");
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/iekf.h"
+
+#include <cmath>
+#include <optional>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
+#include "alidade/estimation/linear.h"
+#include "alidade/estimation/method.h"
+#include "alidade/state/tiles.h"
+
+namespace alidade {
+namespace internal {
+namespace {
+
+/// r' R^-1 r for R = L L', L the lower triangle of `l`; r becomes L^-1 r.
+double SquaredNorm(const Workspace::Matrix& l, Workspace::Vector& r) {
+  l.triangularView<Eigen::Lower>().solveInPlace(r);
+  return r.squaredNorm();
+}
+
+/// Gauss-Newton over an update of Linear.
+class Iterated : public Method {
+ public:
+  Iterated(int max_iterations, double tolerance)
+      : max_iterations_(max_iterations), tolerance_(tolerance) {}
+
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<Iterated>(*this); }
+  Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
+  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+
+ private:
+  struct Minimum {
+    Workspace::Vector dx;
+    int iterations = 0;
+    /// That is left, in posterior standard deviations; none where h has no Jacobian.
+    std::optional<double> step = std::nullopt;
+    bool converged = false;
+  };
+  /// dx = P v, and a step from there, step = P step_v.
+  struct Direction {
+    const Workspace::Vector &dx, &v, &step, &step_v;
+  };
+  std::optional<Minimum> Minimise(FilterState& f, std::span<Row* const> rows);
+  double PartThatLowersTheCost(FilterState& f, std::span<Row* const> rows, const Direction& at,
+                               const Workspace::Matrix& r, Workspace::Vector& residual);
+  bool MoveTo(FilterState& f, const double* dx);
+  bool Innovations(FilterState& f, std::span<Row* const> rows, Workspace::Vector& innovations);
+  bool Relinearise(FilterState& f, std::span<Row* const> rows, const double* dx);
+
+  Linear linear_;
+  int max_iterations_;
+  double tolerance_;
+  std::vector<double> iterate_;                   ///< values on the way; the state is the prior
+  std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
+};
+
+Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  if (at_prediction_.size() < rows.size()) at_prediction_.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) at_prediction_[i] = *rows[i]->report;
+  const std::optional<Minimum> minimum = Minimise(f, rows);
+  const Outcome outcome = linear_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    MeasurementReport& entry = *rows[i]->report;
+    entry.h.swap(at_prediction_[i].h);
+    entry.innovation.swap(at_prediction_[i].innovation);
+    entry.s.swap(at_prediction_[i].s);
+  }
+  if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
+    Note(f, "not_converged",
+         "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+             (minimum->step
+                  ? ", a step of " + RoundedText(*minimum->step, 3) + " sigma before its optimum"
+                  : std::string(" where h has no Jacobian")) +
+             "; the last iterate is kept");
+  }
+  return outcome;
+}
+
+/// The optimum of one update, or the last iterate on the way, which the rows are then linearised
+/// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
+/// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
+std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Row* const> rows) {
+  const Eigen::Index n = f.size(), m = TotalDof(rows);
+  Minimum minimum{f.work.Take(n)};
+  Workspace::Vector& dx = minimum.dx;
+  Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
+  Workspace::Vector y = f.work.Take(m), residual = f.work.Take(m);
+  Workspace::Vector linearised = f.work.Take(n);  // where the rows last were
+  Workspace::Matrix s = f.work.Take(m, m), r = f.work.Take(m, m);
+  dx.setZero();
+  v.setZero();
+  linearised.setZero();
+  for (bool defined = true;; defined = Relinearise(f, rows, dx.data())) {
+    const Workspace::Use use(f.work);
+    const Stacked at = Stack(f, rows);
+    const Panels pht = ProjectionOf(f, rows);
+    s = r = at.noise;
+    AddProjected(f, pht, s);
+    if (!defined || !Factorise(s) || !Factorise(r)) {
+      if (minimum.iterations == 0) return std::nullopt;
+      MoveTo(f, linearised.data());
+      Relinearise(f, rows, linearised.data());
+      minimum.step.reset();
+      break;
+    }
+    linearised = dx;
+    ++minimum.iterations;
+    y = at.innovation;
+    y.noalias() += at.h * dx;
+    s.triangularView<Eigen::Lower>().solveInPlace(y);
+    s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    Multiply(pht, y, step);
+    step -= dx;
+    step_v = -v;
+    step_v.noalias() += at.h.transpose() * y;
+    residual.noalias() = at.h * step;
+    minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, residual));
+    if (*minimum.step <= tolerance_) {
+      dx += step;
+      minimum.converged = true;
+      break;
+    }
+    if (minimum.iterations == max_iterations_) break;
+    residual = at.innovation;
+    const double part = PartThatLowersTheCost(f, rows, {dx, v, step, step_v}, r, residual);
+    if (part == 0.0) break;
+    dx += part * step;
+    v += part * step_v;
+  }
+  return minimum;
+}
+
+/// The largest of 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not rise, but for
+/// what rounding makes of it; 0 where there is none. `r` is the factor of R, `residual` the
+/// innovations at dx, then memory.
+double Iterated::PartThatLowersTheCost(FilterState& f, std::span<Row* const> rows,
+                                       const Direction& at, const Workspace::Matrix& r,
+                                       Workspace::Vector& residual) {
+  constexpr double kRounding = 1e-12;
+  constexpr int kHalvings = 10;
+  const Workspace::Use use(f.work);
+  Workspace::Vector there = f.work.Take(at.dx.size());
+  const double cost = (at.v.dot(at.dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
+  for (int halvings = 0; halvings <= kHalvings; ++halvings) {
+    const double part = std::ldexp(1.0, -halvings);
+    there = at.dx + part * at.step;
+    if (MoveTo(f, there.data()) && Innovations(f, rows, residual) &&
+        (at.v + part * at.step_v).dot(there) + SquaredNorm(r, residual) <= cost) {
+      return part;
+    }
+  }
+  return 0.0;
+}
+
+/// Puts the iterate at prior (+) dx. False where that is not finite.
+bool Iterated::MoveTo(FilterState& f, const double* dx) {
+  f.state.Retract(dx, iterate_);
+  return AllFinite(iterate_);
+}
+
+/// z (-) h at the iterate, of all rows; false where one is not defined or not finite.
+bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
+                           Workspace::Vector& innovations) {
+  Eigen::Index at = 0;
+  for (Row* row : rows) {
+    MeasurementReport& entry = *row->report;
+    const SensorModel& model = *row->model;
+    if (PredictAt(f, *row, iterate_, entry.h.data()) != Outcome::kAccepted) return false;
+    model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
+    at += entry.dof;
+  }
+  return innovations.allFinite();
+}
+
+/// h, R, d h / d dx and S of all rows at the iterate, which lies at prior (+) dx.
+bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const double* dx) {
+  for (Row* row : rows) {
+    const SensorModel& model = *row->model;
+    const SensorPlace& place = *row->place;
+    const double* const* const roles = RolesAt(f, *row, iterate_);
+    if (LineariseAt(*row, roles) != Outcome::kAccepted ||
+        NoiseAt(*row, roles) != Outcome::kAccepted) {
+      return false;
+    }
+    for (double& r : row->R) r /= row->weight;
+    TakeInnovation(*row);
+    const double* const* const at = RolesAt(f, *row, f.state.values());
+    std::size_t part = 0;
+    for (std::size_t i = 0; i < place.values.size(); ++i) {
+      if (place.columns[i] < 0) continue;
+      const int offset = place.parts[part++].offset;
+      const Geometry& geometry = model.roles()[i].geometry;
+      if (geometry.kind == GeometryKind::kVector) continue;
+      const Workspace::Use use(f.work);
+      Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
+      PlusJacobian(geometry, at[i], dx + offset, j.data());
+      ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
+    }
+    Linear::TakeS(f, *row);
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace internal
+
+Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), options, streams,
+             std::make_unique<internal::Iterated>(options.max_iterations, options.tolerance)) {
+  ALIDADE_EXPECTS(options.jacobian == JacobianPolicy::kLatest);
+  ALIDADE_EXPECTS(options.max_iterations > 1 && options.tolerance > 0.0);
+  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+}
+
+}  // namespace alidade

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "alidade/estimation/rows.h"
+
+namespace alidade::internal {
+
+/// What Kalman filters differ in: how x and P are stepped, what a measurement is expected to be,
+/// and how x and P are corrected by it. Knows nothing of gates or frames.
+class Method {
+ public:
+  virtual ~Method() = default;
+  /// With all that it carries besides x and P.
+  virtual std::unique_ptr<Method> Clone() const = 0;
+
+  /// Takes over x and P as they are at the start.
+  virtual void Begin(FilterState& /*f*/) {}
+  /// Moves x and P by dt_s: all of it or nothing, and why.
+  virtual Trouble Step(FilterState& f, double dt_s) = 0;
+  /// h, the innovation, R and S of a row by itself, and what Correct needs besides; kAccepted, or
+  /// why they cannot be had, which it notes.
+  virtual Outcome Predict(FilterState& f, Row& row) = 0;
+  /// One update with all rows, as Predict left them, R and S weighed since: all of it happens, or
+  /// nothing. kAccepted, and the gain is in the reports by RecordGain; or why not, which it notes
+  /// but for kNotPd and kNotFinite. A row that is the reason may have an outcome of its own, in its
+  /// report.
+  virtual Outcome Correct(FilterState& f, std::span<Row* const> rows) = 0;
+};
+
+}  // namespace alidade::internal

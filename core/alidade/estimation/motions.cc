@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/motions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/state/small_kernels.h"
+
+namespace alidade::internal {
+namespace {
+
+bool AreFinite(const double* values, Eigen::Index size) {
+  return AllFinite({values, static_cast<std::size_t>(size)});
+}
+
+/// The values of the model's blocks in x.
+std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
+  std::array<const double*, kMaxRoles> blocks;
+  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
+  return blocks;
+}
+
+}  // namespace
+
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
+  const MotionModel& model = motion.model;
+  const Eigen::Index n = model.tangent_size();
+  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
+                     of_g = g == nullptr ? 0 : n * model.noise_size();
+  std::array<double*, kMaxRoles> to;
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    to[k] = next + place.values[k];
+    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
+  }
+  std::fill_n(f, of_f, kNotWritten);
+  std::fill_n(g, of_g, kNotWritten);
+  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
+  if (status != Status::kOk) return OutcomeOf(status);
+  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
+  }
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l) {
+  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
+  std::fill_n(l, size, kNotWritten);
+  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
+  if (status != Status::kOk) return OutcomeOf(status);
+  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
+  if (outcome == Outcome::kAccepted) return {};
+  const std::string who = "motion model of '" + motion.name + "' ";
+  if (outcome == Outcome::kNotFinite) {
+    return {"not_finite", who + "steps to a state that is not finite"};
+  }
+  const bool failed = outcome == Outcome::kFailed;
+  return {failed ? "plugin_failed" : "diverged",
+          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
+}
+
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x) {
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    if (block.status == BlockStatus::kConstant) continue;
+    const Geometry& geometry = block.geometry();
+    double* const value = x + block.value_offset;
+    std::copy_n(next + block.value_offset, geometry.ambient, value);
+    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
+  }
+}
+
+Motions::Motions(const Binding& binding)
+    : binding_(&binding),
+      steps_(binding.system.motions.size()),
+      next_(binding.initial.values().size()) {
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const MotionModel& model = binding.system.motions[i].model;
+    const auto n = static_cast<std::size_t>(model.tangent_size());
+    const auto n_w = static_cast<std::size_t>(model.noise_size());
+    Step& step = steps_[i];
+    step.f.resize(n * n);
+    step.g.resize(n * n_w);
+    step.l.resize(n_w * n_w);
+    step.gl.resize(n * n_w);
+    step.q.resize(n * n);
+    if (binding.motion_places[i].holds) step.m.resize(n * n_w);
+  }
+}
+
+void Motions::Activate(const StateLayout& layout) {
+  holds_ = false;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const MotionBinding& motion = binding_->system.motions[i];
+    steps_[i].active =
+        !motion.model.stationary() &&
+        std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
+    holds_ = holds_ || (steps_[i].active && binding_->motion_places[i].holds);
+  }
+}
+
+Trouble Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    if (Trouble trouble = EvaluateOne(i, state, dt_s, derivatives)) return trouble;
+  }
+  return {};
+}
+
+Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
+  const MotionBinding& motion = binding_->system.motions[i];
+  const MotionPlace& place = binding_->motion_places[i];
+  Step& step = steps_[i];
+  const bool goes_on = place.holds && in_interval();
+  // The first step may have been the fast path's, which keeps no M.
+  if (goes_on && interval_steps_ == 1) step.m = step.gl;
+  const double* const x = state.values().data();
+  Outcome outcome =
+      StepAt(motion, place, x, step.u.data(), nullptr, dt_s, next_.data(),
+             derivatives ? step.f.data() : nullptr, derivatives ? step.g.data() : nullptr);
+  if (outcome == Outcome::kAccepted && !goes_on) {
+    outcome = SqrtQAt(motion, place, x, step.u.data(), dt_s, step.l.data());
+  }
+  if (outcome != Outcome::kAccepted || !derivatives) return TroubleOf(motion, outcome);
+  SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(), motion.model.noise_size(),
+              step.gl.data(), step.q.data());
+  if (goes_on) {
+    CarryHeld(motion.model, place, step);
+  } else if (place.holds) {
+    step.m = step.gl;
+  }
+  return TroubleOf(motion, AllFinite(step.q) ? Outcome::kAccepted : Outcome::kNotFinite);
+}
+
+/// With A = F M and N = G Lq: q <- N N' + A N' + N A' (its lower triangle), M <- A + N. Blocks
+/// without a covariance have no M.
+void Motions::CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step) {
+  const Workspace::Use use(memory_);
+  const Eigen::Index n = model.tangent_size(), w = model.noise_size();
+  const Eigen::Map<const RowMajor> f(step.f.data(), n, n), input(step.gl.data(), n, w);
+  Eigen::Map<RowMajor> m(step.m.data(), n, w), q(step.q.data(), n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (place.at[static_cast<std::size_t>(i)] < 0) m.row(i).setZero();
+  }
+  Workspace::Matrix moved = memory_.Take(n, w), both = memory_.Take(n, n);
+  moved.noalias() = f * m;
+  both.noalias() = moved * input.transpose();
+  q.triangularView<Eigen::Lower>() += both;
+  q.triangularView<Eigen::Lower>() += both.transpose();
+  m = moved + input;
+}
+
+bool Motions::Apply(State& state) {
+  Covariance& p = state.covariance();
+  if (IsBounded(p)) {
+    Propagate(p);
+  } else {
+    const Covariance before = p;
+    Propagate(p);
+    if (!p.Dense().allFinite()) {
+      p = before;
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    TakeStep(binding_->system.motions[i], state.layout(), next_.data(), state.values().data());
+  }
+  return true;
+}
+
+/// Whether no F P F' + Q of this step can overflow, by |F P F'|_ij <= (n max|F|)^2 max|P|.
+bool Motions::IsBounded(const Covariance& covariance) const {
+  constexpr double kSafe = 1e300;
+  double f = 1.0, q = 0.0, p = 0.0;
+  for (const Step& step : steps_) {
+    if (!step.active) continue;
+    for (const double value : step.f) f = std::max(f, std::abs(value));
+    for (const double value : step.q) q = std::max(q, std::abs(value));
+  }
+  const int n = covariance.size();
+  for (int i = 0; i < n; ++i) p = std::max(p, covariance.Variance(i));
+  const double sum = f * n;
+  return sum * sum * p + q <= kSafe;
+}
+
+void Motions::Propagate(Covariance& p) {
+  const Workspace::Use use(memory_);
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const Step& step = steps_[i];
+    const MotionPlace& place = binding_->motion_places[i];
+    if (!step.active || place.parts.empty()) continue;
+    const auto fixed = std::ranges::count(place.at, -1);  // rows that are not in P
+    if (fixed == 0) {
+      p.Propagate(place.parts, step.f.data(), step.q.data());
+      continue;
+    }
+    const std::size_t n = place.at.size();
+    const auto k = static_cast<Eigen::Index>(n) - fixed;
+    Workspace::Vector f = memory_.Take(k * k), q = memory_.Take(k * k);
+    Eigen::Index at = 0;
+    for (std::size_t element = 0; element < n * n; ++element) {
+      if (place.at[element / n] < 0 || place.at[element % n] < 0) continue;
+      f[at] = step.f[element];
+      q[at++] = step.q[element];
+    }
+    p.Propagate(place.parts, f.data(), q.data());
+  }
+}
+
+int Motions::noise_size() const {
+  int size = 0;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (steps_[i].active) size += binding_->system.motions[i].model.noise_size();
+  }
+  return size;
+}
+
+Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
+  Workspace::Matrix transition = work.Take(n, n);
+  transition.setIdentity();
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    const double* f = steps_[i].f.data();
+    for (const int row : binding_->motion_places[i].at) {
+      for (const int column : binding_->motion_places[i].at) {
+        if (row >= 0 && column >= 0) transition(row, column) = *f;
+        ++f;
+      }
+    }
+  }
+  return transition;
+}
+
+Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Workspace& work,
+                                bool all) const {
+  Workspace::Matrix input = work.Take(n, noise_size());
+  input.setZero();
+  Eigen::Index columns = 0;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const Step& step = steps_[i];
+    const MotionPlace& place = binding_->motion_places[i];
+    if (!step.active) continue;
+    const MotionModel& model = binding_->system.motions[i].model;
+    const Eigen::Index width = model.noise_size();
+    for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {
+      if (place.at[row] < 0) continue;
+      const Eigen::Map<const RowMajor> from((step.*matrix).data(), model.tangent_size(), width);
+      input.row(place.at[row]).segment(columns, width) = from.row(static_cast<Eigen::Index>(row));
+    }
+    columns += width;
+  }
+  return input;
+}
+
+}  // namespace alidade::internal

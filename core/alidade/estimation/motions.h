@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/binding.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/state/workspace.h"
+
+namespace alidade::internal {
+
+// A motion model at any values x of the whole state: that of a filter, a sigma point, a point of a
+// batch. What it does not write is not a number. n_w: noise inputs.
+
+/// Why a step cannot be done; empty where it can.
+struct Trouble {
+  const char* kind = nullptr;  ///< of the event
+  std::string text;
+  explicit operator bool() const { return kind != nullptr; }
+};
+
+/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state, at the places of its
+/// blocks in `next`, and unless null its F (n x n) and G (n x n_w), row-major. w may be null: zero.
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g);
+/// L of its Qw = L L' there, n_w x n_w, row-major.
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l);
+/// What one of these that is not kAccepted means.
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
+/// x <- x' of its blocks that are not constant, brought back to their manifolds.
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x);
+
+/// What the motion models of a system make of the state over one step: x', F and G Lq.
+/// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,
+/// A = F M. n: size of P, n_w: noise inputs of the models that move. A copy is a snapshot.
+class Motions {
+ public:
+  /// Of one model: row-major, in the order of its blocks.
+  struct Step {
+    bool active = false;        ///< false: stationary, or a block has no value yet
+    std::vector<double> u;      ///< control input; empty: the model takes none
+    std::vector<double> f, g;   ///< F, G
+    std::vector<double> l, gl;  ///< L of Qw, G L
+    std::vector<double> q;      ///< what is added to F P F' (lower triangle)
+    std::vector<double> m;      ///< M, where its noise is discrete
+  };
+
+  explicit Motions(const Binding& binding);
+
+  /// Finds out which models move: those all of whose blocks have a value.
+  void Activate(const StateLayout& layout);
+  std::vector<Step>& steps() { return steps_; }
+  /// x' of the active models, by the places of their blocks.
+  std::vector<double>& next() { return next_; }
+
+  /// x', F, G and Lq of all active models; without `derivatives` x' and Lq alone.
+  Trouble Evaluate(const State& state, double dt_s, bool derivatives = true);
+  /// P <- F P F' + Q and x <- x'; false, and nothing changed, where P would not be finite.
+  bool Apply(State& state);
+
+  /// Whether noise that the last step held goes on being held.
+  bool in_interval() const { return holds_ && interval_steps_ > 0; }
+  void CountStep() { ++interval_steps_; }
+  void EndInterval() { interval_steps_ = 0; }
+  /// Whether the noise of an active model is discrete.
+  bool holds() const { return holds_; }
+
+  int noise_size() const;  ///< n_w
+  // Matrices of the last step, in `work`:
+  Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
+  /// Of the steps' `gl` G Lq, of their `m` M, n x n_w, one model beside the other; unless `all`,
+  /// the columns of continuous noise are zero.
+  Workspace::Matrix Held(std::vector<double> Step::*matrix, int n, Workspace& work,
+                         bool all = false) const;
+
+ private:
+  Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
+  void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
+  bool IsBounded(const Covariance& p) const;
+  void Propagate(Covariance& p);
+
+  const Binding* binding_;
+  std::vector<Step> steps_;  ///< as in System::motions
+  std::vector<double> next_;
+  bool holds_ = false;
+  Scratch<Workspace> memory_;
+  Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/owned_state.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/base/error.h"
+#include "alidade/plugin/in_process.h"
+
+namespace alidade::internal {
+namespace {
+
+/// What the structs below have in common: a, and the square root of the time that noise adds up in.
+struct Dynamics {
+  explicit Dynamics(const OwnedRole& owned, std::size_t n)
+      : mean(owned.mean), l(owned.sqrt_density), tau_s(owned.time_constant_s) {
+    if (owned.dynamics == OwnedDynamics::kConstant || l.empty()) l.assign(n * n, 0.0);
+    if (owned.dynamics != OwnedDynamics::kGaussMarkov) tau_s = 0.0;
+  }
+
+  bool returns() const { return tau_s > 0.0; }
+  bool stationary() const {
+    return !returns() && std::ranges::all_of(l, [](double one) { return one == 0.0; });
+  }
+  double Decay(double dt_s) const { return returns() ? std::exp(-dt_s / tau_s) : 1.0; }
+  void SqrtQ(double dt_s, int n, MatrixRef q) const {
+    const double time = returns() ? -0.5 * tau_s * std::expm1(-2.0 * dt_s / tau_s) : dt_s;
+    for (int i = 0; i < n * n; ++i) {
+      q(i / n, i % n) = std::sqrt(std::max(time, 0.0)) * l[static_cast<std::size_t>(i)];
+    }
+  }
+
+  std::vector<double> mean, l;
+  double tau_s;
+};
+
+struct OwnedVector : Motion<kDynamic, Vec<kDynamic>> {
+  static constexpr std::array kBlocks{Quantity{"value"}};
+
+  Dynamics dynamics;
+  int size;
+
+  OwnedVector(const OwnedRole& owned, int n)
+      : dynamics(owned, static_cast<std::size_t>(n)), size(n) {}
+
+  int Size(int) const { return size; }
+  int NoiseSize() const { return size; }
+  bool Stationary() const { return dynamics.stationary(); }
+  template <class T>
+  void Step(const T* x, const T* w, double dt_s, T* next) const {
+    const double a = dynamics.Decay(dt_s);
+    for (int i = 0; i < size; ++i) {
+      const double mean = dynamics.returns() ? dynamics.mean[static_cast<std::size_t>(i)] : 0.0;
+      next[i] = mean + a * (x[i] - mean) + w[i];
+    }
+  }
+  void StepJacobian(const double*, const double*, double dt_s, MatrixRef f, MatrixRef g) const {
+    for (int i = 0; i < size; ++i) {
+      f(i, i) = dynamics.Decay(dt_s);
+      g(i, i) = 1.0;
+    }
+  }
+  void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, size, q); }
+};
+
+template <class G>
+struct OwnedOn : Motion<G::kTangent, G> {
+  static constexpr std::array kBlocks{Quantity{"value"}};
+
+  Dynamics dynamics;
+
+  explicit OwnedOn(const OwnedRole& owned) : dynamics(owned, G::kTangent) {}
+
+  bool Stationary() const { return dynamics.stationary(); }
+  template <class T>
+  void Step(const T* x, const T* w, double dt_s, T* next) const {
+    if (!dynamics.returns()) return G::Plus(x, w, next);
+    T d[G::kTangent], moved[G::kAmbient];
+    G::Minus(x, dynamics.mean.data(), d);
+    for (T& element : d) element *= dynamics.Decay(dt_s);
+    G::Plus(dynamics.mean.data(), d, moved);
+    G::Plus(moved, w, next);
+  }
+  void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, G::kTangent, q); }
+};
+
+const char* NameOf(OwnedDynamics dynamics) {
+  switch (dynamics) {
+    case OwnedDynamics::kRandomWalk:
+      return "random_walk";
+    case OwnedDynamics::kGaussMarkov:
+      return "gauss_markov";
+    case OwnedDynamics::kConstant:
+      break;
+  }
+  return "constant";
+}
+
+}  // namespace
+
+MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
+  const char* const name = NameOf(owned.dynamics);
+  switch (geometry.kind) {
+    case GeometryKind::kAngle:
+      return InProcessMotion(OwnedOn<Angle>(owned), name);
+    case GeometryKind::kUnitQuaternion:
+      return InProcessMotion(OwnedOn<UnitQuaternion>(owned), name);
+    case GeometryKind::kUnitVector:
+      return InProcessMotion(OwnedOn<UnitVector>(owned), name);
+    case GeometryKind::kVector:
+    case GeometryKind::kProduct:  // of measurements alone
+      break;
+  }
+  ALIDADE_EXPECTS(geometry.kind == GeometryKind::kVector);
+  return InProcessMotion(OwnedVector(owned, geometry.ambient), name);
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "alidade/estimation/system.h"
+
+namespace alidade::internal {
+
+/// What the entry of a sensor of landmarks has besides: its landmark roles together, as the role
+/// `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
+/// kBadConfig.
+void ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding);
+
+/// The map `landmarks` of the config's root, as the sensors need it; none where no sensor measures
+/// landmarks. Errors: kBadConfig where it does not fit them.
+std::optional<LandmarkOptions> ReadLandmarks(const Node& root,
+                                             const std::vector<SensorBinding>& sensors);
+
+}  // namespace alidade::internal

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/recovery.h"
+
+#include <algorithm>
+
+#include "alidade/base/number_text.h"
+#include "alidade/estimation/first_values.h"
+#include "alidade/state/dense_algebra.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
+Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  const SymmetricEigen above = EigenOf(b - a);
+  const Eigen::VectorXd positive = above.values.cwiseMax(0.0);
+  return a + ProductTransposed(above.vectors * positive.asDiagonal(), above.vectors);
+}
+
+/// Of the blocks that one motion model moves together with `id`: the values they have are no better
+/// known than at the start, nor than they are. Uncorrelated. `id` itself is initialised after it.
+void DropMotionOf(FilterState& f, BlockId id) {
+  for (const MotionBinding& motion : f.binding->system.motions) {
+    if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
+    for (const Prior& prior : f.binding->system.priors) {
+      const Block& block = f.state.layout()[prior.block];
+      if (std::ranges::find(motion.blocks, prior.block) == motion.blocks.end() ||
+          prior.covariance.size() == 0 || !block.has_covariance() ||
+          block.status != BlockStatus::kEstimated) {
+        continue;
+      }
+      const double* const value = f.state.value(prior.block);
+      const std::vector<double> kept(value, value + block.geometry().ambient);
+      const int at = block.tangent_offset, n = block.geometry().tangent;
+      f.state.Add(prior.block, kept.data(),
+                  UpperBound(prior.covariance, f.state.covariance().Block(at, n, at, n)));
+    }
+  }
+}
+
+/// Multiplies the standard deviations of the blocks that a sensor corrects by 10; false where there
+/// are none.
+bool Inflate(FilterState& f, const SensorBinding& sensor) {
+  constexpr double kInflation = 10.0;
+  bool any = false;
+  for (const RoleBinding& role : sensor.roles) {
+    const auto same = [&](const RoleBinding& other) { return other.block == role.block; };
+    const bool again = &role != &*std::ranges::find_if(sensor.roles, same);
+    if (role.block < 0 || role.mode != RoleMode::kEstimate || again) continue;
+    const Block& block = f.state.layout()[role.block];
+    if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
+    const int n = block.geometry().tangent;
+    const RowMajor inflation = kInflation * RowMajor::Identity(n, n);
+    const JacobianPart part{block.tangent_offset, n, 0};
+    f.state.covariance().Propagate({&part, 1}, inflation.data(), nullptr);
+    any = true;
+  }
+  if (any) f.motions.EndInterval();
+  return any;
+}
+
+}  // namespace
+
+void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
+  constexpr double kRounding = 1e-12;
+  const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
+  if (std::ranges::none_of(rows, is_not_pd)) return;
+  f.state.Recall();
+  Covariance& p = f.state.covariance();
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  Eigen::MatrixXd root;
+  const double defect = SquareRootOf(p.Dense(), ldlt, root);
+  if (!(defect < -kRounding)) return;
+  const std::string text = "the covariance is not positive semi-definite: a pivot is " +
+                           RoundedText(defect, 3) + " of its largest variance";
+  if (repairs_ == options_.max_covariance_repairs) {
+    return End(f, "not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
+  }
+  ++repairs_;
+  f.motions.EndInterval();
+  p.SetBlock(0, 0, ProductTransposed(root, root));
+  Note(f, "repaired",
+       text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
+           std::to_string(options_.max_covariance_repairs) + ")");
+}
+
+void Recovery::Recover(FilterState& f, Row& row) {
+  const SensorBinding& sensor = *row.binding;
+  const std::string why = "sensor '" + sensor.name + "' rejected " +
+                          std::to_string(options_.rejection_recovery_after) + " times in a row: ";
+  const int role = sensor.model.inverse().role;
+  Inverse inverse;
+  const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
+  if (options_.rejection_recovery == RejectionRecovery::kReset && target != nullptr &&
+      target->block >= 0 && target->mode == RoleMode::kEstimate &&
+      f.state.layout()[target->block].status == BlockStatus::kEstimated &&
+      Invert(f, row, nullptr, inverse) == Outcome::kAccepted) {
+    DropMotionOf(f, target->block);
+    Initialise(f, row, inverse);
+    Note(f, "rejection_recovery",
+         why + "reset " + f.state.layout()[target->block].name + " from its measurement");
+    return;
+  }
+  char& inflated = f.health.inflated[static_cast<std::size_t>(row.sensor)];
+  if (inflated != 0) return;
+  inflated = 1;
+  Note(f, "rejection_recovery",
+       why + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
+                                 : "it corrects no block to inflate"));
+}
+
+}  // namespace alidade::internal

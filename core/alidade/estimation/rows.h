@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/estimation/filter_state.h"
+#include "alidade/state/panels.h"
+#include "alidade/state/workspace.h"
+
+/// Measurements on their way into an update: what a frame has of them, what their sensor models say
+/// at some x, and how they lie below one another.
+namespace alidade::internal {
+
+/// One measurement on its way into an update: m = dof, n = size of P.
+struct Row {
+  const Measurement* measurement = nullptr;
+  MeasurementReport* report = nullptr;
+  int sensor = -1;
+  const SensorBinding* binding = nullptr;
+  const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
+  const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
+  SensorPlace own;                     ///< with the blocks of the landmark that it measures
+  std::vector<double> H;               ///< H, m rows of the place's width
+  std::vector<double> R;               ///< R, m x m, row-major
+  std::vector<const double*> roles;    ///< what fills its roles, as RolesAt last had it
+  double weight = 1.0;                 ///< w of the robust loss; R is divided by it
+  struct {
+    std::vector<double*> columns;
+    std::vector<double> l;  ///< factor of R
+  } memory;
+
+  /// Whether it measures a landmark in the state.
+  bool on_landmark() const { return place == &own; }
+  JacobianRows jacobian() const {
+    return {H.data(), report->dof, place->width, place->parts, place->whole};
+  }
+};
+
+/// The rows of a frame, in memory that is kept from one to the next.
+class Rows {
+ public:
+  /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
+  /// its entry in the report: kAccepted as long as nothing speaks against it. With `refused` all
+  /// have that outcome, and no model is asked.
+  void Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
+               std::optional<Outcome> refused = {});
+  /// The same of one measurement and one sensor, whatever their streams. kAccepted.
+  Row& CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
+                  UpdateReport& report);
+  std::span<Row> all() { return {rows_.data(), count_}; }
+
+ private:
+  Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
+           UpdateReport& report);
+  Outcome Check(const Row& row);
+
+  std::vector<Row> rows_;  ///< the first count_ are in use
+  std::size_t count_ = 0;
+  // Memory.
+  Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
+  Scratch<Eigen::MatrixXd> root_;
+};
+
+// A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point, a
+// point of a batch. What it does not write is not a number. m: tangent size of the measurement.
+
+/// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
+/// Null: the role has no place.
+void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
+             const std::vector<double>& known_roles, std::vector<const double*>& roles);
+
+/// h of a measurement at the roles, ambient, and unless null H, m rows of the place's width.
+/// `columns` is memory.
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles,
+                   std::vector<double*>& columns, std::vector<double>& h,
+                   std::vector<double>* jacobian);
+
+/// R at the roles, or as the measurement itself says, m x m. `l` is memory.
+Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
+                const double* const* roles, std::vector<double>& l, std::vector<double>& r);
+
+// The same of a row.
+
+/// What fills its roles at x; roles that the sensor knows have their value in f. Until the next
+/// call.
+const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x);
+/// h at x, ambient, in `h`.
+Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h);
+/// h at the roles, in the report, and H, in the row.
+Outcome LineariseAt(Row& row, const double* const* roles);
+/// R at the roles, or as the measurement itself says, in the row.
+Outcome NoiseAt(Row& row, const double* const* roles);
+/// z (-) h of the h in the report, in the report.
+void TakeInnovation(Row& row);
+/// H <- H J in the columns of one role, J size x size, row-major.
+void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work);
+
+// The rows of an update below one another: m rows in all, n = size of P.
+
+/// m, of all rows of an update.
+Eigen::Index TotalDof(std::span<Row* const> rows);
+
+/// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
+inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
+/// Puts the gain of all rows of an update into their reports: n x m by columns, its rows as they
+/// lie in P.
+void RecordGain(const FilterState& f, std::span<Row* const> rows, const double* gain);
+
+struct Stacked {
+  Workspace::Matrix h, noise;    ///< H (m x n), R (m x m)
+  Workspace::Vector innovation;  ///< m
+};
+
+/// The rows as they are, in f.work.
+Stacked Stack(FilterState& f, std::span<Row* const> rows);
+/// H, R, the innovation and P H' (n x m, as the kernels take it) of all rows, in f.work.
+Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
+Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
+Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
+Panels ProjectionOf(FilterState& f, std::span<Row* const> rows);
+/// (H Phi)' of all rows, k x m, in f.work: see OutsideCorrelation.
+Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows);
+/// The lower triangle of s += H P H', m x m, from the P H' that ProjectionOf returned last.
+void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s);
+/// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
+/// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
+template <class Zero>
+void ForEachConsidered(const FilterState& f, std::span<Row* const> rows, const Zero& zero) {
+  for (std::size_t i = 0; f.blocks.considering && i < f.binding->system.layout.blocks().size();
+       ++i) {
+    const Block& block = f.state.layout()[static_cast<BlockId>(i)];
+    if (!block.present || block.status != BlockStatus::kConsider) continue;
+    zero(block.tangent_offset, block.geometry().tangent, 0, TotalDof(rows));
+  }
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const SensorPlace& place = *row->place;
+    for (std::size_t i = 0; i < place.parts.size(); ++i) {
+      if (place.consider[i]) zero(place.parts[i].offset, place.parts[i].size, at, row->report->dof);
+    }
+    at += row->report->dof;
+  }
+}
+
+}  // namespace alidade::internal

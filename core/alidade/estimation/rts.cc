@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/rts.h"
+
+#include "alidade/base/error.h"
+#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/linear.h"
+#include "alidade/state/dense_algebra.h"
+
+namespace alidade {
+namespace internal {
+
+/// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
+/// information. Where the frame starts inside an interval, A has columns for w behind those of x.
+struct Adjoint {
+  Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
+  Eigen::VectorXd b;
+  Eigen::MatrixXd information;
+
+  /// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
+  void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const {
+    const Eigen::Index n = a.rows(), before = a.cols() - n;
+    Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
+    whole.topRows(n) = a;
+    if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
+    lambda = whole.transpose() * lambda + b;
+    later = Product(TransposedProduct(whole, later), whole) + information;
+    later = 0.5 * (later + later.transpose()).eval();
+  }
+};
+
+namespace {
+
+/// Linear, that takes its steps and updates down as an adjoint.
+class Taped : public Method {
+ public:
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<Taped>(*this); }
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+
+  /// From here on is another frame.
+  void StartFrame(const FilterState& f);
+  const Adjoint& frame() const { return frame_; }
+
+ private:
+  Linear linear_;
+  Adjoint frame_;
+};
+
+void Taped::StartFrame(const FilterState& f) {
+  const Eigen::Index n = f.size();
+  const Eigen::Index all = n + (f.motions.in_interval() ? f.motions.noise_size() : 0);
+  frame_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
+            Eigen::MatrixXd::Zero(all, all)};
+}
+
+Trouble Taped::Step(FilterState& f, double dt_s) {
+  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+  const Workspace::Use use(f.work);
+  frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
+  const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
+  if (held > 0) frame_.a.rightCols(held) += f.motions.Held(&Motions::Step::gl, f.size(), f.work);
+  return {};
+}
+
+Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  const Stacked all = Stack(f, rows);
+  const Eigen::MatrixXd p = f.state.covariance().Dense();
+  const std::vector<double> before = f.state.values();
+  const Outcome outcome = linear_.Correct(f, rows);
+  if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
+  // The filter has factorised the same S.
+  const Eigen::MatrixXd h = all.h, weighted = SolvePositive(Congruence(h, p) + all.noise, h);
+  Eigen::MatrixXd a = -Product(ProductTransposed(p, h), weighted);  // I - P H' S^-1 H
+  a.diagonal().array() += 1.0;
+  const Workspace::Matrix back = TransportTo(f.state, before, f.work);
+  frame_.b += frame_.a.transpose() * (weighted.transpose() * all.innovation);
+  frame_.information +=
+      Product(TransposedProduct(frame_.a, TransposedProduct(h, weighted)), frame_.a);
+  frame_.a = Product(TransposedProduct(back, a), frame_.a);
+  return outcome;
+}
+
+}  // namespace
+}  // namespace internal
+
+/// One frame, and the filter's estimate after it.
+struct RtsSmoother::Passed {
+  internal::Adjoint adjoint;
+  std::vector<double> x;
+  Eigen::MatrixXd p;
+  Eigen::MatrixXd m;  ///< M inside an interval, else n x 0
+  UpdateReport report;
+};
+
+RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+                         const std::vector<StreamInfo>& streams)
+    : loop_(std::make_unique<internal::FrameLoop>(std::move(system),
+                                                  internal::WithoutRecovery(options), streams,
+                                                  std::make_unique<internal::Taped>())) {
+  ALIDADE_EXPECTS(!FindUnsupported(loop_->f.binding->system, kSupport));
+}
+
+RtsSmoother::~RtsSmoother() = default;
+
+void RtsSmoother::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
+const State& RtsSmoother::state() const { return loop_->f.state; }
+Timestamp RtsSmoother::timestamp() const { return loop_->f.timestamp; }
+bool RtsSmoother::diverged() const { return loop_->f.health.diverged; }
+bool RtsSmoother::failed() const { return loop_->f.health.ended; }
+
+const UpdateReport& RtsSmoother::Process(const Frame& frame) {
+  auto& tape = dynamic_cast<internal::Taped&>(*loop_->method);
+  const internal::FilterState& f = loop_->f;
+  tape.StartFrame(f);
+  loop_->Process(frame);
+  Workspace work;
+  Eigen::MatrixXd held(f.size(), 0);
+  if (f.motions.in_interval()) held = f.motions.Held(&internal::Motions::Step::m, f.size(), work);
+  passed_frames_.push_back(
+      {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
+  passed_frames_.back().report.events.clear();  // told already
+  return f.report;
+}
+
+void RtsSmoother::Smooth(const Emit& emit) {
+  const Eigen::Index n = state().covariance().size();
+  Eigen::VectorXd lambda = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);  // Lambda
+  std::vector<Event> events;
+  State smoothed = state();
+  for (auto passed = passed_frames_.rbegin(); passed != passed_frames_.rend(); ++passed) {
+    const Eigen::Index held = lambda.size() - n;  // noise inputs, of an interval that goes on
+    Eigen::MatrixXd with(n, n + held);            // Cov(x, (x, w))
+    with.leftCols(n) = passed->p;
+    with.rightCols(held) = passed->m.leftCols(held);
+    const Eigen::MatrixXd p = passed->p - internal::Congruence(with, information);
+    const bool positive = (p.diagonal().array() >= 0.0).all();
+    if (!positive) {
+      events.push_back({timestamp(), "not_pd",
+                        "a smoothed variance is negative by rounding in frame " +
+                            std::to_string(passed_frames_.rend() - passed - 1) +
+                            "; its covariance is the filter's"});
+    }
+    smoothed.values() = passed->x;
+    smoothed.Retract((with * lambda).eval().data(), passed->x);
+    if (positive) passed->p = p;
+    smoothed.covariance().SetBlock(0, 0, passed->p);
+    smoothed.MoveTo(passed->x);
+    passed->p = smoothed.covariance().Dense();
+    passed->adjoint.GoBack(held, lambda, information);
+  }
+  for (std::size_t k = 0; k < passed_frames_.size(); ++k) {
+    Passed& passed = passed_frames_[k];
+    smoothed.values() = passed.x;
+    smoothed.covariance().SetBlock(0, 0, passed.p);
+    if (k + 1 == passed_frames_.size()) passed.report.events = events;
+    emit(k, smoothed, passed.report);
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/square_root_ekf.h"
+
+#include <Eigen/Householder>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/base/error.h"
+#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/linear.h"
+#include "alidade/state/dense_algebra.h"
+#include "alidade/state/tiles.h"
+
+namespace alidade {
+namespace internal {
+namespace {
+
+/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
+/// it lies what is of no use. `work`: n numbers.
+void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
+    double tau = 0.0, beta = 0.0;
+    a.col(k).tail(rows).makeHouseholderInPlace(tau, beta);
+    a(k, k) = beta;
+    a.bottomRightCorner(rows, columns)
+        .applyHouseholderOnTheLeft(a.col(k).tail(rows - 1), tau, work);
+  }
+}
+
+/// root, n x n, with root root' = a a' + b b', for a n x n.
+void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
+              Eigen::MatrixXd& root) {
+  const Workspace::Use use(f.work);
+  const Eigen::Index n = a.rows();
+  Workspace::Matrix tall = f.work.Take(n + b.cols(), n);
+  tall.topRows(n) = a.transpose();
+  tall.bottomRows(b.cols()) = b.transpose();
+  Triangularise(tall, f.work.Take(n).data());
+  tall.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
+  root = tall.topRows(n).transpose();
+}
+
+/// Linear, with a root of P stepped and corrected beside it, of which P is made.
+class SquareRoot : public Method {
+ public:
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<SquareRoot>(*this); }
+  void Begin(FilterState& f) override;
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+
+  const Eigen::MatrixXd& root() const { return root_; }
+
+ private:
+  void Project(FilterState& f, Row& row) const;
+  void SetCovariance(FilterState& f) const;
+
+  /// Of a sensor's R.
+  struct NoiseRoot {
+    Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt;
+    Eigen::MatrixXd root;
+  };
+
+  Linear linear_;
+  Eigen::MatrixXd root_;
+  Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
+  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
+};
+
+void SquareRoot::Begin(FilterState& f) {
+  noise_roots_.resize(f.binding->sensor_places.size());
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  SquareRootOf(f.state.covariance().Dense(), ldlt, root_);
+  SetCovariance(f);
+}
+
+/// P = L L'.
+void SquareRoot::SetCovariance(FilterState& f) const {
+  const Workspace::Use use(f.work);
+  Workspace::Matrix p = f.work.Take(root_.rows(), root_.rows());
+  p.setZero();
+  AddOuterProduct(p, root_, 1.0);
+  f.state.covariance().SetBlock(0, 0, p);
+}
+
+Trouble SquareRoot::Step(FilterState& f, double dt_s) {
+  const bool goes_on = f.motions.in_interval();
+  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+  const Workspace::Use use(f.work);
+  const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
+  Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
+                    noise = f.motions.Held(&Motions::Step::gl, f.size(), f.work, true);
+  moved.setZero();
+  AddProduct(moved, transition, goes_on ? without_held_ : root_);
+  if (f.motions.holds()) {
+    noise -= f.motions.Held(&Motions::Step::gl, f.size(), f.work);
+    if ((noise.array() != 0.0).any()) {
+      TakeRoot(f, moved, noise, without_held_);
+    } else {
+      without_held_ = moved;
+    }
+    noise += f.motions.Held(&Motions::Step::m, f.size(), f.work);
+  }
+  TakeRoot(f, moved, noise, root_);
+  SetCovariance(f);
+  return {};
+}
+
+Outcome SquareRoot::Predict(FilterState& f, Row& row) {
+  const Outcome outcome = linear_.Linearise(f, row);
+  if (outcome == Outcome::kAccepted) Project(f, row);
+  return outcome;
+}
+
+/// S = (H L) (H L)' + R, which rounding does not turn negative.
+void SquareRoot::Project(FilterState& f, Row& row) const {
+  const Workspace::Use use(f.work);
+  Row* const one[] = {&row};
+  const Stacked all = Stack(f, one);
+  const Eigen::Index m = all.h.rows();
+  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s = f.work.Take(m, m);
+  hl.setZero();
+  AddProduct(hl, all.h, root_);
+  s = all.noise;
+  AddProductWithTransposed(s, hl, hl);
+  row.report->s.assign(s.data(), s.data() + s.size());
+}
+
+Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  const Stacked all = Stack(f, rows);
+  const Eigen::Index n = root_.rows(), m = all.h.rows();
+  Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);  // array: transposed
+  array.setZero();
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const Eigen::Index k = row->report->dof;
+    auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(row->sensor)];
+    SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
+    array.block(at, at, k, k) = root.transpose();
+    at += k;
+  }
+  hl.setZero();
+  AddProduct(hl, all.h, root_);
+  array.bottomLeftCorner(n, m) = hl.transpose();
+  array.bottomRightCorner(n, n) = root_.transpose();
+  Triangularise(array, f.work.Take(m + n).data());
+  array.triangularView<Eigen::StrictlyLower>().setZero();
+  if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) return Outcome::kNotPd;
+  Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);  // K = W Ls^-1
+  Workspace::Vector dx = f.work.Take(n);
+  gain = array.topRightCorner(m, n).transpose();
+  l = array.topLeftCorner(m, m).transpose();
+  Divide(l, gain);
+  dx.noalias() = gain * all.innovation;
+  f.state.Retract(dx.data(), f.moved);
+  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  const Workspace::Matrix transport = TransportTo(f.state, f.moved, f.work);
+  f.state.MoveTo(f.moved);
+  root_.setZero();
+  AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));
+  SetCovariance(f);
+  RecordGain(f, rows, gain.data());
+  return Outcome::kAccepted;
+}
+
+}  // namespace
+}  // namespace internal
+
+SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
+                             const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), internal::WithoutRecovery(options), streams,
+             std::make_unique<internal::SquareRoot>()) {
+  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+}
+
+const Eigen::MatrixXd& SquareRootEkf::root() const {
+  const auto* const method = dynamic_cast<const internal::SquareRoot*>(&*loop().method);
+  ALIDADE_EXPECTS(method != nullptr);
+  return method->root();
+}
+
+}  // namespace alidade

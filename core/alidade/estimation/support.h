@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "alidade/estimation/system.h"
+
+namespace alidade {
+
+/// What an estimator can do with a system, beyond blocks that are estimated or constant.
+struct Support {
+  bool consider = false;          ///< consider blocks and roles (Schmidt)
+  bool known = true;              ///< known roles
+  bool at_measurement = false;    ///< jacobian_at: measurement
+  bool from_measurement = false;  ///< blocks that start from their first measurement
+  bool recovery = false;          ///< after consecutive rejections
+  bool landmarks = false;         ///< that come and go
+};
+
+/// Something that a system asks for and an estimator cannot do: of a block, of a role of a sensor,
+/// or without either the landmarks.
+struct Unsupported {
+  std::string what;    ///< `consider blocks`
+  std::string remedy;  ///< what to write in its place: `the block estimated or constant`
+  BlockId block = -1;
+  int sensor = -1;  ///< index into System::sensors
+  int role = -1;    ///< index into its roles
+};
+
+/// The first thing that `system` asks for beyond `support`, blocks before sensors; nothing where
+/// all can be done. Recovery is an option of the estimator, and not looked at.
+std::optional<Unsupported> FindUnsupported(const System& system, const Support& support);
+
+}  // namespace alidade

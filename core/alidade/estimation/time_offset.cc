@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/time_offset.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <numeric>
+#include <utility>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/base/words.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
+/// ones stay.
+struct Mover {
+  MotionModel model;
+  int first, count;
+  std::vector<bool> stays;
+};
+
+/// The sensor at another time, behind the calls of the plugin ABI.
+class OffsetSensor {
+ public:
+  OffsetSensor(SensorModel sensor, std::vector<Mover> movers, std::vector<int> place_of_role,
+               std::vector<Space> roles, int offset_role)
+      : sensor_(std::move(sensor)),
+        movers_(std::move(movers)),
+        place_(std::move(place_of_role)),
+        roles_(std::move(roles)),
+        offset_(offset_role) {
+    for (const Mover& mover : movers_) {
+      for (const Space& block : mover.model.blocks()) {
+        ambient_ += static_cast<std::size_t>(block.geometry.ambient);
+      }
+      const auto n = static_cast<std::size_t>(mover.model.tangent_size());
+      tangent_ += n;
+      square_ += n * n;
+      noise_ = std::max(noise_, n * static_cast<std::size_t>(mover.model.noise_size()));
+    }
+    Describe();
+  }
+  OffsetSensor(const OffsetSensor&) = delete;
+  OffsetSensor& operator=(const OffsetSensor&) = delete;
+
+  /// Takes over `self`.
+  static SensorModel Publish(std::unique_ptr<OffsetSensor> self) {
+    AlidadeInstance instance{};
+    instance.struct_size = sizeof(instance);
+    instance.kind = ALIDADE_KIND_SENSOR;
+    instance.destroy = [](void* of) { delete static_cast<OffsetSensor*>(of); };
+    instance.error_text = [](const void* of) { return Of(of).ErrorText(); };
+    instance.description = &self->description_;
+    instance.sensor = &self->calls_;
+    const std::string name = self->sensor_.name(), plugin = self->sensor_.instance().plugin();
+    const std::vector<double> noise = self->sensor_.instance().given_noise();
+    instance.self = self.release();
+    const auto model = std::make_shared<ModelInstance>(instance, name, plugin);
+    if (!noise.empty()) model->GiveNoise(noise);
+    return SensorModel(model);
+  }
+
+ private:
+  /// What a call needs besides its arguments, kept from one to the next in a thread.
+  struct Memory {
+    std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
+    std::vector<double> shifted, jacobian;
+    std::vector<const double*> roles;
+    std::vector<double*> jacobians;
+    std::vector<int> strides;
+    std::string error;  ///< of a mover or the sensor, where it failed
+  };
+  static Memory& MemoryOfThread() {
+    static thread_local Memory memory;
+    return memory;
+  }
+  static const OffsetSensor& Of(const void* self) {
+    return *static_cast<const OffsetSensor*>(self);
+  }
+
+  void Describe() {
+    const AlidadeDescription& inner = *sensor_.instance().c().description;
+    spaces_.resize(roles_.size());
+    for (std::size_t i = 0; i < roles_.size(); ++i) {
+      const Space& role = roles_[i];
+      texts_.push_back(Join(role.elements, ","));
+      AlidadeSpace& space = spaces_[i];
+      space.struct_size = sizeof(space);
+      space.geometry = static_cast<std::uint32_t>(role.geometry.kind);
+      space.ambient = role.geometry.ambient;
+      space.tangent = role.geometry.tangent;
+      space.flags = role.flags & (ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED);
+      space.name = role.name.c_str();
+      space.unit = role.unit.c_str();
+      space.doc = role.doc.c_str();
+    }
+    for (std::size_t i = 0; i < roles_.size(); ++i) spaces_[i].elements = texts_[i].c_str();
+    description_.struct_size = sizeof(description_);
+    description_.role_count = static_cast<std::uint32_t>(spaces_.size());
+    description_.role_stride = sizeof(AlidadeSpace);
+    description_.roles = spaces_.data();
+    description_.output = inner.output;
+    description_.known = inner.known;
+    description_.capabilities = inner.capabilities;
+    description_.prior_count = inner.prior_count;
+    calls_.struct_size = sizeof(calls_);
+    calls_.eval = Eval;
+    calls_.sqrt_noise = SqrtNoise;
+    if (sensor_.instance().c().sensor->valid != nullptr) calls_.valid = Valid;
+    const int role = sensor_.inverse().role;
+    if (role >= 0 && !IsMoved(place_[static_cast<std::size_t>(role)])) {
+      description_.initialise_role = place_[static_cast<std::size_t>(role)];
+      calls_.initialise = Initialise;
+    } else {
+      description_.capabilities &= ~std::uint32_t{ALIDADE_CAN_INITIALISE};
+    }
+  }
+
+  bool IsMoved(int place) const {
+    return std::ranges::any_of(movers_, [&](const Mover& mover) {
+      return place >= mover.first && place < mover.first + mover.count;
+    });
+  }
+
+  /// x' of one mover after dt_s, its blocks one after the other; its F unless null.
+  static Status Move(const Mover& mover, const double* const* x, double dt_s, double* next,
+                     Memory& memory, double* f) {
+    std::array<double*, kMaxRoles> to;
+    double* at = next;
+    for (std::size_t b = 0; b < mover.model.blocks().size(); ++b) {
+      to[b] = at;
+      at = std::fill_n(at, mover.model.blocks()[b].geometry.ambient, kNotWritten);
+    }
+    const int n = mover.model.tangent_size();
+    if (f != nullptr) std::fill_n(f, n * n, kNotWritten);
+    const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
+                                           f == nullptr ? nullptr : memory.g.data());
+    int row = 0;
+    for (std::size_t b = 0; status == Status::kOk && b < mover.model.blocks().size(); ++b) {
+      const Geometry& geometry = mover.model.blocks()[b].geometry;
+      geometry.Normalise(to[b]);
+      if (mover.stays[b]) std::copy_n(x[b], geometry.ambient, to[b]);
+      for (int r = row; r < row + geometry.tangent && mover.stays[b] && f != nullptr; ++r) {
+        std::fill_n(f + r * n, n, 0.0);
+        f[r * n + r] = 1.0;
+      }
+      row += geometry.tangent;
+    }
+    return status;
+  }
+
+  /// df/ddelta of one mover at x' = next, in its tangent.
+  static Status Differentiate(const Mover& mover, const double* const* x, double dt_s,
+                              const double* next, Memory& memory, double* rate) {
+    constexpr double kStep = 1e-3;
+    const std::array<std::pair<double, double>, 4> points{
+        {{-2.0, 1.0 / 12.0}, {-1.0, -2.0 / 3.0}, {1.0, 2.0 / 3.0}, {2.0, -1.0 / 12.0}}};
+    std::fill_n(rate, mover.model.tangent_size(), 0.0);
+    std::vector<double>& there = memory.shifted;
+    for (const auto& [steps, weight] : points) {
+      const Status status = Move(mover, x, dt_s + steps * kStep, there.data(), memory, nullptr);
+      if (status != Status::kOk) return status;
+      int a = 0, t = 0;
+      for (const Space& block : mover.model.blocks()) {
+        std::array<double, 64> d;
+        double* const apart = block.geometry.tangent <= 64 ? d.data() : memory.jacobian.data();
+        block.geometry.Minus(there.data() + a, next + a, apart);
+        for (int i = 0; i < block.geometry.tangent; ++i) {
+          rate[t + i] += weight / kStep * apart[i];
+        }
+        a += block.geometry.ambient;
+        t += block.geometry.tangent;
+      }
+    }
+    return Status::kOk;
+  }
+
+  /// The roles of the sensor at t + delta, in memory.roles; with `derivatives` F and df/ddelta.
+  Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
+    memory.next.resize(ambient_);
+    memory.shifted.resize(ambient_);
+    memory.rate.resize(tangent_);
+    memory.f.resize(square_);
+    memory.g.resize(noise_);
+    memory.jacobian.resize(std::max(memory.jacobian.size(), tangent_));
+    memory.error.clear();
+    const double dt_s = roles[offset_][0];
+    memory.roles.assign(place_.size(), nullptr);
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      if (place_[i] >= 0) memory.roles[i] = roles[place_[i]];
+    }
+    double *next = memory.next.data(), *f = memory.f.data(), *rate = memory.rate.data();
+    for (const Mover& mover : movers_) {
+      const double* const* const x = roles + mover.first;
+      Status status = Move(mover, x, dt_s, next, memory, derivatives ? f : nullptr);
+      if (status == Status::kOk && derivatives) {
+        status = Differentiate(mover, x, dt_s, next, memory, rate);
+      }
+      if (status == Status::kError) {
+        memory.error =
+            "motion model '" + mover.model.name() + "' of its roles: " + mover.model.error_text();
+      }
+      if (status != Status::kOk) return status;
+      for (std::size_t i = 0; i < place_.size(); ++i) {
+        const int block = place_[i] - mover.first;
+        if (block < 0 || block >= mover.count) continue;
+        memory.roles[i] = next;
+        for (int b = 0; b < block; ++b) {
+          memory.roles[i] += mover.model.blocks()[static_cast<std::size_t>(b)].geometry.ambient;
+        }
+      }
+      for (const Space& block : mover.model.blocks()) next += block.geometry.ambient;
+      const int n = mover.model.tangent_size();
+      f += n * n;
+      rate += n;
+    }
+    return Status::kOk;
+  }
+
+  /// Gives the sensor where to write its Jacobians, of m rows: for roles that stay the caller's
+  /// place, for others one in memory.
+  void PlaceJacobians(int m, double* const* jacobians, const int* strides, Memory& memory) const {
+    std::size_t size = 0;
+    for (const Space& role : sensor_.roles())
+      size += static_cast<std::size_t>(m * role.geometry.tangent);
+    memory.jacobian.assign(std::max(memory.jacobian.size(), size), kNotWritten);
+    memory.jacobians.assign(place_.size(), nullptr);
+    memory.strides.assign(place_.size(), 0);
+    double* next = memory.jacobian.data();
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      const int n = sensor_.roles()[i].geometry.tangent;
+      if (place_[i] < 0) continue;
+      if (IsMoved(place_[i])) {
+        memory.jacobians[i] = next;
+        memory.strides[i] = n;
+      } else {
+        memory.jacobians[i] = jacobians[place_[i]];
+        memory.strides[i] = strides[place_[i]];
+      }
+      next += m * n;
+    }
+  }
+
+  /// J_c = sum_i J_i F_ic of the blocks c of all movers, and J_delta = sum_i J_i df_i/ddelta, from
+  /// the Jacobians J_i, of m rows, of the roles i that move.
+  void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
+    const auto to = [&](int role, int columns) {
+      return Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>(jacobians[role], m, columns,
+                                                           Eigen::OuterStride<>(strides[role]));
+    };
+    if (jacobians[offset_] != nullptr) to(offset_, 1).setZero();
+    const double *f = memory.f.data(), *rate = memory.rate.data();
+    for (const Mover& mover : movers_) {
+      const std::int32_t* const tangents = mover.model.instance().tangents().data();
+      const int n = mover.model.tangent_size();
+      for (int c = 0; c < mover.count; ++c) {
+        if (jacobians[mover.first + c] != nullptr) to(mover.first + c, tangents[c]).setZero();
+      }
+      for (std::size_t i = 0; i < place_.size(); ++i) {
+        const int block = place_[i] - mover.first;
+        if (block < 0 || block >= mover.count) continue;
+        const int row = std::accumulate(tangents, tangents + block, 0);
+        const Eigen::Map<const RowMajor> own(memory.jacobians[i], m, tangents[block]);
+        for (int k = 0; k < tangents[block]; ++k) {
+          if (jacobians[offset_] != nullptr) to(offset_, 1) += own.col(k) * rate[row + k];
+          const double* from = f + (row + k) * n;
+          for (int c = 0; c < mover.count; ++c) {
+            const Eigen::Map<const Eigen::RowVectorXd> of_c(from, tangents[c]);
+            if (jacobians[mover.first + c] != nullptr) {
+              to(mover.first + c, tangents[c]).noalias() += own.col(k) * of_c;
+            }
+            from += tangents[c];
+          }
+        }
+      }
+      f += n * n;
+      rate += n;
+    }
+  }
+
+  static std::int32_t Eval(const void* self, const AlidadeObservation* seen,
+                           const double* const* roles, double* z, double* const* jacobians,
+                           const std::int32_t* strides) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const Status status = of.Shift(roles, jacobians != nullptr, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    const int m = of.sensor_.measurement().geometry.tangent;
+    if (jacobians != nullptr) of.PlaceJacobians(m, jacobians, strides, memory);
+    const Status there = jacobians == nullptr
+                             ? of.sensor_.Predict(memory.roles.data(), z, seen->known)
+                             : of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
+                                                    memory.strides.data(), seen->known);
+    if (there == Status::kError) memory.error = of.sensor_.error_text();
+    if (there == Status::kOk && jacobians != nullptr) of.Chain(m, jacobians, strides, memory);
+    return static_cast<std::int32_t>(there);
+  }
+  static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
+                                const double* const* roles, double* l, std::int32_t stride) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const Status status = of.Shift(roles, false, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    const AlidadeInstance& c = of.sensor_.instance().c();
+    return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
+  }
+  static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
+    MemoryOfThread().error.clear();
+    const AlidadeInstance& c = Of(self).sensor_.instance().c();
+    return c.sensor->valid(c.self, seen);
+  }
+  static std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
+                                 const double* const* roles, const double* prior, double* y,
+                                 double* const* jx, const std::int32_t* jx_strides, double* jz,
+                                 std::int32_t jz_stride, double* jp, std::int32_t jp_stride) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const bool derivatives = jx != nullptr;
+    const Status status = of.Shift(roles, derivatives, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    int rows = 0;
+    const auto first = of.sensor_.roles().begin() + of.sensor_.inverse().role;
+    for (auto role = first; role != first + of.sensor_.inverse().count; ++role) {
+      rows += role->geometry.tangent;
+    }
+    if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
+    const AlidadeInstance& c = of.sensor_.instance().c();
+    const std::int32_t code =
+        c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
+                             derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),
+                             jz, jz_stride, jp, jp_stride);
+    if (code == ALIDADE_OK && derivatives) of.Chain(rows, jx, jx_strides, memory);
+    return code;
+  }
+  const char* ErrorText() const {
+    if (const std::string& text = MemoryOfThread().error; !text.empty()) return text.c_str();
+    const AlidadeInstance& c = sensor_.instance().c();
+    return c.error_text == nullptr ? "" : c.error_text(c.self);
+  }
+
+  SensorModel sensor_;
+  std::vector<Mover> movers_;
+  std::vector<int> place_;  ///< by role of the sensor: which role of this; -1: unbound
+  std::vector<Space> roles_;
+  int offset_;
+  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;  ///< of Memory
+  std::vector<AlidadeSpace> spaces_;
+  std::vector<std::string> texts_;
+  AlidadeDescription description_{};
+  AlidadeSensor calls_{};
+};
+
+/// How the roles of a sensor and the blocks of its motion models become the roles of an
+/// OffsetSensor.
+struct Arrangement {
+  std::vector<Mover> movers;
+  std::vector<Space> roles;
+  std::vector<RoleBinding> bindings;
+  std::vector<int> place_of_role;
+  int offset = -1;
+
+  /// Appends a role; its index.
+  int Add(Space space, RoleBinding binding, const std::string& name) {
+    space.name = name;
+    roles.push_back(std::move(space));
+    bindings.push_back(binding);
+    return static_cast<int>(roles.size()) - 1;
+  }
+};
+
+/// Of one model of the sensor: its own, or that of landmarks that are xyz.
+Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& sensor,
+                    const SensorModel& model) {
+  Arrangement all;
+  all.place_of_role.assign(model.roles().size(), -1);
+  const auto role_of = [&](BlockId block) {
+    const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
+    return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
+  };
+  for (const MotionBinding& motion : system.motions) {
+    const bool moves =
+        !motion.model.stationary() &&
+        std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
+    if (!moves) continue;
+    all.movers.push_back({motion.model,
+                          static_cast<int>(all.roles.size()),
+                          static_cast<int>(motion.blocks.size()),
+                          {}});
+    // What brings the motion model decides how its other blocks take part.
+    const auto moved =
+        std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
+    const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
+    for (const BlockId id : motion.blocks) {
+      all.movers.back().stays.push_back(system.layout[id].status == BlockStatus::kConstant);
+      const int role = role_of(id);
+      if (role < 0) {
+        all.Add(system.layout[id].space, RoleBinding{id, mode}, system.layout[id].name);
+        continue;
+      }
+      const auto index = static_cast<std::size_t>(role);
+      all.place_of_role[index] =
+          all.Add(model.roles()[index], sensor.roles[index], model.roles()[index].name);
+    }
+  }
+  for (std::size_t i = 0; i < std::min(sensor.roles.size(), model.roles().size()); ++i) {
+    const Space& role = model.roles()[i];
+    if (role.landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) continue;
+    all.place_of_role[i] = all.Add(role, sensor.roles[i], role.name);
+  }
+  all.offset = all.Add(system.layout[offset].space, RoleBinding{offset}, "time_offset");
+  for (std::size_t i = 0; i < model.roles().size(); ++i) {
+    const Space& role = model.roles()[i];
+    if (role.landmark()) all.place_of_role[i] = all.Add(role, {}, role.name);
+  }
+  return all;
+}
+
+SensorModel Publish(const SensorModel& model, Arrangement all) {
+  return OffsetSensor::Publish(std::make_unique<OffsetSensor>(model, std::move(all.movers),
+                                                              std::move(all.place_of_role),
+                                                              std::move(all.roles), all.offset));
+}
+
+}  // namespace
+
+std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& sensor) {
+  Arrangement all = Arrange(system, offset, sensor, sensor.model);
+  for (const Mover& mover : all.movers) {
+    if (mover.model.has_input()) {
+      return "motion model '" + mover.model.name() + "' of its roles takes a control input";
+    }
+  }
+  const auto at_measurement = [](const RoleBinding& role) {
+    return role.jacobian_at == JacobianAt::kMeasurement;
+  };
+  if (std::ranges::any_of(sensor.roles, at_measurement)) {
+    return "a role has jacobian_at: measurement";
+  }
+  if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
+  if (sensor.xyz) {
+    sensor.xyz = Publish(*sensor.xyz, Arrange(system, offset, sensor, *sensor.xyz));
+  }
+  std::vector<RoleBinding> bindings = std::move(all.bindings);
+  sensor.model = Publish(sensor.model, std::move(all));
+  sensor.roles = std::move(bindings);
+  return {};
+}
+
+}  // namespace alidade::internal

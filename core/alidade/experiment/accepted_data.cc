@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/accepted_data.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace alidade::internal {
+namespace {
+
+/// Whether each measurement of a sensor was used, in the order of the frame, as the report is.
+std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
+  std::vector<bool> used;
+  for (const MeasurementReport& entry : report.measurements()) {
+    if (entry.sensor != sensor) continue;
+    used.push_back(entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised);
+  }
+  return used;
+}
+
+}  // namespace
+
+Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
+                 const UpdateReport& report) {
+  Frame accepted{frame.timestamp, {}};
+  std::vector<std::optional<std::vector<bool>>> used(streams.size());  // none: of no sensor
+  for (int sensor = 0; sensor < std::ssize(system.sensors); ++sensor) {
+    const std::string& stream = system.sensors[static_cast<std::size_t>(sensor)].stream;
+    const auto found = std::ranges::find(streams, stream, &StreamInfo::name);
+    ALIDADE_EXPECTS(found != streams.end());
+    used[static_cast<std::size_t>(found - streams.begin())] = UsedOf(sensor, report);
+  }
+  std::vector<std::size_t> next(streams.size(), 0);
+  for (const Measurement& m : frame.measurements) {
+    const auto stream = static_cast<std::size_t>(m.stream);
+    const std::size_t at = next[stream]++;
+    const bool is_used = !used[stream] || (at < used[stream]->size() && (*used[stream])[at]);
+    if (is_used) accepted.measurements.push_back(m);
+  }
+  return accepted;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/frame_check.h"
+
+#include <iterator>
+
+#include "alidade/base/number_text.h"
+#include "alidade/estimation/truth_match.h"
+#include "alidade/state/quaternion_sign.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kCounted = 1e-9;
+
+[[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
+  throw ContractViolation("the source gives " + what + " at t = " + SecondsText(frame.timestamp));
+}
+
+void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<double>& values) {
+  if (std::ssize(values) == info.size) return;
+  Refuse(frame, std::to_string(values.size()) + " values of '" + info.name + "', not " +
+                    std::to_string(info.size) + ',');
+}
+
+/// What the models of the experiment say of a stream.
+Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
+  for (const NamedEstimator& named : experiment.estimators) {
+    for (const SensorBinding& sensor : named.system.sensors) {
+      if (sensor.stream == stream.name) return sensor.model.measurement().geometry;
+    }
+    for (const MotionBinding& motion : named.system.motions) {
+      if (motion.input.stream == stream.name) return motion.model.input().geometry;
+    }
+  }
+  return Geometry::Vector(stream.size);
+}
+
+}  // namespace
+
+FrameCheck::FrameCheck(const Experiment& experiment, Counts& normalised)
+    : source_(*experiment.source), normalised_(normalised) {
+  for (const StreamInfo& stream : source_.streams()) {
+    streams_.push_back({stream, GeometryOf(experiment, stream)});
+  }
+  const std::vector<StreamInfo>& truths = source_.truths();
+  for (const StreamInfo& truth : truths) {
+    truths_.push_back({truth, Geometry::Vector(truth.size)});
+  }
+  for (const NamedEstimator& named : experiment.estimators) {
+    const std::vector<int> match = MatchTruths(named.system.layout, truths);
+    for (std::size_t block = 0; block < match.size(); ++block) {
+      if (match[block] < 0) continue;
+      truths_[static_cast<std::size_t>(match[block])].geometry =
+          named.system.layout.blocks()[block].geometry();
+    }
+  }
+}
+
+void FrameCheck::operator()(SourceFrame& frame) {
+  Check(frame);
+  for (Measurement& m : frame.measurements) {
+    Normalise(streams_[static_cast<std::size_t>(m.stream)], m.values);
+  }
+  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
+    if (!frame.truth[t].empty()) Normalise(truths_[t], frame.truth[t]);
+  }
+}
+
+void FrameCheck::Check(const SourceFrame& frame) const {
+  for (const Measurement& m : frame.measurements) {
+    if (m.stream < 0 || m.stream >= std::ssize(streams_)) {
+      Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
+                        std::to_string(streams_.size()));
+    }
+    const Kind& kind = streams_[static_cast<std::size_t>(m.stream)];
+    CheckSize(frame, kind.info, m.values);
+    if (std::ssize(m.known) != kind.info.known) {
+      Refuse(frame, std::to_string(m.known.size()) + " known numbers with '" + kind.info.name +
+                        "', not " + std::to_string(kind.info.known) + ',');
+    }
+    const int tangent = kind.geometry.tangent;
+    if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
+      Refuse(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
+                        kind.info.name + "', not " + std::to_string(tangent * tangent) + ',');
+    }
+  }
+  if (frame.truth.size() > truths_.size()) {
+    Refuse(frame,
+           std::to_string(frame.truth.size()) + " truths of " + std::to_string(truths_.size()));
+  }
+  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
+    if (!frame.truth[t].empty()) CheckSize(frame, truths_[t].info, frame.truth[t]);
+  }
+}
+
+void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
+  kind.geometry.ForEachPart([&](const Geometry& part, int a, int) {
+    const bool is_rotation = part.kind == GeometryKind::kUnitQuaternion;
+    if (!is_rotation && part.kind != GeometryKind::kUnitVector) return;
+    double* const x = value.data() + a;
+    const double defect = DistanceFrom(part, x);
+    if (!(defect <= kUnitTolerance)) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(source_.place(), kind.info.name,
+                            std::string(is_rotation ? "a quaternion" : "a direction") +
+                                " whose length is off by " + RoundedText(defect, 4),
+                            "unit length to 1e-3"));
+    }
+    if (defect > kCounted) ++normalised_[kind.info.name];
+    part.Normalise(x);
+    if (is_rotation) ChooseSign({}, {x, 4});
+  });
+}
+
+void FrameCheck::FollowTruth(SourceFrame& frame) {
+  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
+    Kind& kind = truths_[t];
+    if (frame.truth[t].empty() || kind.geometry.kind != GeometryKind::kUnitQuaternion) continue;
+    ChooseSign(kind.before, frame.truth[t]);
+    kind.before = frame.truth[t];
+  }
+}
+
+}  // namespace alidade::internal

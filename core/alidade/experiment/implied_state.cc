@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/implied_state.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/estimation/truth_match.h"
+
+namespace alidade::internal {
+namespace {
+
+/// Whether the block is a scalar that the sensor tells from a measurement alone.
+bool IsInvertible(const System& system, const SensorBinding& binding) {
+  const int role = binding.model.inverse().role;
+  const int roles = static_cast<int>(binding.roles.size());
+  if (role < 0 || role >= roles) return false;
+  for (int r = 0; r < roles; ++r) {
+    if (r != role && binding.roles[static_cast<std::size_t>(r)].block >= 0) return false;
+  }
+  const BlockId block = binding.roles[static_cast<std::size_t>(role)].block;
+  return block >= 0 && system.layout[block].geometry().ambient == 1;
+}
+
+/// Whether measurement and roles are scalars.
+bool IsScalar(const SensorBinding& binding) {
+  const auto scalar = [](const Space& space) {
+    return space.geometry.kind == GeometryKind::kVector && space.geometry.ambient == 1;
+  };
+  return scalar(binding.model.measurement()) && std::ranges::all_of(binding.model.roles(), scalar);
+}
+
+/// x of the first role with h(x) = z, all scalar and the others as they are, by Newton's method
+/// from where it is; none where that does not converge.
+std::optional<double> SolveForFirst(const SensorModel& model, std::vector<const double*> roles,
+                                    double z) {
+  constexpr int kMostSteps = 20;
+  double x = *roles[0];
+  roles[0] = &x;
+  double slope = 0.0, h = 0.0;
+  std::vector<double*> jacobians(roles.size(), nullptr);
+  jacobians[0] = &slope;
+  const std::vector<int> strides(roles.size(), 1);
+  for (int i = 0; i < kMostSteps; ++i) {
+    if (model.Linearise(roles.data(), &h, jacobians.data(), strides.data()) != Status::kOk) break;
+    const double step = (z - h) / slope;
+    if (!std::isfinite(step)) break;
+    x += step;
+    if (std::abs(step) <= 1e-12 * std::abs(x)) return x;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<int> TruthsOfRoles(const System& system, const SensorBinding& binding,
+                               const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = MatchTruths(system.layout, truths);
+  std::vector<int> found;
+  for (const RoleBinding& role : binding.roles) {
+    found.push_back(role.block < 0 ? -1 : match[static_cast<std::size_t>(role.block)]);
+    if (found.back() < 0) return {};
+  }
+  return found;
+}
+
+std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<int>& truths) {
+  std::vector<const double*> roles;
+  for (const int index : truths) {
+    const auto t = static_cast<std::size_t>(index);
+    if (t >= truth.size() || truth[t].empty()) return {};
+    roles.push_back(truth[t].data());
+  }
+  return roles;
+}
+
+std::optional<ImpliedState> ImpliedState::Of(const System& system, const SensorBinding& binding,
+                                             const std::vector<StreamInfo>& truths) {
+  if (binding.model.known_size() > 0) return {};  // they would be needed, too
+  if (IsInvertible(system, binding)) {
+    const auto role = static_cast<std::size_t>(binding.model.inverse().role);
+    return ImpliedState(binding.model, binding.roles[role].block);
+  }
+  std::vector<int> of_roles = TruthsOfRoles(system, binding, truths);
+  if (of_roles.empty() || !IsScalar(binding)) return {};
+  ImpliedState implied(binding.model, binding.roles[0].block);
+  implied.rest_at_truth_ = true;
+  implied.truths_ = std::move(of_roles);
+  return implied;
+}
+
+std::optional<double> ImpliedState::From(const Truth& truth, const double* z) const {
+  if (model_.Valid(z) != Status::kOk) return {};
+  if (rest_at_truth_) {
+    const std::vector<const double*> roles = RolesAtTruth(truth, truths_);
+    if (roles.empty()) return {};
+    return SolveForFirst(model_, roles, *z);
+  }
+  double value = 0.0;
+  const std::vector<const double*> roles(model_.roles().size(), nullptr);
+  if (model_.Initialise(roles.data(), z, &value, nullptr, nullptr) != Status::kOk) return {};
+  return value;
+}
+
+}  // namespace alidade::internal

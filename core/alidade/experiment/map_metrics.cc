@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/map_metrics.h"
+
+#include <cmath>
+
+#include "alidade/experiment/similarity.h"
+
+namespace alidade {
+namespace {
+
+double RootMeanSquare(const Eigen::Matrix3Xd& errors) {
+  return std::sqrt(errors.squaredNorm() / static_cast<double>(errors.cols()));
+}
+
+}  // namespace
+
+std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEstimate>& landmarks) {
+  Eigen::Matrix3Xd estimated(3, std::ssize(landmarks)), known = estimated;
+  Eigen::Index count = 0;
+  for (const LandmarkEstimate& landmark : landmarks) {
+    if (!landmark.true_position.allFinite() || !landmark.position.allFinite()) continue;
+    estimated.col(count) = landmark.position;
+    known.col(count++) = landmark.true_position;
+  }
+  if (count == 0) return {};
+  estimated.conservativeResize(Eigen::NoChange, count);
+  known.conservativeResize(Eigen::NoChange, count);
+  std::map<std::string, double> metrics = {{"map.rmse", RootMeanSquare(estimated - known)}};
+  if (const auto aligned = internal::AlignBySimilarity(estimated, known)) {
+    metrics["map.sim3.rmse"] = aligned->rmse;
+    metrics["map.sim3.scale"] = aligned->scale;
+  }
+  return metrics;
+}
+
+void internal::NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result) {
+  if (!named.system.landmarks) return;
+  result.landmarks = named.estimator->landmarks();
+  for (std::vector<LandmarkEstimate>* map : {&*result.landmarks, &result.removed_landmarks}) {
+    for (LandmarkEstimate& landmark : *map) {
+      const auto position = source.TrueLandmark(landmark.id);
+      if (position) landmark.true_position = Eigen::Map<const Eigen::Vector3d>(position->data());
+    }
+  }
+  result.metrics.merge(MapMetrics(*result.landmarks));
+}
+
+}  // namespace alidade

@@ -1,0 +1,411 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/named_estimator.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+
+#include "alidade/base/words.h"
+#include "alidade/config/tree.h"
+#include "alidade/estimation/built_in.h"
+#include "alidade/estimation/compression.h"
+#include "alidade/plugin/calibration.h"
+#include "alidade/plugin/plugin_host.h"
+
+namespace alidade::internal {
+namespace {
+
+/// What a plugin's estimator that does not say is given: it refuses by itself what it cannot do.
+constexpr Support kUnsaid = {.consider = true, .at_measurement = true, .from_measurement = true};
+
+/// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
+int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
+                 const std::vector<StreamInfo>& streams) {
+  const Node node = entry.At("stream");
+  const std::vector<std::string> names = NamesOf(streams);
+  const auto found = std::find(names.begin(), names.end(), node.Text());
+  if (found == names.end()) {
+    node.Fail("the source has no stream '" + node.Text() + "'", "one of " + Join(names),
+              Nearest(node.Text(), names));
+  }
+  const auto index = static_cast<std::size_t>(found - names.begin());
+  if (streams[index].size != size) {
+    node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
+                  " values at a time",
+              std::to_string(size) + ", as " + wanted_by);
+  }
+  return static_cast<int>(index);
+}
+
+/// Names of the sensors an estimator uses, in its own order; empty: all, in the config's.
+std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
+  std::vector<std::string> names;
+  const auto list = entry.Find("sensors");
+  if (!list) return names;
+  std::vector<std::string> known;
+  for (const auto& [name, sensor] : root.At("sensors").Entries()) known.push_back(name);
+  for (const Node& item : list->Items()) {
+    const std::string name = item.Text();
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      item.Fail("no sensor '" + name + "'", "a name from `sensors`", Nearest(name, known));
+    }
+    if (std::find(names.begin(), names.end(), name) != names.end()) {
+      item.Fail("sensor '" + name + "' is listed twice", "each sensor once");
+    }
+    names.push_back(name);
+  }
+  if (names.empty()) list->Fail("empty", "at least one sensor, or leave the key out for all");
+  return names;
+}
+
+/// What the sensors and control inputs of a system take, each stream once.
+std::vector<StreamInfo> StreamsOf(const System& system) {
+  std::vector<StreamInfo> streams;
+  const auto add = [&](const std::string& name, int size, int known) {
+    if (std::ranges::find(streams, name, &StreamInfo::name) == streams.end()) {
+      streams.push_back({name, size, 0.0, known});
+    }
+  };
+  for (const SensorBinding& sensor : system.sensors) {
+    add(sensor.stream, sensor.model.measurement().geometry.ambient, sensor.model.known_size());
+  }
+  for (const MotionBinding& motion : system.motions) {
+    if (motion.model.has_input()) {
+      add(motion.input.stream, motion.model.input().geometry.ambient, 0);
+    }
+  }
+  return streams;
+}
+
+void CheckName(const std::string& name, const Node& entry) {
+  ExpectName(name, entry, "an estimator");
+  if (name == "figures") {
+    entry.Fail("'figures' cannot name an estimator: the run folder has one of that name",
+               "another name");
+  }
+}
+
+[[noreturn]] void FailOffered(const std::string& type, const PluginHost& host, const Node& node) {
+  std::vector<std::string> of_core, of_plugins;
+  for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
+  }
+  std::vector<std::string> names = of_core;
+  names.insert(names.end(), of_plugins.begin(), of_plugins.end());
+  const std::string expected = Join(of_core) + ", built in, or of a plugin: " +
+                               (of_plugins.empty() ? "none was found" : Join(of_plugins));
+  constexpr const char* kHint =
+      "\n  batch estimators come with a build that found the Ceres solver: "
+      "cmake --preset release && cmake --build --preset release";
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        "no estimator '" + type + "' is built in, and no plugin offers it",
+                        expected, Nearest(type, names)) +
+                  (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
+}
+
+/// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
+const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator && entry.name == type) return entry;
+  }
+  if (!host.complete()) FailOffered(type, host.Complete(), node);
+  FailOffered(type, host, node);
+}
+
+std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
+
+/// The item `block` of the list under `consider` of its state entry.
+Node ConsiderOf(const Node& state, const Block& block) {
+  const Node list = state.At("consider");
+  for (const Node& item : list.Items()) {
+    if (item.Text() == NameIn(block)) return item;
+  }
+  return list;
+}
+
+/// Where the config asks for what is not supported.
+Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
+  if (asked.block >= 0) {
+    const Block& block = system.layout[asked.block];
+    const auto entry = root.At("state").Find(block.owner);
+    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
+    if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
+    return state.At("initial").At(NameIn(block)).At("from_measurement");
+  }
+  if (asked.sensor < 0) return root.At("landmarks");
+  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
+  const Node roles = root.At("sensors").At(sensor.name).At("roles");
+  const auto role = roles.Find(sensor.model.roles()[static_cast<std::size_t>(asked.role)].name);
+  if (!role) return roles;  // one that a time offset adds
+  // A mode that cannot be done comes before jacobian_at.
+  return role->At(asked.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
+}
+
+/// Refuses by name what `system`, built from the config `root`, asks for beyond `support`.
+void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
+                       const System& system) {
+  const auto asked = FindUnsupported(system, support);
+  if (!asked) return;
+  NodeOf(*asked, root, system)
+      .Fail("estimator type '" + type + "' does not support " + asked->what,
+            asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
+}
+
+/// The same for the keys of an estimator's entry that other types have, where they are left unread
+/// once its own have been read.
+void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
+  constexpr std::pair<const char*, const char*> kKeys[] = {
+      {"gate", "gate"},
+      {"fuse", "choice of updates"},
+      {"jacobian", "choice of Jacobian"},
+      {"covariance", "choice of covariance"},
+      {"rejection_recovery", "rejection recovery"}};
+  for (const auto& [key, what] : kKeys) {
+    if (!entry.HasUnread(key)) continue;
+    entry.At(key).Fail("estimator type '" + type + "' has no " + what,
+                       "the key left out, or type: ekf");
+  }
+}
+
+/// Refuses `fuse: per_measurement` where a sensor looks for matches that agree.
+void RefuseLoneMatches(const Node& entry, const System& system) {
+  const auto fuse = entry.Find("fuse");
+  if (!fuse || fuse->Text() != "per_measurement") return;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (!sensor.outlier_rejection) continue;
+    fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
+                   "' asks by its `outlier_rejection`",
+               "joint or per_sensor");
+  }
+}
+
+/// Refuses `covariance: compressed` where it would not be exact.
+void RefuseInexact(const Node& entry, const System& system) {
+  const auto covariance = entry.Find("covariance");
+  if (!covariance || covariance->Text() != "compressed") return;
+  const std::string why = WhyNotCompressed(system);
+  if (!why.empty()) covariance->Fail("landmarks cannot be postponed: " + why, "full or auto");
+}
+
+/// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
+/// that is not one of `merged` either, for it has no model.
+void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
+  for (const auto& [key, value] : overrides.Entries()) {
+    if (key == "initial_time_s" || key == "landmarks") continue;
+    if (key != "state" && key != "sensors") {
+      value.Fail("'" + key + "' is common to all estimators of a run",
+                 "state, sensors, landmarks or initial_time_s");
+    }
+    std::vector<std::string> known;
+    for (const auto& [name, entry] : root.At(key).Entries()) known.push_back(name);
+    for (const auto& [name, entry] : value.Entries()) {
+      if (std::ranges::find(known, name) != known.end()) continue;
+      if (merged.At(key).At(name).Find("model")) continue;
+      entry.Fail("no entry '" + name + "' in '" + key + "' to override",
+                 "one of " + Join(known) + ", or a new entry with a model", Nearest(name, known));
+    }
+  }
+}
+
+/// Refuses `filter` where what it accepted does not tell what `named` is to see.
+void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
+  const std::string quoted = '\'' + filter.name + '\'';
+  if (filter.estimator->offline()) {
+    by.Fail(quoted + " has its estimates at the end only", "a filter");
+  }
+  for (const SensorBinding& sensor : named.system.sensors) {
+    const int index = filter.system.FindSensor(sensor.name);
+    const auto& theirs = filter.system.sensors;
+    if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
+      by.Fail(
+          quoted + " does not use sensor '" + sensor.name + "' on stream '" + sensor.stream + "'",
+          "an estimator with the same sensors");
+    }
+    if (std::ranges::count(theirs, sensor.stream, &SensorBinding::stream) > 1) {
+      by.Fail("stream '" + sensor.stream + "' goes to several sensors of " + quoted +
+                  ": one may accept what another does not",
+              "a stream for each sensor");
+    }
+  }
+}
+
+/// Refuses a control input of `named` that is a measurement of `filter`, which may not accept it.
+void CheckInputs(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
+  for (const MotionBinding& motion : named.system.motions) {
+    const std::string& stream = motion.input.stream;
+    const auto& theirs = filter.system.sensors;
+    const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
+    if (!motion.model.has_input() || sensor == theirs.end()) continue;
+    by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
+                "' and goes to sensor '" + sensor->name + "' of '" + filter.name +
+                "': what that does not accept would be missing as an input",
+            "a filter without a sensor on that stream");
+  }
+}
+
+/// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:
+/// it sees all. `before` are those listed before it. Error: kBadConfig.
+int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators,
+            const std::vector<NamedEstimator>& before) {
+  if (!use.is_map()) {
+    if (use.Text() == "all") return -1;
+    use.Fail("not a choice of data: '" + use.Text() + "'", "all, or {accepted_by: NAME}");
+  }
+  const Node by = use.At("accepted_by", "use");
+  const std::string name = by.Text();
+  if (name == named.name) by.Fail("'" + name + "' is this estimator itself", "another one");
+  const auto found = std::ranges::find(before, name, &NamedEstimator::name);
+  if (found == before.end()) {
+    std::vector<std::string> known;
+    for (const auto& [other, entry] : estimators.Entries()) known.push_back(other);
+    if (std::ranges::find(known, name) != known.end()) {
+      by.Fail("'" + name + "' is listed after '" + named.name + "'",
+              "an estimator listed before, which has each frame first");
+    }
+    std::erase(known, named.name);
+    by.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
+  }
+  CheckAccepts(*found, named, by);
+  const int first = static_cast<int>(found - before.begin());
+  for (int i = first; i >= 0; i = before[static_cast<std::size_t>(i)].accepted_by) {
+    CheckInputs(before[static_cast<std::size_t>(i)], named, by);
+  }
+  return first;
+}
+
+/// Makes the estimator of the entry `node`, of a plugin unless null. Error: kPlugin.
+std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator& named,
+                                const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
+                                const Node& node) {
+  const auto made = [&] {
+    return make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
+  };
+  if (plugin == nullptr) return made();
+  std::string why = "an exception of unknown type";
+  try {
+    return made();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& e) {
+    why = e.what();
+  } catch (...) {
+  }
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        "estimator '" + plugin->name + "' of plugin " + plugin->plugin.string() +
+                            " failed while being created: " + why));
+}
+
+/// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
+void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
+  if (named.estimator->offline() || named.estimator->Clone() != nullptr) return;
+  entry.At("type").Fail(
+      "'" + named.type + "' cannot roll back for an out-of-sequence frame",
+      "another type under 'out_of_sequence.policy: rollback', or 'out_of_sequence.policy: buffer'");
+}
+
+}  // namespace
+
+NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
+                              const PluginHost& host, const std::vector<StreamInfo>* streams,
+                              const std::vector<NamedEstimator>& before) {
+  CheckName(name, entry);
+  NamedEstimator named;
+  named.name = name;
+  const Node type = entry.At("type", "an estimator");
+  named.type = type.Text();
+  const EstimatorType* const of_core = FindEstimatorType(named.type);
+  const PluginEntry* const of_plugin =
+      of_core == nullptr ? &FindOffered(named.type, host, type) : nullptr;
+  named.kind = of_core != nullptr ? of_core->kind : of_plugin->estimator;
+  const Support& support = of_core != nullptr              ? of_core->support
+                           : of_plugin->support != nullptr ? *of_plugin->support
+                                                           : kUnsaid;
+  const EstimatorMaker make =
+      of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
+  if (const auto policy = entry.Find("on_divergence")) {
+    named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
+  }
+  if (const auto policy = entry.Find("on_plugin_failure")) {
+    named.on_plugin_failure =
+        static_cast<OnPluginFailure>(policy->Choice({"skip", "disable", "abort"}));
+    const auto order = config.root().Find("out_of_sequence");
+    const auto rollback = order ? order->Find("policy") : std::nullopt;
+    if (named.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
+        rollback->Text() == "rollback") {
+      policy->Fail("a rollback gives frames of before again, with the sensor",
+                   "skip or abort, or another out_of_sequence.policy");
+    }
+  }
+  const auto overrides = entry.Find("overrides");
+  const Config own = overrides ? config.Merged(*overrides) : config;
+  if (overrides) {
+    CheckOverrides(*overrides, config.root(), own.root());
+    named.overrides = overrides->ToYaml();
+  }
+  const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  const auto use = entry.Find("use");
+  if (use && use->is_map()) use->Declare("accepted_by");
+  RefuseUnsupportedKeys(named.type, entry);
+  entry.RejectUnread();
+  named.system = BuildSystem(own.root(), host, only);
+  RefuseUnsupported(named.type, support, own.root(), named.system);
+  if (of_core != nullptr) {
+    RefuseLoneMatches(entry, named.system);
+    RefuseInexact(entry, named.system);
+  }
+  if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
+  const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
+  if (lent && named.system.landmarks) {
+    LandmarkOptions& landmarks = *named.system.landmarks;
+    landmarks.min_observations = 1;
+    if (landmarks.prior) landmarks.prior->min_observations = 0;
+  }
+  named.estimator = Make(make, named, streams, of_plugin, entry);
+  if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
+  return named;
+}
+
+int FindStream(const Node& sensor, const SensorModel& model,
+               const std::vector<StreamInfo>& streams) {
+  const int index = FindStreamOf(sensor, model.measurement().geometry.ambient,
+                                 "model '" + model.name() + "' measures", streams);
+  const int known = streams[static_cast<std::size_t>(index)].known;
+  if (known != model.known_size()) {
+    sensor.At("stream").Fail(
+        "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
+            std::to_string(known) + " known numbers with each measurement",
+        std::to_string(model.known_size()) + ", as model '" + model.name() + "' takes" +
+            (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
+                                    : std::string()));
+  }
+  return index;
+}
+
+void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams) {
+  for (const SensorBinding& sensor : system.sensors) {
+    FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
+  }
+  for (const MotionBinding& motion : system.motions) {
+    if (!motion.model.has_input()) continue;
+    const Space& input = motion.model.input();
+    FindStreamOf(root.At("state").At(motion.name).At("input"), input.geometry.ambient,
+                 "control input '" + input.name + "' of model '" + motion.model.name() + "'",
+                 streams);
+  }
+}
+
+void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
+                  Experiment& experiment) {
+  const Node entry = config.root().At("estimators").At(name);
+  NamedEstimator named = BuildEstimator(name, entry, config, host, &experiment.source->streams(),
+                                        experiment.estimators);
+  if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(named, entry);
+  experiment.estimators.push_back(std::move(named));
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/reference_metrics.h"
+
+#include "alidade/base/all_finite.h"
+
+namespace alidade::internal {
+std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks) {
+  std::vector<std::vector<double>> values(blocks);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    const auto id = static_cast<BlockId>(i);
+    const Block& block = state.layout()[id];
+    if (!block.present) continue;
+    const double* const x = state.value(id);
+    values[i].assign(x, x + block.geometry().ambient);
+  }
+  return values;
+}
+
+std::vector<StreamInfo> BlocksOf(const System& system) {
+  std::vector<StreamInfo> blocks;
+  for (const Block& block : system.layout.blocks()) {
+    blocks.push_back({block.name, block.geometry().ambient});
+  }
+  return blocks;
+}
+
+void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
+                    const std::vector<Seen>& seen, Metrics& metrics) {
+  std::vector<const Estimate*> at(seen.size(), nullptr);
+  for (const Estimate& one : reference) at[one.frame] = &one;
+  for (const Estimate& one : estimates) {
+    if (at[one.frame] == nullptr) continue;
+    const Seen& frame = seen[one.frame];
+    std::vector<std::vector<double>> known = at[one.frame]->values;
+    for (std::vector<double>& value : known) {
+      if (!AllFinite(value)) value.clear();
+    }
+    metrics.AddDifference(frame.frame.timestamp, known, frame.in_segment, one.values);
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <span>
+
+#include "alidade/base/number_text.h"
+#include "alidade/experiment/accepted_data.h"
+#include "alidade/experiment/frame_check.h"
+#include "alidade/experiment/frame_order.h"
+#include "alidade/experiment/map_metrics.h"
+#include "alidade/experiment/metrics.h"
+#include "alidade/experiment/reference_metrics.h"
+#include "alidade/experiment/run_log.h"
+#include "alidade/experiment/running_estimator.h"
+
+namespace alidade {
+namespace {
+
+/// ` at t = 0.033000 s`
+std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.timestamp); }
+
+/// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
+bool InSegment(const Segment& segment, const Frame& frame) {
+  const auto seen = [&](const Measurement& m) {
+    return m.stream == segment.stream &&
+           segment.sensor.Valid(m.values.data(), m.known.data()) == Status::kOk;
+  };
+  return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
+}
+
+using internal::Running;
+using internal::Seen;
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void Fail(RunResult& result, ExitCode code, std::string reason) {
+  result.status = RunStatus::kFailed;
+  result.code = code;
+  result.reason = std::move(reason);
+}
+
+/// The text of the event by which the estimator diverged or failed, else of the last one.
+std::string Cause(const std::vector<Event>& events, const char* otherwise) {
+  const auto cause = std::ranges::find(events, true, &Event::divergence);
+  if (cause != events.end()) return cause->text;
+  return events.empty() ? otherwise : events.back().text;
+}
+
+/// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
+/// where the whole run has to end.
+bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source& source,
+             const internal::Processed* passed, const RunOptions& options, RunResult& result) {
+  one.last = nullptr;
+  if (one.ended) return true;
+  Estimator& estimator = *one.named.estimator;
+  Frame rest;
+  const bool all = one.failed_sensors.empty();
+  if (!all) rest = WithoutFailed(one, visible, source.streams());
+  const auto started = Clock::now();
+  const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
+  if (!passed) {
+    const double wall_s = SecondsSince(started);
+    one.result.wall_s += wall_s;
+    std::ranges::transform(one.result.parts_s, report.spent_s, one.result.parts_s.begin(),
+                           std::plus<>());
+    for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
+  }
+  one.last = &report;
+  one.ended = passed ? passed->failed : estimator.failed();
+  one.diverged = passed ? passed->diverged : estimator.diverged();
+  one.Note(report.events);
+  if (!one.ended && !estimator.offline()) {
+    const auto takes_since = Clock::now();
+    one.Take(static_cast<std::size_t>(result.frames), seen,
+             passed ? passed->after->state() : estimator.state(), report, options);
+    one.result.record_s += SecondsSince(takes_since);
+  }
+  if (const std::string why = one.TakeFailures(report); !why.empty()) {
+    if (result.status == RunStatus::kOk) {
+      Fail(result, ExitCode::kPlugin,
+           "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+    }
+    return false;
+  }
+  const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
+  if (!one.ended && !policy) return true;
+  if (result.status == RunStatus::kOk) {
+    const std::string why = Cause(report.events, "diverged");
+    Fail(result, ExitCode::kDiverged,
+         "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+  }
+  return !policy;
+}
+
+/// The measurements of the frame that filter `by`, which has had what it sees of it, accepted.
+Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame,
+                 const Source& source) {
+  const Running& filter = running[static_cast<std::size_t>(by)];
+  const int before = filter.named.accepted_by;
+  return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
+                              source.streams(), filter.named.system,
+                              filter.last ? *filter.last : UpdateReport());
+}
+
+/// The next frame, as the experiment's OutOfSequencePolicy has it; false at the end. What became of
+/// others on the way is noted.
+bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunResult& result,
+               SourceFrame& frame) {
+  const auto note = [&] {
+    result.arrivals = frames.arrivals();
+    const std::vector<Event> events = frames.TakeEvents();
+    for (Running& one : running) one.Note(events);
+  };
+  try {
+    const bool more = frames.Next(frame);
+    note();
+    return more;
+  } catch (...) {
+    note();
+    throw;
+  }
+}
+
+/// The frames one by one through all estimators. They are kept where an estimator is offline or
+/// metrics wait for one.
+void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
+               RunResult& result, std::vector<Seen>& kept) {
+  Seen seen;
+  seen.in_segment.resize(experiment.segments.size());
+  const std::int64_t size = experiment.source->size();
+  const bool keep = std::ranges::any_of(
+      running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
+  internal::FrameCheck check(experiment, result.normalised);
+  internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
+  while (NextFrame(frames, running, result, seen.frame)) {
+    check.FollowTruth(seen.frame);
+    for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
+      seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
+    }
+    for (RunObserver* const observer : options.observers) observer->OnFrame(seen.frame);
+    if (keep) kept.push_back(seen);
+    bool go_on = true;
+    for (std::size_t e = 0; e < running.size(); ++e) {
+      const int by = running[e].named.accepted_by;
+      Frame accepted;
+      if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, *experiment.source,
+                      frames.processed(e), options, result) &&
+              go_on;
+    }
+    ++result.frames;
+    if (!go_on || std::ranges::all_of(running, &Running::ended)) return;
+    if (options.progress) options.progress(result.frames, size);
+    if (options.stop && options.stop()) {
+      if (result.status != RunStatus::kOk) return;
+      result.status = RunStatus::kStopped;
+      result.code = ExitCode::kStopped;
+      result.reason = "stopped after " + std::to_string(result.frames) +
+                      (result.frames == 1 ? " frame" : " frames");
+      return;
+    }
+  }
+}
+
+/// The metrics of the estimator; where memory, say, does not last for them, the rest is kept.
+void Measure(Running& one, RunResult& result) {
+  try {
+    one.result.metrics = one.metrics.Finish();
+  } catch (...) {
+    Failure failure = CaughtFailure();
+    if (result.status == RunStatus::kOk) Fail(result, failure.code, std::move(failure.reason));
+  }
+}
+
+/// The smoothing of `one` was stopped; the others keep theirs.
+void NoteStop(Running& one, const char* why, RunResult& result) {
+  one.Note({{one.named.estimator->timestamp(), "stopped", why}});
+  if (result.status != RunStatus::kOk) return;
+  result.status = RunStatus::kStopped;
+  result.code = ExitCode::kStopped;
+  result.reason = "estimator '" + one.named.name + "': " + why;
+}
+
+/// The estimates of those that needed all frames.
+void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
+               const RunOptions& options, RunResult& result) {
+  for (Running& one : running) {
+    Estimator& estimator = *one.named.estimator;
+    if (one.ended || !estimator.offline()) continue;
+    std::vector<Event> events;
+    auto works_since = Clock::now();  // rather than the record and the metrics
+    try {
+      estimator.StopWhen(options.stop);
+      estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+        one.result.wall_s += SecondsSince(works_since);
+        one.Take(k, kept[k], state, report, options);
+        events = report.events;
+        works_since = Clock::now();
+      });
+      one.result.wall_s += SecondsSince(works_since);
+    } catch (const Error& e) {
+      one.result.wall_s += SecondsSince(works_since);
+      if (e.code() == ExitCode::kStopped) {
+        NoteStop(one, e.what(), result);
+        continue;
+      }
+      if (!estimator.failed()) throw;  // it is the record, say, that failed
+      events.push_back({estimator.timestamp(), "failed", e.what()});
+    }
+    one.ended = estimator.failed();
+    one.Note(events);
+    if (!one.ended || result.status == RunStatus::kFailed) continue;
+    Fail(result, ExitCode::kDiverged,
+         "estimator '" + one.named.name + "': " + Cause(events, "failed"));
+  }
+}
+
+/// Why the estimates of a reference are of no use to compare with; "": they are of use.
+std::string WhyNoReference(const Running& reference) {
+  const Estimator& estimator = *reference.named.estimator;
+  const char* why = nullptr;
+  if (reference.ended || estimator.failed()) {
+    why = "failed";
+  } else if (reference.diverged || estimator.diverged()) {
+    why = "diverged";
+  } else if (reference.estimates.empty()) {
+    why = "has no estimates";
+  }
+  if (why == nullptr) return "";
+  return "no reference: estimator '" + reference.named.name + "' " + why +
+         ", the comparison with it is withheld";
+}
+
+/// The metrics that waited for the estimates of the reference; what does not last for them is kept.
+void Compare(std::vector<Running>& running, int index, const std::vector<Seen>& kept,
+             RunResult& result) {
+  const Running& reference = running[static_cast<std::size_t>(index)];
+  result.withheld = WhyNoReference(reference);
+  if (!result.withheld.empty()) return;
+  for (Running& one : running) {
+    if (one.index == index) continue;
+    internal::AddDifferences(one.estimates, reference.estimates, kept, one.metrics);
+  }
+}
+
+/// All estimators of the experiment before their first frame.
+std::vector<Running> BeginAll(Experiment& experiment) {
+  const int reference = experiment.reference;
+  std::vector<StreamInfo> truths = experiment.source->truths();
+  for (std::size_t t = 0; t < experiment.truth_sigmas.size(); ++t)
+    truths.at(t).sigma = experiment.truth_sigmas[t];
+  if (reference >= 0) {
+    truths = internal::BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].system);
+  }
+  std::vector<Running> running;
+  for (NamedEstimator& named : experiment.estimators) {
+    const int index = static_cast<int>(running.size());
+    Metrics metrics(named, index == reference ? std::vector<StreamInfo>() : truths,
+                    experiment.segments);
+    running.push_back({named, index, std::move(metrics), internal::Begin(named)});
+    running.back().waits = reference >= 0;
+  }
+  return running;
+}
+
+/// Notes of `one` what the whole run shows, and puts its result behind those before it.
+void Conclude(Running& one, const std::vector<Running>& running, const Experiment& experiment,
+              RunResult& result) {
+  Measure(one, result);
+  one.result.counts = one.metrics.counts();
+  if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
+  one.result.units = one.metrics.units();
+  const std::size_t before = one.result.events.size();
+  internal::NoteMap(one.named, *experiment.source, one.result);
+  const Estimator& estimator = *one.named.estimator;
+  if (one.took && !estimator.failed()) {
+    const int by = one.named.accepted_by;
+    internal::NoteUnused(one.named.system,
+                         by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
+                         one.result);
+    if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
+  }
+  internal::NoteUnits(one.named.system, one.metrics, one.result);
+  if (one.took && !estimator.failed()) internal::NoteConsistency(one.result);
+  internal::LogEvents(one.named.name, std::span(one.result.events).subspan(before));
+  one.Note(one.metrics.events());
+  one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
+  one.result.inconsistent = !one.metrics.events().empty();
+  one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
+}
+
+}  // namespace
+
+const char* ToString(RunStatus status) {
+  switch (status) {
+    case RunStatus::kOk:
+      return "ok";
+    case RunStatus::kStopped:
+      return "stopped";
+    case RunStatus::kFailed:
+      break;
+  }
+  return "failed";
+}
+
+RunResult Run(Experiment& experiment, const RunOptions& options) {
+  RunResult result;
+  const int reference = experiment.reference;
+  if (reference >= 0) {
+    result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;
+  }
+  std::vector<Running> running;
+  std::vector<Seen> kept;
+  const auto guarded = [&result](const auto& call) {
+    try {
+      call();
+    } catch (...) {
+      // What was done so far is kept.
+      Failure failure = CaughtFailure();
+      const bool stopped = failure.code == ExitCode::kStopped;
+      if (stopped && result.status != RunStatus::kOk) return;  // a failure stays one
+      Fail(result, failure.code, std::move(failure.reason));
+      if (stopped) result.status = RunStatus::kStopped;
+    }
+  };
+  guarded([&] {
+    running = BeginAll(experiment);
+    for (RunObserver* const observer : options.observers) observer->Begin(experiment);
+    internal::LogExperiment(experiment);
+    for (const Running& one : running) internal::LogEvents(one.named.name, one.result.events);
+    RunFrames(experiment, running, options, result, kept);
+    SmoothAll(running, kept, options, result);
+  });
+  if (reference >= 0 && !running.empty()) {
+    guarded([&] { Compare(running, reference, kept, result); });
+  }
+  for (Running& one : running) {
+    guarded([&] { Conclude(one, running, experiment, result); });
+    result.estimators.push_back(std::move(one.result));
+  }
+  internal::LogDurations(result);
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/run_log.h"
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/words.h"
+#include "alidade/io/log.h"
+
+namespace alidade::internal {
+namespace {
+
+std::string OrNone(const std::string& text) { return text.empty() ? "none" : text; }
+
+}  // namespace
+
+void LogExperiment(const Experiment& experiment) {
+  if (!IsLogged(LogLevel::kInfo)) return;
+  Log(LogLevel::kInfo, "source: streams " + OrNone(Join(NamesOf(experiment.source->streams()))) +
+                           "; truth " + OrNone(Join(NamesOf(experiment.source->truths()))) +
+                           "; seed " + std::to_string(experiment.seed));
+  for (const NamedEstimator& named : experiment.estimators) {
+    Log(LogLevel::kInfo, named.name + ": type " + named.type + "; sensors " +
+                             OrNone(Join(NamesOf(named.system.sensors))) + "; blocks " +
+                             OrNone(Join(NamesOf(named.system.layout.blocks()))));
+  }
+}
+
+void LogEvents(const std::string& estimator, std::span<const Event> events, bool is_reason) {
+  for (const Event& event : events) {
+    const LogLevel level = event.divergence && !is_reason ? LogLevel::kWarning : LogLevel::kInfo;
+    if (!IsLogged(level)) continue;
+    const std::string at =
+        event.timestamp == kNoTimestamp ? "" : " at t = " + SecondsText(event.timestamp);
+    Log(level, estimator + ": " + event.kind + at + ": " + event.text);
+  }
+}
+
+void LogDurations(const RunResult& result) {
+  if (!IsLogged(LogLevel::kDebug)) return;
+  for (const EstimatorResult& one : result.estimators) {
+    Log(LogLevel::kDebug, one.name + ": " + FixedText(one.wall_s, 3) + " s for " +
+                              std::to_string(result.frames) + " frames");
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/base/timestamp.h"
+#include "alidade/io/output_folder.h"
+
+namespace alidade::internal {
+
+/// A csv file written cell by cell: comma, `\n`, numbers in the shortest form that reads back,
+/// texts quoted where RFC 4180 asks for it.
+class CsvFile {
+ public:
+  /// Creates the file with its header. Errors: kCannotCreate, kIo.
+  CsvFile(const OutputFolder& folder, const std::string& name,
+          const std::vector<std::string>& header);
+
+  CsvFile& Time(Timestamp timestamp);  ///< empty for kNoTimestamp
+  CsvFile& Number(double value);
+  CsvFile& Integer(std::int64_t value);
+  /// Empty where it is negative: there is none.
+  CsvFile& Landmark(std::int64_t id);
+  CsvFile& Text(std::string_view value);
+  CsvFile& Empty(std::size_t cells = 1);
+  /// `values`, then empty cells up to `width`.
+  CsvFile& Numbers(const double* values, std::size_t count, std::size_t width);
+  /// Ends the row, which must have a cell for each column. Error: kIo.
+  void EndRow();
+  void Close();
+
+  /// Rows below the header.
+  std::int64_t rows() const { return rows_; }
+
+ private:
+  void Separate();
+
+  std::unique_ptr<OutputFile> file_;
+  std::string row_;
+  std::size_t columns_, cells_ = 0;
+  std::int64_t rows_ = 0;
+};
+
+/// `text` as a csv cell.
+std::string CsvQuoted(std::string_view text);
+
+}  // namespace alidade::internal

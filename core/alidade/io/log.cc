@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/io/log.h"
+
+#include <spdlog/logger.h>
+#include <spdlog/sinks/dist_sink.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+constexpr std::array<const char*, 6> kLogLevelNames = {"trace",   "debug", "info",
+                                                       "warning", "error", "off"};
+
+spdlog::level::level_enum ToSpdlog(LogLevel level) {
+  constexpr std::array kLevels = {spdlog::level::trace, spdlog::level::debug, spdlog::level::info,
+                                  spdlog::level::warn,  spdlog::level::err,   spdlog::level::off};
+  return kLevels.at(static_cast<std::size_t>(level));
+}
+
+LogLevel FromSpdlog(spdlog::level::level_enum level) {
+  return level >= spdlog::level::err ? LogLevel::kError
+                                     : static_cast<LogLevel>(static_cast<int>(level));
+}
+
+/// Whether this thread is inside a sink.
+thread_local bool in_log_sink = false;
+/// The innermost scope of this thread.
+thread_local const LogScope* log_scope = nullptr;
+
+/// The least level that a sink takes: what is below it costs a load, and no logger.
+std::atomic<int> least_log_level{static_cast<int>(LogLevel::kOff)};
+
+/// The logger of the library.
+class Logger {
+ public:
+  /// Never destroyed: what ends after main() may log.
+  static Logger& Get() {
+    static Logger& logger = *new Logger;
+    return logger;
+  }
+
+  void Add(const std::shared_ptr<spdlog::sinks::sink>& sink) {
+    const std::lock_guard lock(mutex_);
+    taken_.push_back(sink);
+    sinks_->add_sink(sink);
+    Update();
+  }
+  void Remove(const std::shared_ptr<spdlog::sinks::sink>& sink) {
+    const std::lock_guard lock(mutex_);
+    std::erase(taken_, sink);
+    sinks_->remove_sink(sink);
+    Update();
+  }
+  void Write(LogLevel level, std::string_view text) {
+    logger_.log(ToSpdlog(level), spdlog::string_view_t(text.data(), text.size()));
+  }
+
+ private:
+  Logger() : sinks_(std::make_shared<spdlog::sinks::dist_sink_mt>()), logger_("alidade", sinks_) {
+    logger_.set_level(spdlog::level::trace);               // the sinks decide
+    logger_.set_error_handler([](const std::string&) {});  // by itself it prints
+  }
+  void Update() {
+    int least = static_cast<int>(LogLevel::kOff);
+    for (const auto& sink : taken_) least = std::min(least, static_cast<int>(sink->level()));
+    least_log_level = least;
+  }
+
+  std::shared_ptr<spdlog::sinks::dist_sink_mt> sinks_;
+  spdlog::logger logger_;
+  std::mutex mutex_;  ///< of the list
+  std::vector<std::shared_ptr<spdlog::sinks::sink>> taken_;
+};
+
+}  // namespace
+
+const char* ToString(LogLevel level) { return kLogLevelNames.at(static_cast<std::size_t>(level)); }
+
+std::optional<LogLevel> LogLevelOf(std::string_view name) {
+  const auto found = std::ranges::find(kLogLevelNames, name);
+  if (found == kLogLevelNames.end()) return std::nullopt;
+  return static_cast<LogLevel>(found - kLogLevelNames.begin());
+}
+
+/// A sink of spdlog that calls a function. The one that holds it locks.
+class LogSubscription::Sink : public spdlog::sinks::sink {
+ public:
+  explicit Sink(LogSink function) : function_(std::move(function)) {}
+
+  void log(const spdlog::details::log_msg& message) override {
+    if (broken_) return;
+    try {
+      function_(FromSpdlog(message.level), {message.payload.data(), message.payload.size()});
+    } catch (...) {
+      broken_ = true;
+    }
+  }
+  void flush() override {}
+  void set_pattern(const std::string&) override {}
+  void set_formatter(std::unique_ptr<spdlog::formatter>) override {}
+
+ private:
+  LogSink function_;
+  bool broken_ = false;
+};
+
+LogSubscription::LogSubscription(LogLevel least, LogSink sink)
+    : sink_(std::make_shared<Sink>(std::move(sink))) {
+  sink_->set_level(ToSpdlog(least));
+  Logger::Get().Add(sink_);
+}
+
+LogSubscription::~LogSubscription() { Logger::Get().Remove(sink_); }
+
+LogScope::LogScope(std::string prefix, LogLevel highest)
+    : prefix_(std::move(prefix)), highest_(highest), outer_(std::exchange(log_scope, this)) {}
+
+LogScope::~LogScope() { log_scope = outer_; }
+
+bool IsLogged(LogLevel level) {
+  return level < LogLevel::kOff && static_cast<int>(level) >= least_log_level.load();
+}
+
+void Log(LogLevel level, std::string_view text) noexcept {
+  if (log_scope != nullptr) level = std::min(level, log_scope->highest_);
+  if (in_log_sink || !IsLogged(level)) return;
+  in_log_sink = true;
+  try {
+    if (log_scope != nullptr) {
+      Logger::Get().Write(level, log_scope->prefix_ + std::string(text));
+    } else {
+      Logger::Get().Write(level, text);
+    }
+  } catch (...) {  // a message lost is no reason to end anything
+  }
+  in_log_sink = false;
+}
+
+}  // namespace alidade

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/io/output_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace alidade::internal {
+namespace {
+
+constexpr std::size_t kBufferSize = 1 << 16;
+constexpr std::chrono::seconds kLongestWait{1};
+
+std::string Reason(int error_number) { return std::generic_category().message(error_number); }
+
+}  // namespace
+
+void FailCreate(const std::string& path, int error_number) {
+  const bool disk = error_number == ENOSPC || error_number == EDQUOT || error_number == EIO;
+  throw Error(disk ? ExitCode::kIo : ExitCode::kCannotCreate,
+              ErrorLine(Place{path}, {}, "cannot create: " + Reason(error_number)));
+}
+
+void FailIo(const std::string& path, const char* verb, int error_number) {
+  throw Error(
+      ExitCode::kIo,
+      ErrorLine(Place{path}, {}, std::string("cannot ") + verb + ": " + Reason(error_number)));
+}
+
+OutputFile::OutputFile(std::filesystem::path file, Mode mode) : path_(std::move(file)) {
+  const int open_flag = mode == Mode::kAppend ? O_APPEND : O_TRUNC;
+  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | open_flag, 0666);
+  if (fd_ < 0) FailCreate(path_.string(), errno);
+  buffer_.reserve(kBufferSize);
+}
+
+OutputFile::~OutputFile() {
+  try {
+    if (fd_ >= 0) Close();
+  } catch (const std::exception&) {  // errors are reported by Close()
+  }
+}
+
+void OutputFile::Write(std::string_view text) {
+  buffer_ += text;
+  const bool due = std::chrono::steady_clock::now() - flushed_ >= kLongestWait;
+  if (due || buffer_.size() >= kBufferSize) Flush();
+}
+
+void OutputFile::Flush() {
+  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // rows after a gap would mislead
+  for (std::string_view rest = buffer_; !rest.empty();) {
+    const ssize_t written = ::write(fd_, rest.data(), rest.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) {
+      error_ = errno;
+      ::close(std::exchange(fd_, -1));
+      FailIo(path_.string(), "write", error_);
+    }
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+  buffer_.clear();
+  flushed_ = std::chrono::steady_clock::now();
+}
+
+void OutputFile::Close() {
+  Flush();
+  if (::close(std::exchange(fd_, -1)) != 0 && errno != EINTR) {
+    FailIo(path_.string(), "write", errno);
+  }
+}
+
+}  // namespace alidade::internal

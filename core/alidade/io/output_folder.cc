@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/io/output_folder.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <set>
+#include <vector>
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kList = "files.txt";
+
+[[noreturn]] void Refuse(const fs::path& path, const std::string& what, const std::string& remedy) {
+  throw Error(ExitCode::kCannotCreate, ErrorLine(Place{path.string()}, {}, what) + "; " + remedy);
+}
+
+bool Exists(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
+}
+
+/// `target` without a trailing slash; if it is a link or `.`, the folder that it stands for.
+fs::path Normal(const fs::path& target) {
+  fs::path path = target.lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  std::error_code error;
+  if (path.filename() == "." || path.filename() == ".." || fs::is_symlink(path, error)) {
+    const fs::path real = fs::canonical(path, error);
+    if (!error) path = real;
+  }
+  if (path.has_filename()) return path;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{target.string()}, {}, "is not a name for a folder", "PATH/NAME"));
+}
+
+/// The names of all files and folders in `folder`, at any depth, sorted. Error: kIo.
+std::set<std::string> Contents(const fs::path& folder) {
+  std::set<std::string> names;
+  std::error_code error;
+  fs::recursive_directory_iterator entry(folder, error);
+  for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
+    names.insert(entry->path().lexically_relative(folder).string());
+  }
+  if (error) FailIo(folder.string(), "read", error.value());
+  return names;
+}
+
+/// The names of `folder` that its list does not have; a folder stands for all that is in it.
+std::vector<std::string> Unlisted(const fs::path& folder) {
+  std::set<std::string> listed = {kList};
+  std::vector<std::string> whole;  // folders that are listed with all that is in them
+  std::ifstream stream(folder / kList);
+  for (std::string line; std::getline(stream, line);) {
+    if (line.ends_with('/')) whole.push_back(line);
+    listed.insert(std::move(line));
+  }
+  std::vector<std::string> found;
+  for (const std::string& name : Contents(folder)) {
+    const auto holds = [&](const std::string& one) { return name.starts_with(one); };
+    if (listed.contains(name) || std::ranges::any_of(whole, holds)) continue;
+    if (found.empty() || !name.starts_with(found.back() + '/')) found.push_back(name);
+  }
+  return found;
+}
+
+/// The first few of the names, for a message.
+std::string Few(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    text.append(i > 0 ? ", '" : "'").append(names[i]).append("'");
+  }
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+/// Refuses to replace a folder that holds files that its list does not have.
+void CheckListed(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder, error)) {
+    Refuse(folder, "is a link to a missing file", "remove it, or choose another folder");
+  }
+  if (!fs::is_directory(folder, error)) Refuse(folder, "is a file", "choose another folder");
+  const std::vector<std::string> foreign = Unlisted(folder);
+  if (foreign.empty()) return;
+  if (!Exists(folder / kList)) {
+    Refuse(folder, std::string("is not a run folder (it has no ") + kList + ')',
+           "--force replaces run folders only; remove it yourself, or choose another folder");
+  }
+  Refuse(folder, "holds files that alidade did not write: " + Few(foreign),
+         "move that elsewhere, or choose another folder");
+}
+
+}  // namespace
+
+fs::path PartialOf(const fs::path& target) { return Normal(target) += ".partial"; }
+
+OutputFolder::OutputFolder(const fs::path& target, bool force, bool resume)
+    : target_(Normal(target)), partial_(fs::path(target_) += ".partial"), force_(force) {
+  CheckTarget();
+  std::error_code error;
+  if (Exists(partial_)) {
+    if (!force && !resume) {
+      Refuse(partial_,
+             "exists already: the command that writes it has ended early or is still running",
+             "add --force to replace it, or remove it");
+    }
+    CheckListed(partial_);
+    keep_ = resume;
+    if (resume) {
+      Open();
+      return;
+    }
+    fs::remove_all(partial_, error);
+  }
+  if (!error && partial_.has_parent_path()) fs::create_directories(partial_.parent_path(), error);
+  if (error) FailCreate(partial_.string(), error.value());
+  if (::mkdir(partial_.c_str(), 0777) != 0) FailCreate(partial_.string(), errno);
+  Open();
+}
+
+void OutputFolder::Open() {
+  descriptor_ = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor_ < 0) FailCreate(partial_.string(), errno);
+}
+
+bool OutputFolder::exists() const {
+  struct stat status {};
+  return ::fstat(descriptor_, &status) == 0 && status.st_nlink > 0;
+}
+
+void OutputFolder::CheckTarget() const {
+  if (!Exists(target_)) return;
+  if (!force_) Refuse(target_, "exists already", "add --force to replace it");
+  CheckListed(target_);
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  if (!keep_ && exists()) fs::remove_all(partial_, ignored);
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+fs::path OutputFolder::Add(const std::string& name) const {
+  const fs::path path = partial_ / name;
+  OutputFile list(partial_ / kList, OutputFile::Mode::kAppend);
+  for (fs::path above = fs::path(name).parent_path(); !above.empty(); above = above.parent_path()) {
+    list.Write(above.string() + '\n');
+  }
+  list.Write(name + '\n');
+  list.Close();  // before anything is created: no file of a killed process is unlisted
+  std::error_code error;
+  fs::create_directories(path.parent_path(), error);
+  if (error) FailCreate(path.parent_path().string(), error.value());
+  return path.has_filename() ? path : path.parent_path();
+}
+
+std::unique_ptr<OutputFile> OutputFolder::Create(const std::string& name) const {
+  return std::make_unique<OutputFile>(Add(name));
+}
+
+std::unique_ptr<OutputFile> OutputFolder::Append(const std::string& name) const {
+  return std::make_unique<OutputFile>(Add(name), OutputFile::Mode::kAppend);
+}
+
+void OutputFolder::Write(const std::string& name, std::string_view text) const {
+  const std::unique_ptr<OutputFile> file = Create(name);
+  file->Write(text);
+  file->Close();
+}
+
+void OutputFolder::Remove(const std::string& name) const {
+  std::error_code ignored;
+  fs::remove_all(partial_ / name, ignored);
+}
+
+void OutputFolder::Commit() {
+  keep_ = true;
+  if (!exists()) {
+    Refuse(partial_, "was replaced by another command while this one wrote it",
+           "write to another folder");
+  }
+  std::set<std::string> names = Contents(partial_);
+  for (const std::string& foreign : Unlisted(partial_)) {
+    std::erase_if(names, [&](const std::string& name) {
+      return name == foreign || name.starts_with(foreign + '/');
+    });
+  }
+  names.insert(kList);
+  std::string list;
+  for (const std::string& name : names) list += name + '\n';
+  constexpr const char* kNewList = "files.txt.new";  // a disk that is full keeps the old one
+  Write(kNewList, list);
+  std::error_code error;
+  fs::rename(partial_ / kNewList, partial_ / kList, error);
+  if (error) FailIo((partial_ / kList).string(), "write", error.value());
+  try {
+    CheckTarget();
+    fs::remove_all(target_, error);
+    if (!error) fs::rename(partial_, target_, error);
+    if (error) FailIo(target_.string(), "replace", error.value());
+  } catch (const Error& e) {
+    throw Error(e.code(), std::string(e.what()) + "; the new folder is " + partial_.string());
+  }
+}
+
+}  // namespace alidade::internal

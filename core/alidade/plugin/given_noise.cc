@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/given_noise.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace alidade::internal {
+namespace {
+
+/// L of A = L L', n x n row-major, by columns; one in which nothing but rounding is left is zero.
+std::vector<double> RootOf(const std::vector<double>& a, std::size_t n, bool& singular) {
+  const double rounding = 64.0 * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
+  std::vector<double> l(n * n, 0.0);
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto rest = [&](std::size_t i) {
+      double sum = a[i * n + j];
+      for (std::size_t k = 0; k < j; ++k) sum -= l[i * n + k] * l[j * n + k];
+      return sum;
+    };
+    const double square = rest(j);
+    if (!(square > rounding * a[j * n + j])) {
+      singular = true;
+      continue;
+    }
+    l[j * n + j] = std::sqrt(square);
+    for (std::size_t i = j + 1; i < n; ++i) l[i * n + j] = rest(i) / l[j * n + j];
+  }
+  return l;
+}
+
+void ExpectDiscrete(const Node& covariance, const ModelInstance& model) {
+  if ((model.capabilities() & ALIDADE_DISCRETE_NOISE) == 0) {
+    covariance.Fail("model '" + model.name() +
+                        "' has continuous noise, whose covariance is another for each dt",
+                    "the model's own keys, or `noise.kind: discrete` of a model that has it");
+  }
+  if (model.c().description->noise_count == 0) {
+    covariance.Fail("model '" + model.name() + "' has no noise inputs", "the key left out");
+  }
+}
+
+}  // namespace
+
+std::optional<Node> GivenCovariance(const Node& entry, std::uint32_t kind) {
+  if (!entry.is_map()) return std::nullopt;
+  if (kind == ALIDADE_KIND_SENSOR) return entry.Find("covariance");
+  const std::optional<Node> noise = entry.Find("noise");
+  return noise && noise->is_map() ? noise->Find("covariance") : std::nullopt;
+}
+
+std::vector<double> RootForModel(const Node& covariance, const ModelInstance& model) {
+  const bool sensor = model.c().kind == ALIDADE_KIND_SENSOR;
+  if (!sensor) ExpectDiscrete(covariance, model);
+  const int n = sensor ? model.space().geometry.tangent : model.c().description->noise_count;
+  bool singular = false;
+  std::vector<double> root =
+      RootOf(covariance.Covariance(n), static_cast<std::size_t>(n), singular);
+  if (sensor && singular) {
+    covariance.Fail("singular: a measurement without noise in one direction",
+                    "a positive definite covariance");
+  }
+  return root;
+}
+
+}  // namespace alidade::internal

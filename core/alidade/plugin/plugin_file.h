@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/model/plugin_abi.h"
+#include "alidade/plugin/plugin_host.h"
+
+/// Checks of plugin files before and during loading.
+namespace alidade {
+
+struct CppPluginTable;
+
+namespace internal {
+
+/// The folders of ALIDADE_PLUGIN_PATH, in its order.
+std::vector<std::filesystem::path> PluginFoldersOfEnvironment();
+
+/// A plugin that is open for the rest of the process.
+struct OpenedPlugin {
+  std::filesystem::path file;       ///< canonical
+  const AlidadeTable* table;        ///< of a C-ABI plugin, else null
+  const CppPluginTable* cpp_table;  ///< of a C++ plugin, else null
+};
+
+[[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
+  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
+}
+
+/// The folder of the plugins of this build: `lib/alidade` next to this library, in the build tree
+/// or the installation; "" if it cannot be determined.
+std::filesystem::path FolderOfProgram();
+
+/// False if the plugin lists the names of its entries and none of `names` is among them. Such a
+/// plugin may stay closed.
+bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
+
+/// Checks trust and build tag, opens the plugin and checks its table. `canonical` is `file` with
+/// its symbolic links resolved. Errors: kPlugin, kNotTrusted.
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
+
+/// A C++ plugin that is loaded only when it is needed.
+struct PluginOnDemand {
+  std::filesystem::path file;
+  const CppPluginTable* table;
+};
+
+/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` next to this library.
+/// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one,
+/// or one of models; those of OpenPlugin.
+PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
+                            const std::string& missing);
+
+/// Whether the entry is of a kind that this version knows; another is left out.
+bool IsKnown(const AlidadeEntry& entry);
+
+/// What breaks the rules of plugin_abi.h or cpp_plugin.h in a table, or "".
+std::string Defect(const AlidadeTable* table);
+std::string Defect(const CppPluginTable* table);
+
+/// `sensor`, `motion model`, `source`, `estimator`.
+const char* KindName(PluginEntry::Kind kind);
+
+}  // namespace internal
+
+struct PluginHost::Loaded : internal::OpenedPlugin {};
+
+}  // namespace alidade

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/config/config.h"
+#include "alidade/plugin/model_instance.h"
+#include "alidade/plugin/source.h"
+
+namespace alidade {
+
+class Estimator;        // in alidade/estimation/estimator.h
+struct Support;         // in alidade/estimation/support.h
+struct System;          // in alidade/estimation/system.h
+struct SourceEntry;     // in alidade/plugin/cpp_plugin.h
+struct EstimatorEntry;  // likewise
+
+/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
+using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
+    const System& system, const std::vector<StreamInfo>& streams)>;
+
+/// One parameter of a model, as declared by being read.
+struct ParamInfo {
+  std::string key, unit, doc;
+  std::string type;                  ///< number, integer, flag, choice, or `number[3]`
+  std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
+  std::string fallback;              ///< the default as text, "" where the key is required
+  std::vector<std::string> choices;  ///< of a choice
+  std::string when;  ///< `noise_model = constant` where only that choice reads it, else ""
+};
+
+/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
+/// can be compared with.
+enum class EstimatorKind {
+  kFilter,    ///< takes each measurement once, as it comes
+  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
+  kBatch,  ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
+  kSlidingWindow,  ///< solves for the last states anew
+};
+/// `filter`, `smoother`, `batch`, `sliding_window`.
+const char* ToString(EstimatorKind kind);
+
+/// A model, source or estimator that a loaded plugin offers.
+struct PluginEntry {
+  enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
+  std::string name, doc, citation, family;
+  std::filesystem::path plugin;      ///< the file it came from
+  unsigned thread_flags = 0;         ///< ALIDADE_THREAD_*; of a source or estimator 0
+  const Support* support = nullptr;  ///< of an estimator: EstimatorEntry::support
+  EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
+};
+
+/// Why a file in a searched folder was not loaded.
+struct Refusal {
+  std::filesystem::path file;
+  std::string reason;
+  ExitCode code;
+};
+
+/// What becomes of a given file or folder that is missing or refused: an error, or an entry of
+/// PluginHost::searched() and refusals().
+enum class OnRefusal { kThrow, kList };
+
+/// Finds and loads plugins and creates their models. A file is opened only if CheckTrusted accepts
+/// it and its build tag, read from the bytes beforehand, fits this program. Plugins are never
+/// unloaded. Creation is safe from several threads.
+class PluginHost {
+ public:
+  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
+  /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
+  /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
+  /// `only`, if set, has every name that will be asked for: plugins elsewhere that list none of
+  /// them stay closed, which saves the time of opening them. Then an error about a name that is not
+  /// found opens all, which is for one thread.
+  explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
+                      OnRefusal on_refusal = OnRefusal::kThrow,
+                      const std::optional<std::set<std::string>>& only = {});
+  ~PluginHost();
+
+  /// A model from its config entry: reads its parameters there, leaving unread keys to
+  /// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
+  /// sensor that has this choice; "": as it is written. Errors: kPlugin with the places searched,
+  /// kBadConfig.
+  SensorModel CreateSensor(const std::string& name, const Node& entry,
+                           const std::string& representation = {}) const;
+  MotionModel CreateMotion(const std::string& name, const Node& entry) const;
+  /// The model `entry` of entries(), also where another plugin offers its name.
+  std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
+                                              const std::string& representation = {}) const;
+  /// The source of a config, of its map `source`; `any_order` as in SourceArguments.
+  std::unique_ptr<Source> CreateSource(const Config& config, std::uint64_t seed,
+                                       bool any_order = false) const;
+  /// The maker of an estimator whose options are in `entry`; its errors are the same.
+  EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
+
+  /// Whether no plugin was left closed for its names.
+  bool complete() const { return !only_; }
+  /// One that has opened all: for errors, which tell what there is.
+  PluginHost Complete() const;
+
+  const std::vector<PluginEntry>& entries() const { return entries_; }
+  /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
+  std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
+  /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
+  /// each, for `plugins info`.
+  std::vector<std::string> Describe(const PluginEntry& entry) const;
+  /// Every place looked at, in order, with what was found there in the plugins that were opened.
+  const std::vector<std::string>& searched() const { return searched_; }
+  const std::vector<Refusal>& refusals() const { return refusals_; }
+
+ private:
+  struct Loaded;
+  void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
+  void LoadFolder(const std::filesystem::path& folder, bool required, bool whole);
+  void LoadFile(const std::filesystem::path& file, bool required);
+  void Load(const std::filesystem::path& file);
+  void AddEntries(const Loaded& plugin);
+
+  const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;
+  [[noreturn]] void FailMissing(PluginEntry::Kind kind, const std::string& name,
+                                const Node& entry) const;
+  const Loaded& LoadedFrom(const std::filesystem::path& file) const;
+  AlidadeEntry EntryOf(const PluginEntry& entry) const;
+  const SourceEntry& SourceOf(const PluginEntry& entry) const;
+  const EstimatorEntry& EstimatorOf(const PluginEntry& entry) const;
+
+  const std::vector<std::filesystem::path> given_;
+  const std::optional<std::set<std::string>> only_;
+  std::vector<std::unique_ptr<Loaded>> loaded_;
+  std::vector<PluginEntry> entries_;
+  std::vector<std::string> searched_;
+  std::vector<Refusal> refusals_;
+  mutable std::recursive_mutex create_mutex_;  ///< a source may create models
+};
+
+/// Every place searched and what was found there, and every file refused with the reason.
+std::string PluginPlaces(const PluginHost& host);
+
+/// The build tag in the `.alidade` section of a plugin, read from its bytes. Errors: kPlugin (no
+/// build tag, a malformed one, another plugin ABI).
+AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
+
+/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
+/// above it owned by another than root, the caller or the owner of the running program; writable
+/// for the world (sticky folders above excepted) or for a group other than the caller's private
+/// one, which has the caller's name and no other member. Follows symbolic links and checks each
+/// folder on the way. Errors: kNotTrusted.
+void CheckTrusted(const std::filesystem::path& file);
+
+}  // namespace alidade

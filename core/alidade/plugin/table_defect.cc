@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include "alidade/plugin/abi_read.h"
+#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/plugin_file.h"
+
+namespace alidade::internal {
+namespace {
+
+std::string Number(std::uint64_t i) { return std::to_string(i); }
+
+std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
+  if (entry.struct_size < offsetof(AlidadeEntry, reserved) || entry.struct_size > stride) {
+    return "states a size of " + Number(entry.struct_size) + " bytes";
+  }
+  if (!GoodName(entry.name)) return "has no name";
+  const std::pair<const char*, const char*> texts[] = {{"family", entry.family},
+                                                       {"doc", entry.doc},
+                                                       {"citation", entry.citation},
+                                                       {"version", entry.version}};
+  for (const auto& [what, text] : texts) {
+    const std::string defect = TextDefect(text);
+    if (!defect.empty()) return std::string("has a ") + what + " that " + defect;
+  }
+  if (!IsKnown(entry)) return {};
+  const std::string unknown = UnknownBits(entry.flags | entry.thread_flags, 0);
+  if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
+  if (!AllZero(entry.reserved)) return "uses reserved members";
+  if (entry.create == nullptr) return "cannot be created";
+  return {};
+}
+
+template <class Entry>
+std::string BuildDefect(const Entry* entries, int count, const char* kind) {
+  std::set<std::string> names;
+  for (int i = 0; i < count; ++i) {
+    const Entry& entry = entries[i];
+    if (!GoodName(entry.name)) return std::string(kind) + " has no name";
+    if (entry.create == nullptr) return std::string(entry.name) + " cannot be created";
+    if (!names.insert(entry.name).second) {
+      return std::string("its table names '") + entry.name + "' twice";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+bool IsKnown(const AlidadeEntry& entry) {
+  return entry.kind == ALIDADE_KIND_SENSOR || entry.kind == ALIDADE_KIND_MOTION;
+}
+
+std::string Defect(const AlidadeTable* from) {
+  if (from == nullptr) return "its table is null";
+  const AlidadeTable table = ReadPrefix(from);
+  if (table.magic != ALIDADE_MAGIC) return "its table has the wrong magic number";
+  if (table.struct_size < offsetof(AlidadeTable, reserved)) {
+    return "its table states a size of " + Number(table.struct_size) + " bytes";
+  }
+  if (table.abi_major != ALIDADE_ABI_MAJOR) {
+    return "its table has ABI major " + Number(table.abi_major);
+  }
+  const std::string unknown = UnknownBits(table.flags, 0);
+  if (!unknown.empty()) return "its table has flags that this version does not know: " + unknown;
+  if (!AllZero(table.reserved)) return "its table uses reserved members";
+  if (!GoodStride<AlidadeEntry>(table.entry_stride)) {
+    return "its table states an entry stride of " + Number(table.entry_stride) + " bytes";
+  }
+  if (table.entry_count == 0 || table.entry_count > std::uint32_t{ALIDADE_MAX_ENTRIES} ||
+      table.entries == nullptr) {
+    return "its table has " + Number(table.entry_count) + " entries";
+  }
+  std::set<std::pair<std::uint32_t, std::string>> names;
+  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
+    const AlidadeEntry entry = ReadEntry(table.entries, table.entry_stride, i);
+    const std::string defect = EntryDefect(entry, table.entry_stride);
+    if (!defect.empty()) return "entry " + Number(i) + " of its table " + defect;
+    if (!names.emplace(entry.kind, entry.name).second) {
+      return std::string("its table names '") + entry.name + "' twice";
+    }
+  }
+  return {};
+}
+
+std::string Defect(const CppPluginTable* table) {
+  if (table == nullptr) return "its table is null";
+  if (table->struct_size != sizeof(CppPluginTable)) {
+    return "its table states a size of " + Number(table->struct_size) + " bytes";
+  }
+  const int sources = table->sources == nullptr ? 0 : table->source_count;
+  const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
+  const bool other = table->images != nullptr || table->adjust != nullptr;
+  if (sources < 1 && estimators < 1 && !other) return "its table is empty";
+  std::string defect = BuildDefect(table->sources, sources, "a source");
+  if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");
+  return defect;
+}
+
+const char* KindName(PluginEntry::Kind kind) {
+  switch (kind) {
+    case PluginEntry::Kind::kSensor:
+      return "sensor";
+    case PluginEntry::Kind::kMotion:
+      return "motion model";
+    case PluginEntry::Kind::kSource:
+      return "source";
+    case PluginEntry::Kind::kEstimator:
+      return "estimator";
+  }
+  return "";
+}
+
+}  // namespace alidade::internal

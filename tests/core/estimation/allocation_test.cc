@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+
+#include "alidade/estimation/iekf.h"
+#include "alidade/estimation/square_root_ekf.h"
+#include "alidade/estimation/ukf.h"
+#include "alidade/io/log.h"
+#include "support/driven.h"
+#include "support/landmark_models.h"
+#include "support/sanitized.h"
+#include "support/systems.h"
+
+namespace {
+std::atomic<long> allocations{0};
+}  // namespace
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which have their own
+// Every allocation of this program is counted, those of operator new and of Eigen too.
+extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
+extern "C" void* malloc(std::size_t size) noexcept {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#endif
+
+namespace alidade {
+namespace {
+
+/// The depth filter, with a motion model besides that is of no sensor.
+System WalkingDepthFilter() {
+  System system = testing::DepthFilter();
+  testing::AddMotion(system, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
+  return system;
+}
+
+TEST(ControlInput, TakesNoAllocation) {
+  System system = testing::DepthFilter();
+  testing::AddMotion(system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+                     {{"position", 0.0, 1.0}});
+  system.motions.back().input = {"odometry", 0.05};
+  std::vector<StreamInfo> streams = testing::StreamsOf(system);
+  streams.push_back({"odometry", 1});
+  Ekf ekf(system, {}, streams);
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) frames.push_back(testing::FrameAt(0.033 * k, {{2, 0.1 * k}}));
+  for (std::size_t k = 0; k < 20; ++k) ekf.Process(frames[k]);
+  const long before = allocations;
+  for (std::size_t k = 20; k < frames.size(); ++k) ekf.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(Log, TakesNoAllocationWithoutASink) {
+  const long before = allocations;
+  for (int i = 0; i < 100; ++i) Log(LogLevel::kError, "nobody hears this text of 40 characters");
+  EXPECT_EQ(allocations - before, 0);
+}
+
+/// Both sensors, one, an outlier, none, and the other order.
+std::vector<Frame> Frames() {
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) {
+    const double t = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t);
+    const double d = k % 5 == 2 ? 500.0 : 26.0 / depth, s = depth / 0.3;
+    switch (k % 7) {
+      case 3:
+        frames.push_back(testing::FrameAt(t, {{1, s}}));
+        break;
+      case 4:
+        frames.push_back(testing::FrameAt(t, {}));
+        break;
+      case 5:
+        frames.push_back(testing::FrameAt(t, {{1, s}, {0, d}}));
+        break;
+      default:
+        frames.push_back(testing::FrameAt(t, {{0, d}, {1, s}}));
+    }
+  }
+  return frames;
+}
+
+void ExpectNoAllocation(Estimator& filter) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  const std::vector<Frame> frames = Frames();
+  for (std::size_t k = 0; k < 20; ++k) filter.Process(frames[k]);
+  const long before = allocations;
+  EXPECT_GT(before, 0);  // they are counted
+  for (std::size_t k = 20; k < frames.size(); ++k) filter.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_FALSE(filter.diverged());
+}
+
+class Allocation : public ::testing::TestWithParam<Fuse> {
+ protected:
+  Allocation() : system_(WalkingDepthFilter()), streams_(testing::StreamsOf(system_)) {
+    options_.fuse = GetParam();
+    options_.gate = 0.999;
+  }
+
+  System system_;
+  std::vector<StreamInfo> streams_;
+  EkfOptions options_;
+};
+
+TEST_P(Allocation, AStepOfTheEkfTakesNone) {
+  Ekf filter(system_, options_, streams_);
+  ExpectNoAllocation(filter);
+}
+
+TEST_P(Allocation, AStepOfTheIteratedEkfTakesNone) {
+  Iekf filter(system_, {options_}, streams_);
+  ExpectNoAllocation(filter);
+}
+
+TEST_P(Allocation, AStepOfTheSquareRootEkfTakesNone) {
+  SquareRootEkf filter(system_, options_, streams_);
+  ExpectNoAllocation(filter);
+}
+
+TEST_P(Allocation, AStepOfTheUkfTakesNone) {
+  UkfOptions options;
+  options.filter = options_;
+  options.alpha = 1.0;
+  Ukf filter(system_, options, streams_);
+  ExpectNoAllocation(filter);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
+                         ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
+
+/// Adds `count` states that walk; with `considered` the first one is never corrected.
+void AddWalking(System& system, int count, bool considered) {
+  const MotionModel model = testing::ConstantMotion(1, 0.1);
+  for (int i = 0; i < count; ++i) {
+    const std::string name = "other_" + std::to_string(i);
+    const BlockId id = system.layout.Declare(
+        name + ".value", name, model.blocks()[0],
+        considered && i == 0 ? BlockStatus::kConsider : BlockStatus::kEstimated);
+    Prior prior;
+    prior.block = id;
+    prior.mean = {0.0};
+    prior.covariance = Eigen::MatrixXd::Identity(1, 1);
+    system.priors.push_back(prior);
+    system.motions.push_back({name, model, {id}});
+  }
+}
+
+/// Landmark `id` from a camera that walks along x, in pixels.
+std::vector<double> PixelOf(std::int64_t id, double x) {
+  const double angle = static_cast<double>(id), depth = 4.0 + static_cast<double>(id % 5);
+  return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
+}
+
+/// Counts allocations in frames of `measured` landmarks out of half as many again. In each frame a
+/// tenth of them leaves, and as many come; one measurement is wild.
+void ExpectNoAllocationOf(Filter& filter, int measured) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  const int known = measured * 3 / 2, change = measured / 10;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) {
+    std::vector<testing::Observation> observations;
+    for (int i = 0; i < measured; ++i) {
+      const std::int64_t id = (k * change + i) % known;
+      observations.push_back({id, PixelOf(id, 0.01 * k)});
+    }
+    observations[static_cast<std::size_t>(measured / 2)].z[0] += 3.0;
+    frames.push_back(testing::FrameOf(0.1 * k, observations));
+  }
+  long before = 0;
+  int initialised = 0, deleted = 0, converted = 0, accepted = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (k == 40) before = allocations;
+    const UpdateReport& report = filter.Process(frames[k]);
+    if (k < 40) continue;
+    initialised += report.landmarks.initialised;
+    deleted += report.landmarks.deleted;
+    converted += report.landmarks.converted;
+    for (const MeasurementReport& entry : report.measurements()) {
+      accepted += entry.outcome == Outcome::kAccepted;
+    }
+  }
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_FALSE(filter.diverged());
+  EXPECT_GE(initialised, 20 * change);
+  EXPECT_GE(deleted, 20 * change);
+  EXPECT_GE(accepted, 15 * measured);
+  if (filter.system().landmarks->max_linearity_index > 0.0) {
+    EXPECT_GT(converted, 0);
+  }
+}
+
+LandmarkOptions Turnover() {
+  LandmarkOptions options = testing::WithPrior(0.2, 0.1);
+  options.max_missed_frames = 1;
+  return options;
+}
+
+EkfOptions Gated() {
+  EkfOptions options;
+  options.gate = 0.999;
+  return options;
+}
+
+TEST(AllocationOfLandmarks, AnUpdateOfManyTakesNone) {
+  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  AddWalking(system, 10, /*considered=*/true);
+  Ekf filter = testing::EkfOf(system, Gated());
+  ExpectNoAllocationOf(filter, 100);
+  EXPECT_TRUE(IsSkipped() || filter.state().covariance().size() >= 13 + 6 * 100);
+}
+
+TEST(AllocationOfLandmarks, AFrameBesidePostponedOnesTakesNone) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  EkfOptions options = Gated();
+  options.covariance = CovarianceForm::kCompressed;
+  Ekf filter = testing::EkfOf(
+      testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(0.2, 0.1)), options);
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) {
+    std::vector<testing::Observation> observations;
+    for (int id = 0; id < (k == 0 ? 100 : 15); ++id) {
+      observations.push_back({id, PixelOf(id, 0.01 * k)});
+    }
+    frames.push_back(testing::FrameOf(0.1 * k, observations));
+  }
+  for (std::size_t k = 0; k < 40; ++k) filter.Process(frames[k]);
+  EXPECT_EQ(filter.state().covariance().size(), 3 + 6 * 15);
+  const long before = allocations;
+  for (std::size_t k = 40; k < frames.size(); ++k) filter.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(filter.landmarks().size(), 100u);
+}
+
+TEST(AllocationOfLandmarks, TheIteratedEkfTakesNone) {
+  const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  Iekf filter(system, {Gated()}, {{"tracks", 2}});
+  ExpectNoAllocationOf(filter, 20);
+}
+
+TEST(AllocationOfLandmarks, DirectionsAndSharedAnchorsTakeNone) {
+  const System system =
+      testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), Turnover());
+  Ekf filter = testing::EkfOf(system, Gated());
+  ExpectNoAllocationOf(filter, 20);
+}
+
+TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
+  LandmarkOptions options = Turnover();
+  options.max_linearity_index = 10.0;
+  options.prior->adapt_after = 3;
+  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options);
+  system.sensors[0].outlier_rejection = OnePointRansac{};
+  Ekf filter = testing::EkfOf(system, Gated());
+  ExpectNoAllocationOf(filter, 20);
+}
+
+/// Thirty states in fifteen points that move, one measurement each.
+System ThirtyStates() {
+  System system;
+  for (int i = 0; i < 15; ++i) {
+    const std::string name = "p" + std::to_string(i);
+    testing::AddMotion(system, name, testing::ConstantVelocityMotion(1.0),
+                       {{"x", 0.1 * i, 1.0}, {"v", 0.0, 1.0}});
+    testing::AddSensor(system, "of_" + name, testing::LinearSensor(1.0, 0.1), {name + ".x"});
+  }
+  return system;
+}
+
+template <class Filter, class Options>
+void ExpectNoAllocationOfThirtyStates(const Options& options) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  const System system = ThirtyStates();
+  Filter filter(system, options, testing::StreamsOf(system));
+  std::vector<Frame> frames;
+  for (int k = 0; k < 30; ++k) {
+    std::vector<std::pair<int, double>> values;
+    for (int i = 0; i < 15; ++i) values.emplace_back(i, 0.1 * i + 0.01 * k);
+    frames.push_back(testing::FrameAt(0.1 * k, values));
+  }
+  for (std::size_t k = 0; k < 10; ++k) filter.Process(frames[k]);
+  const long before = allocations;
+  for (std::size_t k = 10; k < frames.size(); ++k) filter.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_FALSE(filter.diverged());
+}
+
+TEST(AllocationOfThirtyStates, TheEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<Ekf>(EkfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheIteratedEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<Iekf>(IekfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheSquareRootEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<SquareRootEkf>(EkfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheUkfTakesNone) {
+  UkfOptions options;
+  options.alpha = 1.0;
+  ExpectNoAllocationOfThirtyStates<Ukf>(options);
+}
+
+}  // namespace
+}  // namespace alidade

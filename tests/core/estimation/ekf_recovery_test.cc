@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/estimation/rts.h"
+#include "alidade/estimation/square_root_ekf.h"
+#include "alidade/estimation/ukf.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+// FAULTS 76
+TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
+  AddSensor(system, "broken", InProcessSensor(Broken(), "broken"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_NE(report.events[0].text.find("broken"), std::string::npos);
+  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 7.0);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0);
+  EXPECT_FALSE(ekf.failed());
+}
+
+/// Overflows as soon as it moves.
+struct Exploding : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = 1e308 * (x[0] + w[0]);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+// FAULTS 76
+TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{0, 5.0}}));
+  const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 5.0}}));
+  EXPECT_TRUE(ekf.failed());
+  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 4.0);
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
+            std::string::npos);
+  EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
+  EXPECT_STREQ(ToString(report.measurements()[0].outcome), "ended");
+  EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
+}
+
+/// Counts how often it is asked whether a measurement is of use.
+struct Asked : Linear {
+  static inline int times = 0;
+  using Linear::Linear;
+  bool Valid(const double*) const {
+    ++times;
+    return true;
+  }
+};
+
+TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(system, "asked", InProcessSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Asked::times = 0;
+  ekf.Process(FrameAt(0.0, {{0, 5.0}}));
+  EXPECT_EQ(Asked::times, 1);
+  EXPECT_EQ(ekf.Process(FrameAt(-1.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kStale);
+  ekf.Process(FrameAt(1.0, {{0, 5.0}}));
+  ASSERT_TRUE(ekf.failed());
+  EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
+  EXPECT_EQ(Asked::times, 1);
+}
+
+TEST(Ekf, AFailedStepMovesNothing) {
+  System system = MovingPoint();
+  AddMotion(system, "q", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  Ekf ekf(system, {}, {});
+  ekf.Start(0);
+  const std::vector<double> x = ekf.state().values();
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  ekf.Process(FrameAt(1.0, {}));
+  EXPECT_TRUE(ekf.failed());
+  EXPECT_EQ(ekf.state().values(), x);
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+// FAULTS 38
+TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
+  EkfOptions options;
+  options.max_dt_s = 1e-9;
+  Ekf ekf(MovingPoint(), options, {});
+  ekf.Start(0);
+  const UpdateReport& report = ekf.Process(FrameAt(10.0, {}));
+  EXPECT_TRUE(ekf.failed());
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "too_many_substeps");
+}
+
+TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
+  System system = DepthFilter();
+  system.sensors.pop_back();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {{0, 65.0}});
+  frame.measurements[0].covariance = {100.0};
+  ekf.Process(frame);
+  // sigma_Z = Z^2 / BF sigma_d
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"),
+              std::pow(0.16 / 26.0 * 10.0, 2), 1e-12);
+}
+
+TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{1, std::nan("")}}));
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+// Nor do covariances that are none: what is wrong with them is not the filter's.
+TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
+  const System system = DepthFilter();
+  for (const double variance : {std::nan(""), -1e6}) {
+    Ekf ekf(system, {}, StreamsOf(system));
+    const State before = ekf.state();
+    Frame frame = FrameAt(0.0, {{1, 1.0}});
+    frame.measurements[0].covariance = {variance};
+    for (int k = 0; k < 100; ++k) {
+      const UpdateReport& report = ekf.Process(frame);
+      EXPECT_EQ(report.measurements()[0].outcome,
+                std::isnan(variance) ? Outcome::kNotFinite : Outcome::kInvalid);
+      EXPECT_TRUE(report.events.empty());
+    }
+    EXPECT_EQ(ekf.state().values(), before.values());
+    EXPECT_EQ(ekf.state().covariance().Dense(), before.covariance().Dense());
+    frame.measurements[0].covariance = {0.0};  // an exact measurement
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome, Outcome::kAccepted);
+  }
+}
+
+/// Two numbers, of which only the sum has noise.
+struct OfSum : Sensor<Vec<2>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = z[1] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[2] = T(0.1);
+  }
+};
+
+// What S rejects counts as much as what the gate rejects: the sensor's blocks become less certain.
+TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(system, "z", InProcessSensor(OfSum(), "of_sum"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {});
+  frame.measurements.push_back({0, 0, -1, {0.5, 0.5}, {}});
+  int recovered = 0;
+  for (int k = 0; k < 20; ++k) {
+    const UpdateReport& report = ekf.Process(frame);
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
+    recovered += HasEvent(report, "rejection_recovery");
+  }
+  EXPECT_EQ(recovered, 1);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-9);
+}
+
+// FAULTS 77
+TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.sensors[0].roles[1].mode = RoleMode::kKnown;
+  system.priors[0].mean = {-1.0};
+  Ekf ekf(system, {}, StreamsOf(system));
+  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1.0, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+            0.25);
+}
+
+TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, std::nan("")}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
+  EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
+}
+
+// FAULTS 77
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
+  System system = DepthFilter();
+  system.priors[0].mean = {3.0};
+  system.priors[0].covariance(0, 0) = 1e-6;
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
+  ASSERT_FALSE(report.events.empty());
+  EXPECT_EQ(report.events.back().kind, "rejection_recovery");
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
+  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
+  EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
+              0.4 * 0.4 / 26.0, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 0.25);
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements()[0].outcome, Outcome::kAccepted);
+}
+
+// After a second the rate is known to 1 more than its prior; the reset measures it no better.
+TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
+  EkfOptions options;
+  options.gate = 0.999;
+  const System system = DepthFilter();
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Start(0);
+  bool reset = false;
+  for (int k = 0; k < 20; ++k) {
+    reset = HasEvent(ekf.Process(FrameAt(1.0, {{0, 1e5}})), "rejection_recovery");
+  }
+  ASSERT_TRUE(reset);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth", "target.depth_rate"), 0.0);
+}
+
+// Filters that carry more than P, and so cannot follow what others make of it.
+template <class Type>
+class WithoutRecovery : public ::testing::Test {};
+using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
+TYPED_TEST_SUITE(WithoutRecovery, CarryMore);
+
+TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
+  const System system = DepthFilter();
+  using Options = std::conditional_t<std::is_same_v<TypeParam, Ukf>, UkfOptions, EkfOptions>;
+  Options options;
+  if constexpr (std::is_same_v<TypeParam, Ukf>) {
+    options.filter.gate = 0.999;
+  } else {
+    options.gate = 0.999;
+  }
+  TypeParam filter(system, options, StreamsOf(system));
+  filter.Start(0);
+  const Eigen::MatrixXd p = filter.state().covariance().Dense();
+  for (int k = 0; k < 50; ++k) {
+    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2000.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
+    EXPECT_TRUE(report.events.empty());
+  }
+  EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
+}
+
+/// x' = x + w of both blocks, and of neither by the other.
+struct Pair : Motion<2, Vec<1>, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"a"}, Quantity{"b"}};
+  template <class T>
+  void Step(const T* a, const T* b, const T* w, double, T* next_a, T* next_b) const {
+    next_a[0] = a[0] + w[0];
+    next_b[0] = b[0] + w[1];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 1e-3; }
+};
+
+/// z = a + b, which tells b.
+struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0] + b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+  template <class T>
+  bool Initialise(const T* a, const T* z, T* b) const {
+    b[0] = z[0] - a[0];
+    return true;
+  }
+};
+
+// b = z - a: a, which moves with it, is put back to its prior first, and b is correlated with that.
+TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
+  AddSensor(system, "sum", InProcessSensor(Sum(), "sum"), {"p.a", "p.b"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.01), {"p.a"});
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{1, 1.0}}));
+  for (int k = 0; k < 20; ++k) ekf.Process(FrameAt(0.0, {{0, 50.0}}));
+  EXPECT_NEAR(ValueOf(ekf.state(), "p.b"), 49.0, 1e-3);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.a", "p.a"), 0.25, 1e-12);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.a", "p.b"), -0.25, 1e-12);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.b", "p.b"), 0.25 + 0.01, 1e-12);
+}
+
+/// z = (a, b)
+struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0];
+    z[1] = b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+};
+
+// Each half of it is a covariance.
+TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
+  AddSensor(system, "both", InProcessSensor(Both(), "both"), {"p.a", "p.b"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {{0, 1.0}});
+  frame.measurements[0].values = {1.0, 2.0};
+  for (const double other : {5.0, 0.1}) {
+    frame.measurements[0].covariance = {1.0, 0.1, other, 1.0};
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+              other == 0.1 ? Outcome::kAccepted : Outcome::kInvalid);
+    frame.measurements[0].covariance = {1.0, other, 0.1, 1.0};
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+              other == 0.1 ? Outcome::kAccepted : Outcome::kInvalid);
+  }
+}
+
+TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
+  System system = DepthFilter();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  Ekf ekf(system, {}, StreamsOf(system));
+  // The scale alone has to wait for a depth.
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements()[0].outcome, Outcome::kNotReady);
+  const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
+  EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInitialised);
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
+  EXPECT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), 2.0, 1e-15);
+  // lambda = s / Z: d lambda = ds / Z - s / Z^2 dZ, sigma_s = 2/300 at s = 1.
+  const double variance_z = std::pow(0.25 / 26.0, 2), variance_s = std::pow(2.0 / 300.0, 2);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), variance_z, 1e-15);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"),
+              -4.0 * variance_z, 1e-15);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+              16.0 * variance_z + 4.0 * variance_s, 1e-14);
+}
+
+TEST(Ekf, ABlockStartsFromTheSensorThatTheConfigNames) {
+  System system = DepthFilter();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  SensorBinding other = system.sensors[0];
+  other.name = other.stream = "other";
+  system.sensors.push_back(other);
+  Ekf ekf(system, {}, StreamsOf(system));
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{2, 65.0}})).measurements()[0].outcome, Outcome::kNotReady);
+  EXPECT_EQ(ekf.Process(FrameAt(0.1, {{0, 52.0}})).measurements()[0].outcome,
+            Outcome::kInitialised);
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
+}
+
+TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.sensors[0].roles[0].mode = RoleMode::kKnown;
+  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"), 0.0);
+  // lambda = s / Z with Z = 0.35 as exact, sigma_s = 2/300 at s = 1.
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+              std::pow(2.0 / 300.0 / 0.35, 2), 1e-15);
+}
+
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
+  const auto event_of = [](BlockStatus status) {
+    System system = WithStatus(DepthFilter(), "target.depth", status);
+    system.priors[0].mean = {3.0};
+    system.priors[0].covariance(0, 0) = 1e-6;
+    EkfOptions options;
+    options.gate = 0.999;
+    options.rejection_recovery = RejectionRecovery::kInflate;
+    Ekf ekf(system, options, StreamsOf(system));
+    UpdateReport report;
+    for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
+    return report.events.empty() ? "" : report.events.back().text;
+  };
+  const std::string why = "sensor 'disparity' rejected 20 times in a row: ";
+  EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "inflated the covariance of its blocks");
+  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "it corrects no block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "it corrects no block to inflate");
+}
+
+TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
+  System system = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider);
+  system.priors[0].mean = {3.0};
+  system.priors[0].covariance(0, 0) = 1e-6;
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Start(0);
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
+  ASSERT_EQ(report.events.back().kind, "rejection_recovery");
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
+  // 0.25 of the prior and 1 of the acceleration over the second.
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
+}
+
+/// z = x + y, which tells y; y may stay unbound.
+struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"},
+                                     Quantity{"y", "", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    z[0] = y == nullptr ? x[0] : x[0] + y[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1e-3);
+  }
+  template <class T>
+  bool Initialise(const T* x, const T* z, T* y) const {
+    y[0] = z[0] - x[0];
+    return true;
+  }
+};
+
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(system, "s", InProcessSensor(WithOptional(), "with_optional"), {"p.x"});
+  system.sensors[0].roles.push_back({});
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 100.0}}));
+  ASSERT_FALSE(report.events.empty());
+  EXPECT_EQ(report.events.back().text,
+            "sensor 's' rejected 20 times in a row: inflated the covariance of its blocks");
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-12);
+}
+
+TEST(Ekf, ThatASensorLeftItsDomainIsNotedAlsoAfterAGatedMeasurement) {
+  System system = DepthFilter();
+  system.priors[1].mean = {-1.0};
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1e6}})).measurements()[0].outcome, Outcome::kGated);
+  EXPECT_FALSE(ekf.diverged());
+  const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 80.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
+  EXPECT_TRUE(ekf.diverged());
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "diverged");
+  EXPECT_TRUE(ekf.Process(FrameAt(1.0, {{0, 80.0}})).events.empty());
+}
+
+}  // namespace
+}  // namespace alidade

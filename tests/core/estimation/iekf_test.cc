@@ -1,0 +1,429 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/iekf.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "alidade/base/random.h"
+#include "alidade/state/small_kernels.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+TEST(Iekf, EqualsTheEkfOnALinearProblem) {
+  System system = MovingPoint();
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Iekf iekf(system, {}, StreamsOf(system));
+  Random random(21);
+  for (int k = 0; k < 200; ++k) {
+    const Frame frame = FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}});
+    const UpdateReport& plain = ekf.Process(frame);
+    const UpdateReport& iterated = iekf.Process(frame);
+    ASSERT_TRUE(iterated.events.empty()) << iterated.events[0].text;
+    ASSERT_LT((ekf.state().covariance().Dense() - iekf.state().covariance().Dense()).norm(), 1e-9);
+    for (const char* block : {"p.x", "p.v"}) {
+      ASSERT_NEAR(ValueOf(iekf.state(), block), ValueOf(ekf.state(), block), 1e-9) << k;
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      ASSERT_NEAR(iterated.measurements()[i / 2].gain[i % 2],
+                  plain.measurements()[i / 2].gain[i % 2], 1e-9);
+    }
+  }
+}
+
+/// The x in [low, high] where c is least, by golden sections.
+double Least(const std::function<double(double)>& c, double low, double high) {
+  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
+  for (int i = 0; i < 200; ++i) {
+    const double a = high - ratio * (high - low), b = low + ratio * (high - low);
+    (c(a) < c(b) ? high : low) = c(a) < c(b) ? b : a;
+  }
+  return 0.5 * (low + high);
+}
+
+TEST(Iekf, FindsTheMostProbableState) {
+  System system = DepthFilter();
+  system.sensors.pop_back();
+  Iekf iekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 110.0}}));
+  EXPECT_TRUE(report.events.empty());
+  const auto cost = [](double z) {
+    return std::pow((z - 0.35) / 0.1, 2) + std::pow(110.0 - 26.0 / z, 2);
+  };
+  const double least = Least(cost, 0.15, 0.4);
+  // A ten-thousandth of the posterior's sigma, 2 mm.
+  EXPECT_NEAR(ValueOf(iekf.state(), "target.depth"), least, 2e-7);
+  // P = (1 / P0 + H' H)^-1 there; what a step of that size changes of H: 3e-6 of P.
+  const double h = -26.0 / (least * least);
+  const double p = 1.0 / (1.0 / 0.01 + h * h);
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "target.depth", "target.depth") / p, 1.0, 1e-4);
+  // Reported as at the prediction.
+  EXPECT_NEAR(report.measurements()[0].h[0], 26.0 / 0.35, 1e-12);
+  EXPECT_NEAR(report.measurements()[0].innovation[0], 110.0 - 26.0 / 0.35, 1e-12);
+  EXPECT_NEAR(report.measurements()[0].s[0], std::pow(26.0 / 0.35 / 0.35, 2) * 0.01 + 1.0, 1e-9);
+}
+
+TEST(Iekf, TheGateIsThatOfThePrediction) {
+  const System system = DepthFilter();
+  IekfOptions options;
+  options.gate = 0.999;
+  Iekf iekf(system, options, StreamsOf(system));
+  Ekf ekf(system, options, StreamsOf(system));
+  const std::vector<double> x = iekf.state().values();
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 300.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
+  EXPECT_EQ(report.measurements()[0].nis,
+            ekf.Process(FrameAt(0.0, {{0, 300.0}})).measurements()[0].nis);
+  EXPECT_EQ(iekf.state().values(), x);
+}
+
+/// z = atan(x)
+struct ArcTangent : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    using std::atan;
+    z[0] = atan(x[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1e-3);
+  }
+};
+
+/// The same, with its derivative 1 / (1 + x^2) written, and counted.
+struct CountedArcTangent : ArcTangent {
+  int* count;
+  CountedArcTangent(const ArcTangent& base, int* counter) : ArcTangent(base), count(counter) {}
+  void Jacobian(const double* x, MatrixRef j) const {
+    ++*count;
+    j(0, 0) = 1.0 / (1.0 + x[0] * x[0]);
+  }
+};
+
+/// z = x^2, whose derivative is given for |x| > 2 only.
+struct Creased : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0] * x[0];
+    return true;
+  }
+  void Jacobian(const double* x, MatrixRef j) const {
+    j(0, 0) = std::abs(x[0]) > 2.0 ? 2.0 * x[0] : std::nan("");
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+System FarArcTangent() {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
+  AddSensor(system, "s", InProcessSensor(ArcTangent(), "arc_tangent"), {"p.x"});
+  return system;
+}
+
+// FAULTS 81: the best is kept
+TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
+  // From 3 a whole Gauss-Newton step leads to -9.5, from there to 116, and so on.
+  const System system = FarArcTangent();
+  Iekf iekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+  EXPECT_TRUE(report.events.empty()) << report.events[0].text;
+  EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 0.0, 1e-6);
+}
+
+// FAULTS 81
+TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
+  const System system = FarArcTangent();
+  IekfOptions options;
+  options.max_iterations = 2;
+  Iekf iekf(system, options, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_converged");
+  EXPECT_NE(report.events[0].text.find("stopped after 2 iterations"), std::string::npos);
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
+  EXPECT_LT(std::abs(ValueOf(iekf.state(), "p.x")), 3.0);
+  EXPECT_FALSE(iekf.diverged());
+}
+
+// The last iterate x is where H was last taken: P = (1 / P0 + H^2 / R)^-1 there, and the step left
+// is (P0 H (r + H dx) / S - dx) / sqrt(P), worked out here by hand.
+TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
+  const System system = FarArcTangent();
+  for (const int most : {2, 3}) {
+    IekfOptions options;
+    options.max_iterations = most;
+    Iekf iekf(system, options, StreamsOf(system));
+    const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+    ASSERT_EQ(report.events.size(), 1u) << most;
+    int count = 0;
+    double left = 0.0;
+    ASSERT_EQ(
+        std::sscanf(report.events[0].text.c_str(),
+                    "an update stopped after %d iterations, a step of %lf sigma", &count, &left),
+        2)
+        << report.events[0].text;
+    EXPECT_EQ(count, most);
+    const double x = ValueOf(iekf.state(), "p.x"), dx = x - 3.0;
+    const double h = 1.0 / (1.0 + x * x), p0 = 1e4, r = 1e-6, innovation = -std::atan(x);
+    const double step = p0 * h * (innovation + h * dx) / (h * p0 * h + r) - dx;
+    const double p = 1.0 / (1.0 / p0 + h * h / r);
+    EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x") / p, 1.0, 2.2e-16 * p0 / p) << most;
+    EXPECT_NEAR(left / (std::abs(step) / std::sqrt(p)), 1.0, 5e-3) << most;  // three digits
+  }
+}
+
+TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
+  for (const int most : {2, 3}) {
+    int linearisations = 0;
+    System system;
+    AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
+    AddSensor(system, "s", InProcessSensor(CountedArcTangent{{}, &linearisations}, "counted"),
+              {"p.x"});
+    IekfOptions options;
+    options.max_iterations = most;
+    Iekf(system, options, StreamsOf(system)).Process(FrameAt(0.0, {{0, 0.0}}));
+    EXPECT_EQ(linearisations, most);
+  }
+}
+
+// The first step leads from 2.5 to 1.34, where h is defined but its derivative is not.
+TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
+  AddSensor(system, "plain", LinearSensor(1.0, 1.0), {"p.x"});
+  AddSensor(system, "creased", InProcessSensor(Creased{}, "creased"), {"p.x"});
+  Iekf iekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 2.5}, {1, 0.0}}));
+  for (const MeasurementReport& entry : report.measurements()) {
+    EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+  }
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_converged");
+  EXPECT_EQ(report.events[0].text,
+            "an update stopped after 1 iterations where h has no Jacobian; the last iterate is "
+            "kept");
+  // H = 5 at the prediction: 1 / P = 1 + 1 + 25, and the step from there is P 5 (0 - 2.5^2).
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0 / 27.0, 1e-12);
+  EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 2.5 - 5.0 * 6.25 / 27.0, 1e-12);
+}
+
+TEST(Iekf, WithoutNoiseTheUpdateIsThatOfTheEkf) {
+  System system = MovingPoint();
+  AddSensor(system, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
+  Iekf iekf(system, {}, StreamsOf(system));
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 3.0}}));
+  ekf.Process(FrameAt(0.0, {{0, 3.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
+  EXPECT_EQ(iekf.state().values(), ekf.state().values());
+}
+
+struct Still : Motion<0, UnitQuaternion, UnitVector> {
+  static constexpr std::array kBlocks{Quantity{"q"}, Quantity{"u"}};
+  template <class T>
+  void Step(const T* q, const T* u, const T*, double, T* next_q, T* next_u) const {
+    for (int i = 0; i < 4; ++i) next_q[i] = q[i];
+    for (int i = 0; i < 3; ++i) next_u[i] = u[i];
+  }
+  void SqrtQ(double, MatrixRef) const {}
+  bool Stationary() const { return true; }
+};
+
+/// z = R(q) u
+struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
+  static constexpr std::array kRoles{Quantity{"q"}, Quantity{"u"}};
+  static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* q, const T* u, T* z) const {
+    const T pure[4] = {T(0.0), u[0], u[1], u[2]}, back[4] = {q[0], -q[1], -q[2], -q[3]};
+    T half[4], turned[4];
+    UnitQuaternion::Multiply(q, pure, half);
+    UnitQuaternion::Multiply(half, back, turned);
+    for (int i = 0; i < 3; ++i) z[i] = turned[i + 1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(0.1);
+  }
+};
+
+System TurnedVector() {
+  System system;
+  MotionBinding binding{"s", InProcessMotion(Still(), "still"), {}};
+  const std::vector<double> means[2] = {{1.0, 0.0, 0.0, 0.0}, {0.6, 0.0, 0.8}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Space& space = binding.model.blocks()[i];
+    const BlockId id = system.layout.Declare("s." + space.name, "s", space);
+    binding.blocks.push_back(id);
+    Prior prior;
+    prior.block = id;
+    prior.mean = means[i];
+    const int n = space.geometry.tangent;
+    prior.covariance = 0.5 * Eigen::MatrixXd::Identity(n, n);
+    system.priors.push_back(prior);
+  }
+  system.motions.push_back(binding);
+  AddSensor(system, "turned", InProcessSensor(Turned(), "turned"), {"s.q", "s.u"});
+  return system;
+}
+
+TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
+  const System system = TurnedVector();
+  IekfOptions options;
+  options.max_iterations = 100;
+  options.tolerance = 1e-8;
+  Iekf iekf(system, options, StreamsOf(system));
+  Frame frame;
+  frame.timestamp = 0;
+  const double z[3] = {-0.3, 0.9, 0.2};
+  frame.measurements.push_back({0, 0, -1, {z[0], z[1], z[2]}, {}});
+  EXPECT_TRUE(iekf.Process(frame).events.empty());
+  // The slope of the cost over the tangent at the prior vanishes at the estimate.
+  const Geometry geometries[2] = {Geometry::UnitQuaternion(), Geometry::UnitVector()};
+  double d[5];
+  geometries[0].Minus(iekf.state().value(0), system.priors[0].mean.data(), d);
+  geometries[1].Minus(iekf.state().value(1), system.priors[1].mean.data(), d + 3);
+  const auto cost = [&] {
+    double q[4], u[3], h[3], sum = 0.0;
+    geometries[0].Plus(system.priors[0].mean.data(), d, q);
+    geometries[1].Plus(system.priors[1].mean.data(), d + 3, u);
+    Turned().Predict(q, u, h);
+    for (int i = 0; i < 3; ++i) sum += std::pow((z[i] - h[i]) / 0.1, 2);
+    for (const double element : d) sum += element * element / 0.5;
+    return sum;
+  };
+  EXPECT_GT(std::hypot(d[0], d[1], d[2]), 0.5);  // far enough for the curvature to count
+  constexpr double kStep = 1e-5;
+  for (double& element : d) {
+    const double middle = element;
+    element = middle + kStep;
+    const double above = cost();
+    element = middle - kStep;
+    const double below = cost();
+    element = middle;
+    // Second derivatives are about 2 / 0.1^2 = 200: a distance of 1e-7 from the optimum.
+    EXPECT_NEAR((above - below) / (2.0 * kStep), 0.0, 2e-5);
+  }
+}
+
+TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
+  const System few = TurnedVector();
+  System many = TurnedVector();
+  for (int i = 0; i < 20; ++i) {
+    AddMotion(many, "m" + std::to_string(i), testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  }
+  Ekf small(few, {}, StreamsOf(few)), large(many, {}, StreamsOf(many));
+  Frame frame;
+  frame.timestamp = 0;
+  frame.measurements.push_back({0, 0, -1, {-0.3, 0.9, 0.2}, {}});
+  small.Process(frame);
+  large.Process(frame);
+  ASSERT_TRUE(internal::IsSmall(small.state().covariance()));
+  ASSERT_FALSE(internal::IsSmall(large.state().covariance()));
+  EXPECT_LT(
+      (small.state().covariance().Dense() - large.state().covariance().Dense().topLeftCorner(5, 5))
+          .norm(),
+      1e-12);
+}
+
+/// z = x^k c + n
+struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
+  static constexpr Quantity kMeasurement{"z"};
+  int power;
+  explicit PowerTimes(int k) : power(k) {}
+  template <class T>
+  bool Predict(const T* x, const T* c, T* z) const {
+    z[0] = c[0];
+    for (int i = 0; i < power; ++i) z[0] = z[0] * x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+/// z = x - c + n. It leaves of P = 1.9 I the correlated P = [[1, .9], [.9, 1]]: .9 = 1.9^2 / S.
+struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, const T* c, T* z) const {
+    z[0] = x[0] - c[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(std::sqrt(1.9 * 1.9 / 0.9 - 3.8));
+  }
+};
+
+/// After z = 2 = x^k c with R = .01 and c held; x = c = 1 before, as correlated as Difference says.
+State AfterAHeldRole(int power) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
+  AddMotion(system, "q", testing::ConstantMotion(1), {{"c", 1.0, std::sqrt(1.9)}});
+  AddSensor(system, "difference", InProcessSensor(Difference(), "difference"), {"p.x", "q.c"});
+  AddSensor(system, "power", InProcessSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
+  system.sensors[1].roles[1].mode = RoleMode::kKnown;
+  IekfOptions options;
+  options.max_iterations = 50;
+  options.tolerance = 1e-9;
+  Iekf iekf(system, options, StreamsOf(system));
+  iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "q.c"), 0.9, 1e-12);
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0, 1e-12);
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{1, 2.0}}));
+  EXPECT_TRUE(report.events.empty()) << report.events[0].text;
+  return iekf.state();
+}
+
+// With c held h = x is linear: K = (1, .9) / 1.01.
+TEST(Iekf, HoldsARoleInEveryIteration) {
+  const State linear = AfterAHeldRole(1);
+  EXPECT_NEAR(ValueOf(linear, "p.x"), 1.0 + 1.0 / 1.01, 1e-9);
+  EXPECT_NEAR(ValueOf(linear, "q.c"), 1.0 + 0.9 / 1.01, 1e-9);
+  EXPECT_NEAR(CovarianceOf(linear, "p.x", "p.x"), 0.01 / 1.01, 1e-9);
+  EXPECT_NEAR(CovarianceOf(linear, "q.c", "q.c"), 1.0 - 0.81 / 1.01, 1e-9);
+  const State cubic = AfterAHeldRole(3);
+  const auto cost = [](double x) {
+    return std::pow(x - 1.0, 2) + std::pow((2.0 - x * x * x) / 0.1, 2);
+  };
+  const double x = Least(cost, 1.0, 1.5);
+  EXPECT_NEAR(ValueOf(cubic, "p.x"), x, 1e-7);  // of golden sections: the root of rounding
+  EXPECT_NEAR(ValueOf(cubic, "q.c"), 1.0 + 0.9 * (x - 1.0), 1e-7);
+}
+
+TEST(Iekf, RefusesWhatItCannotDo) {
+  System considered = DepthFilter();
+  considered.sensors[1].roles[1].mode = RoleMode::kConsider;
+  EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), ContractViolation);
+  System measured = DepthFilter();
+  measured.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), ContractViolation);
+  IekfOptions first;
+  first.jacobian = JacobianPolicy::kFirstEstimate;
+  EXPECT_THROW(Iekf(DepthFilter(), first, {}), ContractViolation);
+}
+
+}  // namespace
+}  // namespace alidade

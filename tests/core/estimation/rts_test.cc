@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/rts.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "alidade/base/random.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// Least squares over the first state and all noise inputs, which no singular Q troubles:
+/// x_k = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
+struct DenseBatch {
+  std::vector<Eigen::MatrixXd> map;  ///< x_k as a function of the unknowns
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
+  DenseBatch(int frames, int n) {
+    const int size = n + frames - 1;
+    normal = Eigen::MatrixXd::Zero(size, size);
+    right = Eigen::VectorXd::Zero(size);
+    normal.bottomRightCorner(frames - 1, frames - 1).setIdentity();  // w ~ N(0, 1)
+    map.push_back(Eigen::MatrixXd::Identity(n, size));
+  }
+  void Step(const Eigen::MatrixXd& f, const Eigen::VectorXd& g) {
+    Eigen::MatrixXd next = f * map.back();
+    next.col(f.rows() + static_cast<Eigen::Index>(map.size()) - 1) += g;
+    map.push_back(next);
+  }
+  void Measure(const Eigen::RowVectorXd& h, double z, double sigma) {
+    const Eigen::RowVectorXd row = h * map.back() / sigma;
+    normal += row.transpose() * row;
+    right += row.transpose() * z / sigma;
+  }
+};
+
+TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
+  constexpr int kFrames = 80;
+  System system = MovingPoint(0.7);
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  EkfOptions per_sensor;
+  per_sensor.fuse = Fuse::kPerSensor;
+  RtsSmoother joint(system, {}, StreamsOf(system)), apart(system, per_sensor, StreamsOf(system));
+  DenseBatch batch(kFrames, 2);
+  batch.normal.topLeftCorner<2, 2>() = Eigen::Vector2d(1.0 / 4.0, 1.0 / 9.0).asDiagonal();
+  batch.right.head<2>() = Eigen::Vector2d(1.0 / 4.0, -0.5 / 9.0);
+  Random random(5);
+  for (int k = 0; k < kFrames; ++k) {
+    const double dt = 0.04;
+    Frame frame = FrameAt(dt * k, {});
+    if (k > 0) {
+      batch.Step((Eigen::Matrix2d() << 1.0, dt, 0.0, 1.0).finished(),
+                 0.7 * Eigen::Vector2d(0.5 * dt * dt, dt));
+    }
+    const double z0 = random.Normal(), z1 = random.Normal();
+    if (k % 3 != 2) batch.Measure(Eigen::RowVector2d(1.0, 0.0), z0, 0.3);
+    if (k % 5 == 0) batch.Measure(Eigen::RowVector2d(2.0, 0.0), z1, 0.7);
+    if (k % 3 != 2) frame.measurements.push_back({frame.timestamp, 0, -1, {z0}, {}});
+    if (k % 5 == 0) frame.measurements.push_back({frame.timestamp, 1, -1, {z1}, {}});
+    joint.Process(frame);
+    apart.Process(frame);
+  }
+  const Eigen::MatrixXd covariance = batch.normal.inverse();
+  const Eigen::VectorXd solution = batch.normal.fullPivLu().solve(batch.right);
+  for (RtsSmoother* rts : {&joint, &apart}) {
+    std::size_t count = 0;
+    rts->Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+      ASSERT_EQ(k, count++);
+      const Eigen::Vector2d x = batch.map[k] * solution;
+      const Eigen::Matrix2d p = batch.map[k] * covariance * batch.map[k].transpose();
+      EXPECT_NEAR(ValueOf(state, "p.x"), x[0], 1e-9) << k;
+      EXPECT_NEAR(ValueOf(state, "p.v"), x[1], 1e-9) << k;
+      EXPECT_LT((state.covariance().Dense() - p).norm(), 1e-9) << k;
+      EXPECT_EQ(report.measurements().size(), (k % 3 != 2 ? 1u : 0u) + (k % 5 == 0 ? 1u : 0u));
+    });
+    EXPECT_EQ(count, static_cast<std::size_t>(kFrames));
+  }
+}
+
+TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
+  System system = MovingPoint();
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  EkfOptions options;
+  options.gate = 0.999;
+  options.max_dt_s = 0.1;
+  RtsSmoother rts(system, options, StreamsOf(system));
+  Ekf ekf(system, options, StreamsOf(system));
+  const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.0}}), FrameAt(0.35, {{0, 0.8}}),
+                                     FrameAt(0.4, {{0, 1e6}}), FrameAt(1.0, {{0, 0.5}})};
+  for (const Frame& frame : frames) {
+    rts.Process(frame);
+    ekf.Process(frame);
+  }
+  std::vector<double> sigma;
+  rts.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+    sigma.push_back(CovarianceOf(state, "p.x", "p.x"));
+    EXPECT_EQ(report.measurements()[0].outcome, k == 2 ? Outcome::kGated : Outcome::kAccepted);
+    if (k + 1 < frames.size()) return;
+    EXPECT_EQ(state.values(), ekf.state().values());  // nothing comes after the last frame
+    EXPECT_EQ(state.covariance().Dense(), ekf.state().covariance().Dense());
+  });
+  ASSERT_EQ(sigma.size(), frames.size());
+  EXPECT_LT(sigma[0], 0.09);  // better than the measurement alone
+  // The same parts as frames without a measurement: 0.35 s in 4 of them, 0.6 s in 6.
+  options.max_dt_s = std::numeric_limits<double>::infinity();
+  RtsSmoother in_frames(system, options, StreamsOf(system));
+  std::vector<double> of_frames;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Timestamp last = i == 0 ? 0 : frames[i - 1].timestamp, gap = frames[i].timestamp - last;
+    const int parts = std::array{1, 4, 1, 6}[i];
+    for (int k = 1; k < parts; ++k) in_frames.Process(FrameAt(Seconds(last + gap * k / parts), {}));
+    in_frames.Process(frames[i]);
+  }
+  in_frames.Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+    if (!report.measurements().empty()) of_frames.push_back(CovarianceOf(state, "p.x", "p.x"));
+  });
+  ASSERT_EQ(of_frames.size(), sigma.size());
+  for (std::size_t i = 0; i < sigma.size(); ++i) EXPECT_NEAR(sigma[i], of_frames[i], 1e-9) << i;
+}
+
+// The depth filter is not linear. The smoother's own recursion, with the inverse that the adjoint
+// form does without: x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-) C', C = P F' P-^-1.
+TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
+  const System system = DepthFilter();
+  EkfOptions options;
+  options.gate = 0.999;
+  options.rejection_recovery = RejectionRecovery::kNone;
+  RtsSmoother rts(system, options, StreamsOf(system));
+  Ekf ekf(system, options, StreamsOf(system));
+  struct Pass {
+    Eigen::Vector3d predicted, x;
+    Eigen::Matrix3d p_predicted, p;
+  };
+  const auto values = [&] { return Eigen::Vector3d(ekf.state().values().data()); };
+  std::vector<Pass> passes;
+  Random random(6);
+  constexpr int kFrames = 60;
+  for (int k = 0; k < kFrames; ++k) {
+    const double depth = 0.3 + 0.1 * std::sin(2.5 * 0.033 * k);
+    const double d = k == 20 ? 500.0 : 26.0 / depth + random.Normal();
+    const Frame frame = FrameAt(0.033 * k, {{0, d}, {1, depth / 0.3 + 0.01 * random.Normal()}});
+    rts.Process(frame);
+    ekf.Process(FrameAt(0.033 * k, {}));
+    const Eigen::Vector3d predicted = values();
+    const Eigen::Matrix3d p_predicted = ekf.state().covariance().Dense();
+    ekf.Process(frame);
+    passes.push_back({predicted, values(), p_predicted, ekf.state().covariance().Dense()});
+  }
+  for (int k = kFrames - 2; k >= 0; --k) {
+    Pass& pass = passes[static_cast<std::size_t>(k)];
+    const Pass& next = passes[static_cast<std::size_t>(k) + 1];
+    Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
+    f(0, 1) = 0.033;
+    const Eigen::Matrix3d c = pass.p * f.transpose() * next.p_predicted.inverse();
+    pass.x += c * (next.x - next.predicted);
+    pass.p += c * (next.p - next.p_predicted) * c.transpose();
+  }
+  rts.Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
+    EXPECT_LT((Eigen::Vector3d(state.values().data()) - passes[k].x).norm(), 1e-9) << k;
+    EXPECT_LT((state.covariance().Dense() - passes[k].p).norm(), 1e-9) << k;
+  });
+}
+
+TEST(RtsSmoother, HasNothingToGoBackTo) {
+  const System system = DepthFilter();
+  EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Clone(), nullptr);
+}
+
+TEST(RtsSmoother, AllBlocksMayBeConstant) {
+  const System system = WithStatus(DepthFilter(), "", BlockStatus::kConstant);
+  RtsSmoother smoother(system, {}, StreamsOf(system));
+  for (int k = 0; k < 3; ++k) smoother.Process(FrameAt(0.1 * k, {{0, 80.0}}));
+  int frames = 0;
+  smoother.Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+    EXPECT_NEAR(ValueOf(state, "target.depth"), system.priors[0].mean[0], 0.2);
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
+    ++frames;
+  });
+  EXPECT_EQ(frames, 3);
+}
+
+TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
+  System considered = DepthFilter();
+  const BlockId id = considered.layout.Find("template.inverse_distance");
+  StateLayout layout;
+  for (const Block& b : considered.layout.blocks()) {
+    layout.Declare(b.name, b.owner, b.space,
+                   b.name == considered.layout[id].name ? BlockStatus::kConsider : b.status);
+  }
+  considered.layout = layout;
+  EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), ContractViolation);
+  System waiting = DepthFilter();
+  waiting.priors[0].from = "disparity";
+  EXPECT_THROW(RtsSmoother(waiting, {}, StreamsOf(waiting)), ContractViolation);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+
+#include "alidade/estimation/square_root_ekf.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// Measures a direction.
+struct MeasuredDirection : Sensor<UnitVector, UnitVector> {
+  static constexpr std::array kRoles{Quantity{"n", "", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* n, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = n[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.05);
+    l[3] = T(0.2);
+  }
+};
+
+/// A direction that stays.
+struct Fixture : Motion<0, UnitVector> {
+  static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
+  template <class T>
+  void Step(const T* n, const T*, double, T* next) const {
+    for (int i = 0; i < 3; ++i) next[i] = n[i];
+  }
+  void SqrtQ(double, MatrixRef) const {}
+};
+
+/// A direction at z = 0.05 that the measurement takes across z = 0, where the basis of
+/// its tangent plane turns over.
+System DirectionNearTheSeam() {
+  System system;
+  MotionBinding binding{"d", InProcessMotion(Fixture(), "still"), {}};
+  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model.blocks()[0]));
+  Prior prior;
+  prior.block = 0;
+  prior.mean = {std::sqrt(0.5 - 0.00125), std::sqrt(0.5 - 0.00125), 0.05};
+  prior.covariance = (Eigen::Matrix2d() << 0.04, 0.01, 0.01, 0.01).finished();
+  system.priors.push_back(prior);
+  system.motions.push_back(binding);
+  AddSensor(system, "seen", InProcessSensor(MeasuredDirection{}, "direction"), {"d.n"});
+  return system;
+}
+
+/// P of a direction as a covariance of the vector: B P B'.
+Eigen::Matrix3d InSpace(const State& state) {
+  double basis[6];
+  UnitVector::Basis(state.value(0), basis);
+  const Eigen::Matrix<double, 3, 2> b =
+      Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(basis);
+  return b * state.covariance().Dense() * b.transpose();
+}
+
+// In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with
+// the direction, by the smallest rotation.
+TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  // FAULTS 84
+  const System system = DirectionNearTheSeam();
+  SquareRootEkf filter(system, {}, StreamsOf(system));
+  const Eigen::Vector3d before(system.priors[0].mean.data());
+  double basis[6];
+  UnitVector::Basis(before.data(), basis);
+  const Eigen::Matrix<double, 3, 2> b =
+      Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(basis);
+  Frame frame = FrameAt(0.0, {});
+  const double side = std::sqrt(0.5 - 0.045);
+  frame.measurements.push_back({0, 0, -1, {side, side, -0.3}, {}});
+  filter.Process(frame);
+  const Eigen::Vector3d after(filter.state().value(0));
+  ASSERT_LT(after[2], 0.0);
+  const Eigen::Matrix2d r = Eigen::Vector2d(0.0025, 0.04).asDiagonal();
+  const Eigen::Matrix2d p = (system.priors[0].covariance.inverse() + r.inverse().eval()).inverse();
+  const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(before, after).matrix();
+  const Eigen::Matrix3d expected = turn * b * p * b.transpose() * turn.transpose();
+  EXPECT_LT((InSpace(filter.state()) - expected).norm(), 1e-12);
+  const Eigen::MatrixXd root = filter.root() * filter.root().transpose();
+  EXPECT_LT((root - filter.state().covariance().Dense()).norm(), 1e-15);
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Process(frame);
+  EXPECT_LT((InSpace(ekf.state()) - expected).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace alidade

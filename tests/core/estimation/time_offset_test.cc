@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A sensor whose clock is off: worked numbers, its Jacobians against differences, and data that are
+// late in truth.
+#include "alidade/estimation/time_offset.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "motion_models/quaternion_pose.h"
+#include "sensors/inverse_depth_feature.h"
+#include "support/model_checks.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using testing::AddMotion;
+using testing::AddSensor;
+using testing::Blocks;
+using testing::ExpectSame;
+using testing::kPoison;
+using testing::Linearised;
+using testing::LinearSensor;
+using testing::NumericallyLinearised;
+using testing::Pointers;
+
+BlockId AddOffset(System& system, double mean, double sigma) {
+  AddMotion(system, "clock", testing::ConstantMotion(1), {{"offset", mean, sigma}});
+  return system.layout.Find("clock.offset");
+}
+
+std::vector<std::string> NamesOf(const SensorModel& sensor) {
+  std::vector<std::string> names;
+  for (const Space& role : sensor.roles()) names.push_back(role.name);
+  return names;
+}
+
+// z = 2 (x + v delta)
+TEST(TimeOffset, SeesAPointWhereItIsThen) {
+  System system = testing::MovingPoint();
+  AddSensor(system, "z", LinearSensor(2.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(system, 0.0, 0.1);
+  SensorBinding& sensor = system.sensors[0];
+  ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+  EXPECT_EQ(NamesOf(sensor.model), (std::vector<std::string>{"x", "p.v", "time_offset"}));
+  EXPECT_EQ(sensor.roles[1].block, system.layout.Find("p.v"));
+  EXPECT_EQ(sensor.roles[2].block, offset);
+  EXPECT_EQ(sensor.model.inverse().role, -1) << "x is no longer where z says";
+  for (const double delta : {0.0, 0.25, -0.5}) {
+    const Blocks roles{{3.0}, {-4.0}, {delta}};
+    double z = kPoison, l = kPoison;
+    ASSERT_EQ(sensor.model.Predict(Pointers(roles).data(), &z), Status::kOk);
+    EXPECT_DOUBLE_EQ(z, 2.0 * (3.0 - 4.0 * delta));
+    ExpectSame(Linearised(sensor.model, roles), {2.0, 2.0 * delta, -8.0}, 1e-12);
+    ASSERT_EQ(sensor.model.SqrtNoise(Pointers(roles).data(), &z, &l), Status::kOk);
+    EXPECT_EQ(l, 0.1);
+  }
+}
+
+// A camera that turns and moves sees a landmark: rotations, a landmark's roles, an inverse.
+TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
+  const Camera camera(640, 480, 400, 400, 320, 240);
+  for (const bool anchored : {false, true}) {
+    System system;
+    const MotionModel pose =
+        InProcessMotion(QuaternionPose({0.3, 0.3, 0.3}, {0.2, 0.2, 0.2}), "quaternion_pose");
+    MotionBinding motion{"cam", pose, {}};
+    for (const Space& block : pose.blocks()) {
+      motion.blocks.push_back(system.layout.Declare("cam." + block.name, "cam", block));
+    }
+    system.motions.push_back(motion);
+    const BlockId offset = AddOffset(system, 0.0, 0.1);
+    SensorBinding sensor{
+        "pixels",
+        "pixels",
+        anchored ? InProcessSensor(InverseDepthFeature<Anchored>(camera, 1.0), "feature")
+                 : InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature"),
+        {{system.layout.Find("cam.position")}, {system.layout.Find("cam.orientation")}}};
+    sensor.roles.resize(sensor.model.roles().size());
+    const int inverse = sensor.model.inverse().role;
+    if (anchored) sensor.xyz = InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature");
+    ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+    const std::vector<std::string> names = NamesOf(sensor.model);
+    EXPECT_EQ(names[4], "time_offset");
+    EXPECT_EQ(names.size(), anchored ? 8u : 6u);
+    EXPECT_EQ(sensor.model.inverse().role, inverse + 3) << "of the landmark";
+    EXPECT_EQ(sensor.xyz.has_value(), anchored);
+    if (anchored) {
+      EXPECT_EQ(sensor.xyz->roles().size(), 6u);
+    }
+    Blocks roles;
+    for (const Space& role : sensor.model.roles()) {
+      std::vector<double> value(static_cast<std::size_t>(role.geometry.ambient));
+      role.geometry.Identity(value.data());
+      roles.push_back(value);
+    }
+    const auto set = [&](const std::string& name, std::vector<double> value) {
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        if (names[i] != name) continue;
+        sensor.model.roles()[i].geometry.Normalise(value.data());
+        roles[i] = value;
+      }
+    };
+    set("position", {0.1, -0.2, 0.3});
+    set("orientation", {0.98, 0.1, -0.15, 0.05});
+    set("cam.velocity", {0.5, 1.0, -0.4});
+    set("cam.angular_velocity", {0.3, -0.6, 0.9});
+    set("time_offset", {0.08});
+    if (anchored) {
+      roles[5] = {0.0, 0.0, 0.0};
+      roles[6] = {0.28, 0.0, 0.96};
+      roles[7] = {0.4};
+    } else {
+      roles[5] = {0.4, 0.3, 3.0};
+    }
+    // df/ddelta is by differences itself: 1e-12 of the values over 1 ms.
+    ExpectSame(Linearised(sensor.model, roles), NumericallyLinearised(sensor.model, roles), 1e-7);
+  }
+}
+
+/// A point that moves as long as its speed is not that of light.
+struct Refusing : ConstantVelocity<1, false> {
+  using ConstantVelocity<1, false>::ConstantVelocity;
+  template <class T>
+  void Step(const T* x, const T* v, const T* w, double dt_s, T* next_x, T* next_v) const {
+    if (v[0] > 3e8) throw std::runtime_error("faster than light");
+    ConstantVelocity<1, false>::Step(x, v, w, dt_s, next_x, next_v);
+  }
+};
+
+// What fails is the motion model, and its words are those that are heard.
+TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Refusing(1.0), "refusing"),
+            {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
+  AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(system, 0.0, 0.1);
+  SensorBinding& sensor = system.sensors[0];
+  ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+  double z = 0.0;
+  const Blocks fast{{0.0}, {4e8}, {0.1}};
+  EXPECT_EQ(sensor.model.Predict(Pointers(fast).data(), &z), Status::kError);
+  EXPECT_EQ(sensor.model.error_text(), "motion model 'refusing' of its roles: faster than light");
+}
+
+TEST(TimeOffset, RefusesWhatItCannotDo) {
+  System still;
+  AddMotion(still, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(still, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(still, 0.0, 0.1);
+  EXPECT_NE(internal::OffsetInTime(still, offset, still.sensors[0]).find("sees the same"),
+            std::string::npos);
+  System moving = testing::MovingPoint();
+  AddSensor(moving, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  moving.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  EXPECT_NE(internal::OffsetInTime(moving, AddOffset(moving, 0.0, 0.1), moving.sensors[0])
+                .find("jacobian_at"),
+            std::string::npos);
+}
+
+// A point swings; one sensor is on time, the other one stamps 20 ms late what it saw: it saw at
+// t - 0.02. The truth is a sine, no motion model.
+TEST(TimeOffset, IsFoundInDataThatAreLate) {
+  System system = testing::MovingPoint(2.0);
+  AddSensor(system, "good", LinearSensor(1.0, 0.01), {"p.x"});
+  AddSensor(system, "late", LinearSensor(1.0, 0.01), {"p.x"});
+  const BlockId offset = AddOffset(system, 0.0, 0.05);
+  ASSERT_EQ(internal::OffsetInTime(system, offset, system.sensors[1]), "");
+  Ekf filter(system, {}, testing::StreamsOf(system));
+  std::mt19937_64 engine(5);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  const auto truth = [](double t_s) { return std::sin(1.5 * t_s) + 1.0; };
+  for (int k = 0; k < 1000; ++k) {
+    const double t_s = 0.02 * k;
+    filter.Process(testing::FrameAt(
+        t_s, {{0, truth(t_s) + noise(engine)}, {1, truth(t_s - 0.02) + noise(engine)}}));
+  }
+  const double sigma = filter.state().sigma(offset);
+  EXPECT_LT(sigma, 0.002);
+  EXPECT_NEAR(*filter.state().value(offset), -0.02, 3.0 * sigma);
+}
+
+}  // namespace
+}  // namespace alidade

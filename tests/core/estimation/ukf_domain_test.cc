@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Points of the unscented filter where a model is not defined.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "alidade/estimation/built_in.h"
+#include "alidade/estimation/ukf.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
+  System system = DepthFilter();
+  system.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m: points at 0.35 - 1.7 m
+  UkfOptions options;
+  options.alpha = 1.0;
+  Ukf ukf(system, options, StreamsOf(system));
+  const UpdateReport& first = ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
+  for (const MeasurementReport& entry : first.measurements()) {
+    EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+    EXPECT_TRUE(std::isfinite(entry.nis));
+  }
+  EXPECT_TRUE(HasEvent(first, "guarded"));
+  EXPECT_FALSE(ukf.diverged());
+  EXPECT_GT(ValueOf(ukf.state(), "target.depth"), 0.0);
+  // Narrow enough now: nothing to say.
+  for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
+  EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), "guarded"));
+  EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
+  // Three seconds later it may be metres away: said anew.
+  EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), "guarded"));
+}
+
+/// Stays at 1, and throws elsewhere.
+struct Stubborn : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T*, double, T* next) const {
+    if (!(x[0] == T(1.0))) throw std::runtime_error("only from 1");
+    next[0] = x[0];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 0.1; }
+};
+
+TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
+  Ukf ukf(system, {}, {});
+  ukf.Start(0);
+  const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
+  EXPECT_TRUE(ukf.failed());
+  ASSERT_TRUE(HasEvent(report, "plugin_failed"));
+  EXPECT_NE(report.events.back().text.find("only from 1"), std::string::npos)
+      << report.events.back().text;
+}
+
+/// z = x + 5 + n, linear, but defined for x > 0 alone.
+struct Near : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    if (!(x[0] > T(0.0))) return false;
+    z[0] = x[0] + 5.0;
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+System NearZero(double x) {
+  System system;
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
+  AddSensor(system, "near", InProcessSensor(Near{}, "near"), {"p.x"});
+  return system;
+}
+
+// Points 1e-3 sigma from an estimate 1e-3 sigma from the end of the domain. The moments of a linear
+// h are those of the EKF at any spread, but for eps 5 / (2 c^2) = 6e-10 at the narrowest.
+TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
+  for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
+    const System system = NearZero(x);
+    Ekf ekf(system, {}, StreamsOf(system));
+    Ukf ukf(system, {}, StreamsOf(system));
+    const Frame frame = FrameAt(0.0, {{0, 5.02}});
+    const UpdateReport &expected = ekf.Process(frame), &found = ukf.Process(frame);
+    EXPECT_EQ(HasEvent(found, "guarded"), x < 1e-3) << x;
+    ASSERT_EQ(found.measurements()[0].outcome, Outcome::kAccepted) << x;
+    EXPECT_NEAR(found.measurements()[0].h[0], expected.measurements()[0].h[0], 1e-7) << x;
+    EXPECT_NEAR(found.measurements()[0].s[0], expected.measurements()[0].s[0], 1e-7) << x;
+    EXPECT_NEAR(ValueOf(ukf.state(), "p.x"), ValueOf(ekf.state(), "p.x"), 1e-7) << x;
+    EXPECT_NEAR(CovarianceOf(ukf.state(), "p.x", "p.x"), CovarianceOf(ekf.state(), "p.x", "p.x"),
+                1e-7)
+        << x;
+  }
+}
+
+// Points that near would tell nothing but rounding.
+TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
+  for (const double x : {1e-7, 3e-10}) {
+    const System system = NearZero(x);
+    Ukf ukf(system, {}, StreamsOf(system));
+    const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 5.02}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
+    EXPECT_TRUE(report.measurements()[0].h.empty());
+    ASSERT_EQ(report.events.size(), 1u);
+    EXPECT_EQ(report.events[0].kind, "guarded");
+    EXPECT_EQ(report.events[0].text,
+              "sensor 'near': sigma points leave its domain or have no mean, and their spread can "
+              "be narrowed no further; their spread is divided by 64");
+    EXPECT_FALSE(ukf.diverged());
+    EXPECT_EQ(ValueOf(ukf.state(), "p.x"), x);
+    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());  // once
+  }
+}
+
+TEST(Ukf, ASpreadThatLosesAllDigitsIsRefused) {
+  const System system = NearZero(1.0);
+  UkfOptions options;
+  options.alpha = 1e-5;
+  EXPECT_THROW(Ukf(system, options, StreamsOf(system)), ContractViolation);
+  const Config config = Config::FromText("alpha: 1e-9", "ukf.yaml");
+  try {
+    internal::FindEstimatorType("ukf")->read(config.root());
+    FAIL() << "alpha 1e-9 is read";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "ukf.yaml:1:8 alpha: '1e-9' is out of range; expected a number in [1e-04, 1]");
+  }
+}
+
+TEST(Ukf, ASensorNotDefinedAtTheEstimateIsOutOfDomain) {
+  System system = DepthFilter();
+  system.priors[0].mean = {-0.2};
+  Ukf ukf(system, {}, StreamsOf(system));
+  const std::vector<double> before = ukf.state().values();
+  const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 80.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
+  EXPECT_TRUE(report.measurements()[0].h.empty());
+  EXPECT_TRUE(HasEvent(report, "diverged"));
+  EXPECT_TRUE(ukf.diverged());
+  EXPECT_EQ(ukf.state().values(), before);
+}
+
+}  // namespace
+}  // namespace alidade

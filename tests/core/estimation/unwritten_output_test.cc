@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A plugin writes every element of its outputs. What it leaves out is not finite, in the fast path
+// of a small filter as in the general one, at the first measurement as at any other.
+#include <gtest/gtest.h>
+
+#include "alidade/estimation/time_offset.h"
+#include "alidade/estimation/ukf.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// The output of which the elements off the diagonal (of L: above it; of h: the last) are left out.
+enum class Left { kNothing, kPrediction, kSensorL, kSensorH, kMotionL, kF, kG };
+
+void WriteDiagonal(double value, bool zeros_too, double* j, int stride) {
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 2; ++column) {
+      if (row == column) j[row * stride + column] = value;
+      if (row != column && zeros_too) j[row * stride + column] = 0.0;
+    }
+  }
+}
+void WriteLower(double value, bool zeros_too, double* l, int stride) {
+  l[0] = l[stride + 1] = value;
+  l[stride] = 0.0;
+  if (zeros_too) l[1] = 0.0;
+}
+bool Leaves(const void* self, Left what) { return *static_cast<const Left*>(self) == what; }
+
+/// Models of two numbers, z = x + n and x' = x + w, written by hand against the C header.
+struct HandWritten {
+  explicit HandWritten(Left left_out) : left(left_out) {
+    space.struct_size = sizeof(space);
+    space.geometry = ALIDADE_VECTOR;
+    space.ambient = space.tangent = 2;
+    space.name = "x";
+    space.elements = "a,b";
+    seen.struct_size = moves.struct_size = sizeof(AlidadeDescription);
+    seen.role_count = moves.role_count = 1;
+    seen.role_stride = moves.role_stride = sizeof(AlidadeSpace);
+    seen.roles = moves.roles = seen.output = &space;
+    moves.noise_count = 2;
+    sensor.struct_size = sizeof(sensor);
+    sensor.eval = [](const void* self, const AlidadeObservation*, const double* const* roles,
+                     double* z, double* const* jacobians, const std::int32_t* strides) {
+      for (int i = 0; i < (Leaves(self, Left::kPrediction) ? 1 : 2); ++i) z[i] = roles[0][i];
+      if (jacobians != nullptr && jacobians[0] != nullptr) {
+        WriteDiagonal(1.0, !Leaves(self, Left::kSensorH), jacobians[0], strides[0]);
+      }
+      return std::int32_t{ALIDADE_OK};
+    };
+    sensor.sqrt_noise = [](const void* self, const AlidadeObservation*, const double* const*,
+                           double* l, std::int32_t stride) {
+      WriteLower(0.5, !Leaves(self, Left::kSensorL), l, stride);
+      return std::int32_t{ALIDADE_OK};
+    };
+    motion.struct_size = sizeof(motion);
+    motion.step = [](const void* self, const double* const* blocks, const double* const*,
+                     const double* w, double, double* const* next, double* f, std::int32_t f_stride,
+                     double* g, std::int32_t g_stride, double*, std::int32_t) {
+      for (int i = 0; i < 2; ++i) next[0][i] = blocks[0][i] + (w == nullptr ? 0.0 : w[i]);
+      if (f != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kF), f, f_stride);
+      if (g != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kG), g, g_stride);
+      return std::int32_t{ALIDADE_OK};
+    };
+    motion.sqrt_q = [](const void* self, const double* const*, const double* const*, double,
+                       double* l, std::int32_t stride) {
+      WriteLower(0.1, !Leaves(self, Left::kMotionL), l, stride);
+      return std::int32_t{ALIDADE_OK};
+    };
+  }
+  HandWritten(const HandWritten&) = delete;
+
+  std::shared_ptr<const ModelInstance> Make(std::uint32_t kind) {
+    AlidadeInstance instance{};
+    instance.struct_size = sizeof(instance);
+    instance.kind = kind;
+    instance.self = &left;
+    instance.destroy = [](void*) {};
+    instance.description = kind == ALIDADE_KIND_SENSOR ? &seen : &moves;
+    if (kind == ALIDADE_KIND_SENSOR) instance.sensor = &sensor;
+    if (kind == ALIDADE_KIND_MOTION) instance.motion = &motion;
+    return std::make_shared<const ModelInstance>(instance, "hand", "by hand");
+  }
+
+  Left left;
+  AlidadeSpace space{};
+  AlidadeDescription seen{}, moves{};
+  AlidadeSensor sensor{};
+  AlidadeMotion motion{};
+};
+
+/// `a.x`, measured by `direct`; `aside`: with a fixed block, which keeps it from the fast path.
+System Direct(HandWritten& hand, bool aside) {
+  System system;
+  const MotionModel model(hand.Make(ALIDADE_KIND_MOTION));
+  const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
+  system.motions.push_back({"a", model, {x}});
+  system.priors.push_back({x, {1.0, 2.0}, Eigen::Matrix2d::Identity(), ""});
+  if (aside) {
+    const BlockId id =
+        system.layout.Declare("aside.x", "aside", model.blocks()[0], BlockStatus::kConstant);
+    system.priors.push_back({id, {0.0, 0.0}, Eigen::Matrix2d::Zero(), ""});
+  }
+  AddSensor(system, "direct", SensorModel(hand.Make(ALIDADE_KIND_SENSOR)), {"a.x"});
+  return system;
+}
+
+class Unwritten : public ::testing::TestWithParam<bool> {};
+
+TEST_P(Unwritten, OutputOfASensorIsNotFiniteAtEveryMeasurement) {
+  for (const Left left : {Left::kNothing, Left::kPrediction, Left::kSensorL, Left::kSensorH}) {
+    HandWritten hand(left);
+    const System system = Direct(hand, GetParam());
+    Ekf ekf(system, {}, StreamsOf(system));
+    ekf.Start(0);
+    for (int k = 0; k < 4; ++k) {
+      Frame frame = FrameAt(0.1 * k, {});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
+      const UpdateReport& report = ekf.Process(frame);
+      EXPECT_EQ(report.measurements()[0].outcome,
+                left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
+          << static_cast<int>(left) << ' ' << k;
+    }
+  }
+}
+
+TEST_P(Unwritten, OutputOfAMotionModelEndsTheFilterAtItsFirstStep) {
+  for (const Left left : {Left::kNothing, Left::kMotionL, Left::kF, Left::kG}) {
+    HandWritten hand(left);
+    const System system = Direct(hand, GetParam());
+    Ekf ekf(system, {}, StreamsOf(system));
+    ekf.Start(0);
+    const UpdateReport& report = ekf.Process(FrameAt(0.1, {}));
+    EXPECT_EQ(HasEvent(report, "not_finite"), left != Left::kNothing) << static_cast<int>(left);
+    EXPECT_EQ(ekf.failed(), left != Left::kNothing) << static_cast<int>(left);
+  }
+}
+
+// The memory that h comes into was that of the measurement before.
+TEST(UnwrittenAtPoints, IsNotFiniteAtEveryMeasurement) {
+  for (const Left left : {Left::kNothing, Left::kPrediction}) {
+    HandWritten hand(left);
+    const System system = Direct(hand, false);
+    Ukf ukf(system, {}, StreamsOf(system));
+    ukf.Start(0);
+    for (int k = 0; k < 4; ++k) {
+      Frame frame = FrameAt(0.1 * k, {});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
+      EXPECT_EQ(ukf.Process(frame).measurements()[0].outcome,
+                left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
+          << k;
+    }
+  }
+}
+
+TEST(UnwrittenUnderATimeOffset, IsNotFiniteAtEveryMeasurement) {
+  for (const Left left : {Left::kNothing, Left::kPrediction, Left::kSensorH, Left::kF}) {
+    HandWritten hand(left);
+    System system = Direct(hand, false);
+    AddMotion(system, "clock", ConstantMotion(1), {{"offset", 0.0, 0.1}});
+    const BlockId offset = system.layout.Find("clock.offset");
+    ASSERT_EQ(internal::OffsetInTime(system, offset, system.sensors[0]), "");
+    Ekf ekf(system, {}, StreamsOf(system));
+    ekf.Start(0);
+    for (int k = 0; k < 3; ++k) {
+      Frame frame = FrameAt(0.0, {});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
+      EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+                left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
+          << static_cast<int>(left) << ' ' << k;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Paths, Unwritten, ::testing::Bool(),
+                         [](const auto& one) { return one.param ? "general" : "fast"; });
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/implied_state.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/recording.h"
+#include "support/systems.h"
+
+namespace alidade::internal {
+namespace {
+
+const SensorBinding& SensorOf(const System& system, const std::string& name) {
+  for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.name == name) return sensor;
+  }
+  throw std::out_of_range(name);
+}
+
+TEST(ImpliedState, OfASensorThatInitialisesAlone) {
+  const System system = testing::DepthFilter();
+  const auto depth = ImpliedState::Of(system, SensorOf(system, "disparity"), {});
+  ASSERT_TRUE(depth);
+  EXPECT_FALSE(depth->rest_at_truth());
+  EXPECT_EQ(system.layout[depth->block()].name, "target.depth");
+  const double d = 65.0, none = -1.0;  // px; f B = 26 px m
+  EXPECT_DOUBLE_EQ(depth->From({}, &d).value(), 0.4);
+  EXPECT_FALSE(depth->From({}, &none));
+}
+
+TEST(ImpliedState, OfAnotherWithItsRestAtTruth) {
+  const System system = testing::DepthFilter();
+  const SensorBinding& scale = SensorOf(system, "inverse_scale");
+  const auto depth = ImpliedState::Of(system, scale, {{"depth", 1}, {"inverse_distance", 1}});
+  ASSERT_TRUE(depth);
+  EXPECT_TRUE(depth->rest_at_truth());
+  const double z = 1.25;  // lambda Z
+  EXPECT_NEAR(depth->From({{0.3}, {2.5}}, &z).value(), 0.5, 1e-12);
+  EXPECT_FALSE(depth->From({{0.3}, {}}, &z)) << "lambda is not known at this time";
+  EXPECT_FALSE(ImpliedState::Of(system, scale, {{"depth", 1}})) << "nor at any";
+}
+
+TEST(ImpliedStateMetrics, AreTheErrorOfSingleMeasurements) {
+  Experiment experiment = testing::MakeExperiment(), again = testing::MakeExperiment();
+  const RunResult result = alidade::Run(experiment, {});
+  double sum = 0.0;
+  int count = 0;
+  for (SourceFrame frame; again.source->Next(frame);) {
+    for (const Measurement& m : frame.measurements) {
+      if (m.stream != 0 || frame.truth[0].empty()) continue;
+      sum += std::pow(26.0 / m.values[0] - frame.truth[0][0], 2);
+      ++count;
+    }
+  }
+  ASSERT_EQ(count, 30);
+  for (const EstimatorResult& one : result.estimators) {
+    EXPECT_NEAR(one.metrics.at("implied.rmse:disparity"), std::sqrt(sum / count), 1e-12);
+    EXPECT_EQ(one.units.at("disparity"), "m");
+    EXPECT_FALSE(one.metrics.contains("implied.rmse:inverse_scale")) << "lambda has no truth";
+  }
+}
+
+}  // namespace
+}  // namespace alidade::internal

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/metric_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <sstream>
+
+#include "alidade/experiment/run.h"
+
+namespace alidade {
+namespace {
+
+EstimatorResult Named(const std::string& name, std::map<std::string, double> metrics) {
+  EstimatorResult result;
+  result.name = name;
+  result.metrics = std::move(metrics);
+  result.units = {{"target.depth", "m"}, {"cam.heading", "rad"}, {"cam.pixel", "px"}};
+  return result;
+}
+
+TEST(ComparisonTable, OrdersScalesAndAligns) {
+  RunResult result;
+  result.estimators = {Named("fused", {{"rmse:target.depth", 0.002145},
+                                       {"rmse:target.depth@blind", 0.00121},
+                                       {"rmse:cam.pixel", 0.31},
+                                       {"lag_ms:target.depth", -1.42},
+                                       {"coverage95:target.depth", 0.9342},
+                                       {"coverage95:target.depth@blind", 0.9},
+                                       {"nees.mean:target", 0.8948},
+                                       {"nees.within95:target", 1.0},
+                                       {"nis.mean:stereo", 0.9059},
+                                       {"final_error:target.depth", 1.0}}),
+                       Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
+  result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
+  result.estimators[1].diverged = true;
+  result.estimators[0].inconsistent = true;
+  EXPECT_EQ(ComparisonTable(result),
+            "                                     fused  stereo_only\n"
+            "rmse cam.pixel [px]                 0.3100            -\n"
+            "rmse target.depth [mm]               2.145        206.5\n"
+            "rmse target.depth @blind [mm]        1.210            -\n"
+            "lag target.depth [ms]               -1.420            -\n"
+            "coverage95 target.depth [%]          93.42            -\n"
+            "coverage95 target.depth @blind [%]   90.00            -\n"
+            "nees.mean target                    0.8948            -\n"
+            "nees.within95 target [%]             100.0            -\n"
+            "nis.mean stereo                     0.9059            -\n"
+            "accepted stereo                         74            -\n"
+            "gated stereo                             1            -\n"
+            "diverged                                no          yes\n"
+            "inconsistent                           yes           no\n");
+}
+
+TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
+  RunResult result;
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, 4e-7, inf}) {
+    const std::string name = std::string(1, static_cast<char>('a' + result.estimators.size()));
+    result.estimators.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
+  }
+  const std::string table = ComparisonTable(result);
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  4.000e-07  inf\n"),
+            std::string::npos)
+      << table;
+}
+
+TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
+  RunResult result;
+  result.estimators = {Named("ekf", {{"rmse:target.depth", 0.9},
+                                     {"rmse:target.depth@blind", 1.2},
+                                     {"rmse:target.depth@seeing", 0.004}})};
+  EXPECT_EQ(ComparisonTable(result),
+            "                                    ekf\n"
+            "rmse target.depth [m]            0.9000\n"
+            "rmse target.depth @blind [m]      1.200\n"
+            "rmse target.depth @seeing [m]  0.004000\n"
+            "diverged                             no\n"
+            "inconsistent                         no\n");
+}
+
+TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
+  RunResult result;
+  result.estimators = {Named("a", {{"nees.mean:target", 3.21e-6}}),
+                       Named("b", {{"nees.mean:target", 4.5e-6}})};
+  EXPECT_NE(ComparisonTable(result).find("nees.mean target  3.210e-06  4.500e-06\n"),
+            std::string::npos)
+      << ComparisonTable(result);
+}
+
+TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
+  RunResult result;
+  result.estimators = {Named("a", {{"rmse:target.depth", 0.0},
+                                   {"coverage95:target.depth", 1.0},
+                                   {"nees.mean:target", 0.0},
+                                   {"nees.within95:target", 1.0}}),
+                       Named("b", {})};
+  EXPECT_EQ(ComparisonTable(result),
+            "               a   b\ndiverged      no  no\ninconsistent  no  no\n");
+  result.estimators[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
+  EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
+}
+
+TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
+  RunResult result;
+  for (int i = 0; i < 12; ++i) {
+    result.estimators.push_back(
+        Named("estimator_" + std::to_string(i), {{"rmse:target.depth", 1.0 + i}}));
+  }
+  std::istringstream table(ComparisonTable(result));
+  std::string line;
+  int headers = 0, widest = 0;
+  while (std::getline(table, line)) {
+    headers += line.starts_with("   ");
+    widest = std::max(widest, static_cast<int>(line.size()));
+  }
+  EXPECT_EQ(headers, 3);
+  EXPECT_LE(widest, 100);
+  EXPECT_GT(widest, 60);
+}
+
+// Two of health, five of the first turn; of the second the first three. In all 9 rows of blocks, 6
+// over segments (without lag), 4 means, 3 counts and 2 of health: 24, of which 14 are left out.
+TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
+  RunResult result;
+  std::map<std::string, double> metrics;
+  for (const char* block : {"cam.heading", "cam.position", "cam.velocity"}) {
+    for (const char* kind : {"rmse:", "coverage95:", "lag_ms:"}) {
+      metrics[kind + std::string(block)] = 0.5;
+      metrics[kind + std::string(block) + "@blind"] = 0.5;
+    }
+  }
+  for (const char* owner : {"cam", "map"}) metrics[std::string("nees.mean:") + owner] = 0.5;
+  for (const char* sensor : {"left", "right"}) metrics[std::string("nis.mean:") + sensor] = 0.5;
+  result.estimators = {Named("ekf", metrics)};
+  result.estimators[0].counts = {{"accepted:left", 3}, {"accepted:right", 4}, {"gated:left", 1}};
+  const std::vector<std::string> subjects = {"cam.position", "cam",   "cam.heading",
+                                             "cam.velocity", "right", "left"};
+  std::vector<std::string> labels;
+  for (const auto& row : internal::MainRows(result, subjects)) labels.push_back(row.label);
+  EXPECT_EQ(labels, (std::vector<std::string>{"rmse cam.heading [mrad]", "rmse cam.position",
+                                              "coverage95 cam.position [%]", "nees.mean cam",
+                                              "nees.mean map", "nis.mean left", "nis.mean right",
+                                              "accepted right", "diverged", "inconsistent"}));
+  EXPECT_NE(internal::MainTable(result, subjects).find("\n14 more rows: --all\n"),
+            std::string::npos)
+      << internal::MainTable(result, subjects);
+}
+
+// The map has no subject: it comes with the first turn, in the unit of the path.
+TEST(MainRows, HaveTheErrorOfTheMapBeforeThatAfterAlignment) {
+  std::map<std::string, double> metrics = {{"map.rmse", 0.012}, {"map.sim3.rmse", 0.007}};
+  for (const char* block : {"cam.position", "cam.velocity", "cam.heading"}) {
+    for (const char* kind : {"rmse:", "coverage95:", "nees.mean:"}) {
+      metrics[kind + std::string(block)] = 0.5;
+    }
+  }
+  RunResult result;
+  result.estimators = {Named("ekf", metrics)};
+  result.estimators[0].units = {{"cam.position", "m"}};
+  std::vector<internal::TableRow> rows = internal::MainRows(result, {"cam.position"});
+  ASSERT_EQ(rows.size(), 10u);
+  const auto map = std::ranges::find(rows, "map.rmse [mm]", &internal::TableRow::label);
+  ASSERT_NE(map, rows.end());
+  EXPECT_EQ(map->cells, std::vector<std::string>{"12.00"});
+  EXPECT_EQ(std::next(map)->label, "map.sim3.rmse [mm]");
+}
+
+TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {
+  RunResult result;
+  result.estimators = {Named("ekf", {{"rmse:target.depth", 0.5}, {"lag_ms:target.depth", 1.0}})};
+  EXPECT_EQ(internal::MainRows(result, {}).size(), 4u);
+  EXPECT_EQ(internal::MainTable(result, {}), ComparisonTable(result));
+}
+
+TEST(MarkdownTable, KeepsWhatWouldEndACell) {
+  EXPECT_EQ(internal::MarkdownTable("`ekf`", {"rmse", "|e|"}, {{"a|b", {"1", "2"}}}),
+            "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");
+}
+
+TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }
+
+}  // namespace
+}  // namespace alidade

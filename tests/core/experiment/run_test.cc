@@ -1,0 +1,628 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/run.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "alidade/base/random.h"
+#include "support/driven.h"
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+using testing::MakeExperiment;
+
+/// Steps to infinity at the first step.
+struct Exploding : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = 1e308 * 10.0 * (x[0] + w[0]);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+NamedEstimator ExplodingEstimator(const std::vector<StreamInfo>& streams) {
+  NamedEstimator named;
+  named.name = "exploding";
+  testing::AddMotion(named.system, "p", InProcessMotion(Exploding(), "exploding"),
+                     {{"x", 1.0, 1.0}});
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, streams);
+  return named;
+}
+
+TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
+  Experiment experiment = MakeExperiment();
+  experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_NE(result.reason.find("estimator 'exploding' at t = 0.033000 s"), std::string::npos)
+      << result.reason;
+  EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
+  EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
+  // The event is at the frame of the failed step too.
+  EXPECT_EQ(result.estimators[2].events.back().timestamp, TimestampFromSeconds(0.033));
+  // The others saw all frames.
+  EXPECT_EQ(result.frames, 60);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 60);
+}
+
+TEST(Run, DivergenceUnderFailEndsTheRun) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.system.priors[0].mean = {-0.2};
+  alone.on_divergence = OnDivergence::kFail;
+  alone.estimator = std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_EQ(result.frames, 1);
+  EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos);
+}
+
+TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.on_divergence = OnDivergence::kFail;
+  alone.system.priors[0].mean = {-0.2};
+  EkfOptions options;
+  options.rejection_recovery_after = 1;
+  alone.estimator = std::make_unique<Ekf>(alone.system, options, experiment.source->streams());
+  const RunResult result = alidade::Run(experiment, {});
+  ASSERT_EQ(result.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "rejection_recovery", &Event::kind), 1);
+  EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos)
+      << result.reason;
+}
+
+/// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
+struct Hindsight : Estimator {
+  explicit Hindsight(const System& system) : state_(system.InitialState()) {}
+  void Start(Timestamp) override {}
+  const UpdateReport& Process(const Frame&) override {
+    ++frames_;
+    return report_;
+  }
+  bool offline() const override { return true; }
+  void Smooth(const Emit& emit) override {
+    for (std::size_t k = 0; k < frames_; ++k) {
+      state_.values()[0] = 1.0 + 1e-3 * static_cast<double>(k);
+      if (k + 1 == frames_) report_.events.push_back({kNoTimestamp, "hindsight", "all is known"});
+      emit(k, state_, report_);
+    }
+  }
+  const State& state() const override { return state_; }
+  Timestamp timestamp() const override { return kNoTimestamp; }
+  bool diverged() const override { return false; }
+  bool failed() const override { return failed_; }
+
+ protected:
+  bool failed_ = false;
+
+ private:
+  State state_;
+  UpdateReport report_;
+  std::size_t frames_ = 0;
+};
+
+TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.estimator = std::make_unique<Hindsight>(alone.system);
+  Experiment truths = MakeExperiment();
+  SourceFrame frame;
+  double squares = 0.0, known = 0.0;
+  for (double k = 0.0; truths.source->Next(frame); ++k) {
+    for (const double depth : frame.truth[0]) {
+      squares += std::pow(1.0 + 1e-3 * k - depth, 2);
+      ++known;
+    }
+  }
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kOk);
+  EXPECT_NEAR(result.estimators[1].metrics.at("rmse:target.depth"), std::sqrt(squares / known),
+              1e-12);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "all is known", &Event::text), 1);
+}
+
+/// Finds at the end that it cannot say anything.
+struct Speechless : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, "no words");
+  }
+};
+
+TEST(Run, AnEstimatorThatFailsSaysNothingOfItsSensors) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.estimator = std::make_unique<Speechless>(alone.system);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "failed", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, "unused", &Event::kind), 0);
+}
+
+TEST(Run, AStopIsTakenAfterTheFrame) {
+  Experiment experiment = MakeExperiment();
+  int frames = 0;
+  RunOptions options;
+  options.stop = [&] { return ++frames == 7; };
+  const RunResult result = alidade::Run(experiment, options);
+  EXPECT_EQ(result.status, RunStatus::kStopped);
+  EXPECT_EQ(result.code, ExitCode::kStopped);
+  EXPECT_EQ(result.frames, 7);
+}
+
+TEST(Run, AStopAfterAFailureIsStillAFailure) {
+  Experiment experiment = MakeExperiment();
+  experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+  int frames = 0;
+  RunOptions options;
+  options.stop = [&] { return ++frames == 7; };
+  const RunResult result = alidade::Run(experiment, options);
+  EXPECT_EQ(result.frames, 7);
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
+}
+
+/// Ends by a signal while it waits for frame 7, as a pipe does.
+struct SignalledSource : Source {
+  explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
+  const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
+  const std::vector<StreamInfo>& truths() const override { return frames->truths(); }
+  bool Next(SourceFrame& frame) override {
+    if (++count == 7) throw Error(ExitCode::kStopped, "a signal");
+    return frames->Next(frame);
+  }
+  std::unique_ptr<Source> frames;
+  int count = 0;
+};
+
+TEST(Run, ASignalToItsSourceAfterAFailureIsStillAFailure) {
+  for (const bool fails : {false, true}) {
+    Experiment experiment = MakeExperiment();
+    if (fails) {
+      experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+    }
+    experiment.source = std::make_unique<SignalledSource>(std::move(experiment.source));
+    const RunResult result = alidade::Run(experiment, {});
+    EXPECT_EQ(result.frames, 6);
+    EXPECT_EQ(result.status, fails ? RunStatus::kFailed : RunStatus::kStopped);
+    EXPECT_EQ(result.code, fails ? ExitCode::kDiverged : ExitCode::kStopped) << result.reason;
+  }
+}
+
+/// Is stopped in its smoothing.
+struct Interrupted : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override { throw Error(ExitCode::kStopped, "a signal"); }
+};
+
+TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
+  const auto run = [](bool fails) {
+    Experiment experiment = MakeExperiment();
+    NamedEstimator& alone = experiment.estimators[1];
+    alone.estimator = std::make_unique<Interrupted>(alone.system);
+    if (fails) {
+      experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+    }
+    return alidade::Run(experiment, {});
+  };
+  EXPECT_EQ(run(false).code, ExitCode::kStopped);
+  const RunResult failed = run(true);
+  EXPECT_EQ(failed.status, RunStatus::kFailed);
+  EXPECT_EQ(failed.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = failed.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "stopped", &Event::kind), 1);
+}
+
+/// A value that walks by N(0, 0.1^2) each second, and is measured with noise of sigma 1.
+class Walking : public testing::SwingingTarget {
+ public:
+  explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
+    x_ = 2.0 * random_.Normal();
+  }
+  bool Next(SourceFrame& frame) override {
+    if (k_ == 200) return false;
+    frame = {testing::FrameAt(k_++, {{0, x_ + random_.Normal()}}), {{x_}}};
+    x_ += 0.1 * random_.Normal();
+    return true;
+  }
+
+ private:
+  Random random_;
+  double x_ = 0.0;
+  int k_ = 0;
+};
+
+/// Events of a filter of Walking that takes the noises for `factor` times what they are.
+EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
+  Experiment experiment;
+  experiment.source = std::make_unique<Walking>(seed);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  testing::AddMotion(named.system, "p", testing::ConstantMotion(1, 0.1 * factor),
+                     {{"depth", 0.0, 2.0 * factor}});
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, factor), {"p.depth"});
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  return alidade::Run(experiment, {}).estimators[0];
+}
+
+std::vector<std::string> TextsOf(const EstimatorResult& result, const std::string& kind) {
+  std::vector<std::string> texts;
+  for (const Event& event : result.events) {
+    if (event.kind == kind) texts.push_back(event.text);
+  }
+  return texts;
+}
+
+TEST(Run, AnOverconfidentFilterIsAnEvent) {
+  const EstimatorResult result = WalkWith(0.13);
+  EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
+  ASSERT_EQ(TextsOf(result, "nees_bounds").size(), 1u);
+  const std::string nees = TextsOf(result, "nees_bounds")[0];
+  EXPECT_TRUE(nees.starts_with("NEES mean ")) << nees;
+  EXPECT_NE(nees.find(" of p is outside its 95 % bounds ["), std::string::npos) << nees;
+  EXPECT_TRUE(nees.ends_with("]: the filter is overconfident")) << nees;
+  ASSERT_EQ(TextsOf(result, "nis_bounds").size(), 1u);
+  const std::string nis = TextsOf(result, "nis_bounds")[0];
+  EXPECT_TRUE(nis.starts_with("NIS mean ")) << nis;
+  EXPECT_NE(nis.find(" of sensor disparity is outside its 95 % bounds ["), std::string::npos)
+      << nis;
+}
+
+TEST(Run, AnUnderconfidentFilterIsAnEvent) {
+  const std::vector<std::string> texts = TextsOf(WalkWith(4.0), "nis_bounds");
+  ASSERT_EQ(texts.size(), 1u);
+  EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
+}
+
+// 5 % of 200 runs are 10, with a standard deviation of 3; the bounds of the NEES are wider.
+TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
+  std::size_t nees = 0, nis = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const EstimatorResult result = WalkWith(1.0, seed);
+    nees += TextsOf(result, "nees_bounds").size();
+    nis += TextsOf(result, "nis_bounds").size();
+  }
+  EXPECT_LE(nees, 20u);
+  EXPECT_LE(nis, 20u);
+  EXPECT_GE(nis, 2u);
+}
+
+/// z = x + n, all angles.
+struct Compass : Sensor<Angle, Angle> {
+  static constexpr std::array kRoles{Quantity{"heading", "rad"}};
+  static constexpr Quantity kMeasurement{"heading", "rad"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.02);
+  }
+};
+
+/// A heading that turns at random.
+struct Turn : Motion<1, Angle> {
+  static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.2 * std::sqrt(dt_s); }
+};
+
+/// Turns at a steady rate, and measures its heading ten times a second in a unit of its own.
+class Turning : public testing::SwingingTarget {
+ public:
+  Turning(double rate_rad_s, double unit, bool wrapped)
+      : SwingingTarget(0), rate_rad_s_(rate_rad_s), unit_(unit), wrapped_(wrapped) {}
+  bool Next(SourceFrame& frame) override {
+    if (k_ == 300) return false;
+    const double t_s = 0.1 * k_++;
+    const double angle = 0.6 + rate_rad_s_ * t_s + 0.02 * random_.Normal();
+    frame = {testing::FrameAt(t_s, {{0, unit_ * (wrapped_ ? Angle::Wrap(angle) : angle)}})};
+    return true;
+  }
+
+ private:
+  double rate_rad_s_, unit_;
+  bool wrapped_;
+  Random random_{4};
+  int k_ = 0;
+};
+
+std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
+  Experiment experiment;
+  experiment.source = std::make_unique<Turning>(source);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  const MotionModel model = InProcessMotion(Turn(), "turn");
+  const BlockId id = named.system.layout.Declare("car.heading", "car", model.blocks()[0]);
+  named.system.motions.push_back({"car", model, {id}});
+  named.system.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
+  testing::AddSensor(named.system, "disparity", InProcessSensor(Compass(), "compass"),
+                     {"car.heading"});
+  EkfOptions options;
+  options.gate = gate;
+  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  return TextsOf(alidade::Run(experiment, {}).estimators[0], "unit");
+}
+
+constexpr double kDegree = 180.0 / std::numbers::pi;
+
+TEST(Run, DegreesForRadiansAreAnEvent) {
+  for (const double gate : {1.0, 0.9999}) {
+    for (const double rate : {0.3, 0.05, -0.1}) {
+      const std::vector<std::string> texts = UnitEventsOf(Turning(rate, kDegree, true), gate);
+      ASSERT_EQ(texts.size(), 1u) << gate << ' ' << rate;
+      EXPECT_EQ(
+          texts[0],
+          "sensor 'disparity': the median of |z - h| is more than 5 sigma, and |z - h| > pi / "
+          "4 or |z| > 2 pi; is stream 'disparity' in rad?");
+    }
+  }
+}
+
+// Across the seam, or counted on over several turns.
+TEST(Run, RadiansAreNoEvent) {
+  for (const double gate : {1.0, 0.9999}) {
+    for (const double rate : {0.0, 0.3, 0.9, -0.9}) {
+      for (const bool wrapped : {true, false}) {
+        EXPECT_EQ(UnitEventsOf(Turning(rate, 1.0, wrapped), gate), std::vector<std::string>{})
+            << gate << ' ' << rate << ' ' << wrapped;
+      }
+    }
+  }
+}
+
+TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
+  Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
+  NamedEstimator& ekf = experiment.estimators[0];
+  ekf.system.initial_time_s = 49.5 * 0.033;
+  ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
+  const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
+  EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
+  EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
+  // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is
+  // off, by 75 mm of curvature: sqrt(75^2 / 10) mm, and a little for the wobble.
+  EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
+}
+
+TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
+  const auto unused = [](const EstimatorResult& result) {
+    std::vector<std::string> texts;
+    for (const Event& event : result.events) {
+      if (event.kind == "unused") texts.push_back(event.text);
+    }
+    return texts;
+  };
+  using Texts = std::vector<std::string>;
+  Experiment experiment = MakeExperiment();
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]), Texts{});
+
+  experiment = MakeExperiment();
+  NamedEstimator& ekf = experiment.estimators[0];
+  const SensorModel linear = testing::LinearSensor(1.0, 1.0);
+  testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
+  for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
+  EkfOptions options;
+  options.gate = 1e-6;
+  options.rejection_recovery = RejectionRecovery::kNone;
+  ekf.system.motions.clear();
+  ekf.estimator = std::make_unique<Ekf>(ekf.system, options, experiment.source->streams());
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]),
+            (Texts{"sensor 'disparity' used none of 30 measurements: 30 gated",
+                   "sensor 'inverse_scale' used none of 60 measurements: 60 gated",
+                   "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
+}
+
+/// Five frames, then bad data.
+class Failing : public testing::SwingingTarget {
+ public:
+  explicit Failing(ExitCode code) : SwingingTarget(60), code_(code) {}
+  bool Next(SourceFrame& frame) override {
+    if (++count_ > 5) throw Error(code_, "rows.csv:7 d: 'x' is not a number");
+    return SwingingTarget::Next(frame);
+  }
+
+ private:
+  ExitCode code_;
+  int count_ = 0;
+};
+
+/// A speed and a fix each second.
+class EachSecond : public testing::SwingingTarget {
+ public:
+  explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
+  bool Next(SourceFrame& frame) override {
+    if (left_-- == 0) return false;
+    frame = {testing::FrameAt(t_s_, {{0, t_s_}, {1, 1.0}})};
+    t_s_ += 1.0;
+    return true;
+  }
+
+ private:
+  int left_;
+  double t_s_ = 0.0;
+};
+
+// An input that always comes too late: the run says it once, and counts.
+TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
+  Experiment experiment;
+  experiment.source = std::make_unique<EachSecond>(100);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  testing::AddMotion(named.system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+                     {{"position", 0.0, 1.0}});
+  named.system.motions[0].input = {"inverse_scale", 0.5};
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"car.position"});
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  const RunResult run = alidade::Run(experiment, {});
+  const EstimatorResult& ekf = run.estimators[0];
+  EXPECT_EQ(std::ranges::count(ekf.events, "input_stale", &Event::kind), 1);
+  EXPECT_EQ(ekf.counts.at("input_stale"), 99);
+  EXPECT_EQ(ekf.counts.at("inputs:car"), 100);
+}
+
+TEST(Run, BadDataKeepsWhatWasDone) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Failing>(ExitCode::kBadData);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(result.reason, "rows.csv:7 d: 'x' is not a number");
+  EXPECT_EQ(result.frames, 5);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
+}
+
+/// A defect of the program half-way.
+class Breaking : public testing::SwingingTarget {
+ public:
+  Breaking() : SwingingTarget(60) {}
+  bool Next(SourceFrame& frame) override {
+    if (++count_ > 5) throw std::logic_error("an invariant");
+    return SwingingTarget::Next(frame);
+  }
+
+ private:
+  int count_ = 0;
+};
+
+/// Has landmarks at the end, but cannot say where they are.
+struct Mapless : Hindsight {
+  using Hindsight::Hindsight;
+  std::vector<LandmarkEstimate> landmarks() const override {
+    throw std::out_of_range("a landmark that is none");
+  }
+};
+
+TEST(Run, AFailureAtTheEndKeepsTheResults) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& first = experiment.estimators[0];
+  first.system.landmarks.emplace();
+  first.estimator = std::make_unique<Mapless>(first.system);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kInternal);
+  EXPECT_NE(result.reason.find("a landmark that is none"), std::string::npos) << result.reason;
+  ASSERT_EQ(result.estimators.size(), 2u);
+  EXPECT_FALSE(result.estimators[1].metrics.empty());
+}
+
+/// Fails in its smoothing.
+struct FailsLate : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, "no optimum");
+  }
+};
+
+TEST(Run, TheFirstFailureIsTheReason) {
+  const auto reason = [](bool explodes) {
+    Experiment experiment = MakeExperiment();
+    NamedEstimator& alone = experiment.estimators[1];
+    alone.estimator = std::make_unique<FailsLate>(alone.system);
+    if (explodes) {
+      experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+    }
+    return alidade::Run(experiment, {}).reason;
+  };
+  EXPECT_TRUE(reason(false).ends_with(": no optimum")) << reason(false);
+  EXPECT_TRUE(reason(true).starts_with("estimator 'exploding'")) << reason(true);
+}
+
+TEST(Run, ADefectIsAResultToo) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Breaking>();
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kInternal);
+  EXPECT_EQ(result.reason, "internal: an invariant");
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
+}
+
+/// Spoils its fourth frame.
+class Spoiling : public testing::SwingingTarget {
+ public:
+  explicit Spoiling(void (*spoil)(SourceFrame&)) : SwingingTarget(60), spoil_(spoil) {}
+  bool Next(SourceFrame& frame) override {
+    const bool more = SwingingTarget::Next(frame);
+    if (++count_ == 4) spoil_(frame);
+    return more;
+  }
+
+ private:
+  void (*spoil_)(SourceFrame&);
+  int count_ = 0;
+};
+
+TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
+  struct Case {
+    void (*spoil)(SourceFrame&);
+    std::string reason;
+  };
+  for (const Case& one : std::vector<Case>{
+           {[](SourceFrame& f) { f.measurements[0].values.clear(); },
+            "0 values of 'inverse_scale', not 1"},
+           {[](SourceFrame& f) {
+              f.measurements[0].values = {1, 2};
+            },
+            "2 values of 'inverse_scale', not 1"},
+           {[](SourceFrame& f) {
+              f.measurements[0].covariance = {1, 0, 0, 1};
+            },
+            "a covariance of 4 numbers of 'inverse_scale', not 1"},
+           {[](SourceFrame& f) { f.measurements[0].stream = -1; },
+            "a measurement of stream -1 of 2"},
+           {[](SourceFrame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},
+           {[](SourceFrame& f) {
+              f.truth[0] = {1, 2};
+            },
+            "2 values of 'depth', not 1"},
+           {[](SourceFrame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
+    Experiment experiment = MakeExperiment();
+    const SensorModel stereo = experiment.estimators[0].system.sensors[1].model;
+    experiment.segments.push_back({"near", 1, true, stereo});
+    experiment.source = std::make_unique<Spoiling>(one.spoil);
+    const RunResult result = alidade::Run(experiment, {});
+    EXPECT_EQ(result.code, ExitCode::kInternal);
+    EXPECT_NE(result.reason.find("the source gives " + one.reason), std::string::npos)
+        << result.reason;
+    EXPECT_NE(result.reason.find("at t = 0.099000 s"), std::string::npos) << result.reason;
+    EXPECT_EQ(result.frames, 3);
+    EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
+  }
+}
+
+TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
+  Experiment first = MakeExperiment(), second = MakeExperiment();
+  EXPECT_EQ(alidade::Run(first, {}).estimators[0].metrics,
+            alidade::Run(second, {}).estimators[0].metrics);
+}
+
+TEST(Experiment, WordsOfAConfigAreItsKeysAndScalars) {
+  const Config config =
+      Config::FromText("a: {model: b, list: [c, {d: 1.5}]}\ne: 'f g'", "test.yaml");
+  EXPECT_EQ(WordsOf(config),
+            (std::set<std::string>{"a", "model", "b", "list", "c", "d", "1.5", "e", "f g"}));
+  EXPECT_THROW(config.root().RejectUnread(), Error);  // nothing counts as read
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/check/check.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/words.h"
+#include "alidade/check/check_context.h"
+#include "alidade/check/plugin_listing.h"
+#include "alidade/estimation/built_in.h"
+#include "alidade/io/text_table.h"
+#include "alidade/plugin/plugin_file.h"
+
+namespace alidade {
+namespace fs = std::filesystem;
+namespace {
+
+using internal::Check;
+using internal::ChildEnd;
+using internal::Context;
+using internal::NumberText;
+
+bool IsModel(const PluginEntry& entry) {
+  return entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
+}
+
+/// The child's answers: a verdict, or an error of the set-up with its exit code.
+constexpr char kError = 'E';
+constexpr char kVerdicts[] = {'+', '-', '0'};
+
+std::string Encode(const Finding& finding) {
+  return kVerdicts[static_cast<int>(finding.verdict)] + finding.words;
+}
+
+Finding Decode(const std::string& answer) {
+  if (answer.empty()) return internal::Fail("gave no verdict");
+  if (answer.front() == kError) throw Error(ExitCode::kBadConfig, answer.substr(1));
+  const auto* at = std::find(std::begin(kVerdicts), std::end(kVerdicts), answer.front());
+  if (at == std::end(kVerdicts)) return internal::Fail("gave no verdict");
+  return {static_cast<Finding::Verdict>(at - kVerdicts), "", answer.substr(1)};
+}
+
+/// How the child ended, in words, and in which call.
+std::string EndWords(const ChildEnd& end, const internal::CallRecord& record, double timeout_s) {
+  const std::string at = record.state().empty() ? "" : " at " + record.state();
+  if (end.late) {
+    const std::string where =
+        record.call().empty() ? "before its first call" : "in " + record.call() + at;
+    return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it was " +
+           where;
+  }
+  std::string words = record.call().empty() ? "the check" : record.call();
+  words += ' ' + end.text;
+  if (!record.state().empty()) words += "; at " + record.state();
+  return words;
+}
+
+/// One check, in a child process.
+Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& entry,
+                 const Node& parameters, const CheckOptions& options, bool& ended) {
+  internal::CallRecord record;
+  const auto work = [&]() -> std::string {
+    try {
+      Context context(host, entry, parameters, options, record);
+      const Finding finding = check.run(context);
+      context.Close();
+      return Encode(finding);
+    } catch (const Error& e) {
+      return e.code() == ExitCode::kBadConfig ? kError + std::string(e.what())
+                                              : Encode(internal::Fail(e.what()));
+    } catch (const std::exception& e) {
+      return Encode(internal::Fail(e.what()));
+    }
+  };
+  const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);
+  ended = !end.answered;
+  Finding finding =
+      end.answered ? Decode(end.text) : internal::Fail(EndWords(end, record, options.timeout_s));
+  if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
+      !end.printed.empty()) {
+    finding = internal::Fail("the model prints, which goes into the output of a run: '" +
+                             end.printed + "'");
+  }
+  const auto says = [&](const char* what) { return finding.words.find(what) != std::string::npos; };
+  // The second is what a thread without room for its stack throws.
+  if (says("std::bad_alloc") || says("Resource temporarily unavailable")) {
+    finding.words += "; it may take " + std::to_string(options.memory_mb) + " MB (--memory)";
+  }
+  return finding;
+}
+
+}  // namespace
+
+std::vector<Finding> CheckModel(const PluginHost& host, const PluginEntry& entry,
+                                const Node& parameters, const CheckOptions& options) {
+  ALIDADE_EXPECTS(IsModel(entry) && options.states > 0 && options.timeout_s > 0.0);
+  std::vector<Finding> findings;
+  std::string stopped_by;
+  for (const Check& check : internal::kChecks) {
+    Finding finding = internal::Skip("'" + stopped_by + "' failed");
+    if (stopped_by.empty()) {
+      bool ended = false;
+      finding = RunCheck(check, host, entry, parameters, options, ended);
+      const bool failed = finding.verdict == Finding::Verdict::kFail;
+      if (failed && (check.needed || ended)) stopped_by = check.name;
+    }
+    finding.check = check.name;
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& plugin,
+                                    const std::string& model) {
+  std::error_code error;
+  const fs::path file = fs::canonical(plugin, error);
+  std::vector<PluginEntry> found;
+  std::vector<std::string> names;
+  const auto collect = [&](const auto& matches) {
+    if (!found.empty()) return;
+    for (const PluginEntry& entry : host.entries()) {
+      if (IsModel(entry) && matches(entry)) found.push_back(entry);
+    }
+  };
+  if (!error) collect([&](const PluginEntry& entry) { return entry.plugin == file; });
+  collect([&](const PluginEntry& entry) {
+    const std::string stem = entry.plugin.stem().string();
+    return stem == plugin || stem == "alidade_" + plugin;
+  });
+  collect([&](const PluginEntry& entry) { return entry.name == plugin; });
+  const auto fail = [&](const std::string& what, const std::string& wanted) {
+    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, what, {}, Nearest(wanted, names)));
+  };
+  if (found.empty()) {
+    const auto other = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
+    const bool built_in = internal::FindEstimatorType(plugin) != nullptr;
+    if (built_in || other != host.entries().end()) {
+      const std::string is =
+          built_in ? "built-in estimator" : std::string(internal::KindName(other->kind));
+      throw Error(ExitCode::kPlugin,
+                  ErrorLine({}, {}, "'" + plugin + "' is " + internal::WithArticle(is),
+                            "a sensor or motion model, which is what is checked"));
+    }
+    for (const PluginEntry& entry : host.entries()) {
+      if (IsModel(entry)) names.push_back(entry.name);
+    }
+    throw Error(ExitCode::kPlugin,
+                ErrorLine({}, {}, "no plugin '" + plugin + "' with a sensor or motion model", {},
+                          Nearest(plugin, names)) +
+                    "\n" + PluginPlaces(host));
+  }
+  if (model.empty()) return found;
+  for (const PluginEntry& entry : found) names.push_back(entry.name);
+  std::erase_if(found, [&](const PluginEntry& entry) { return entry.name != model; });
+  if (found.empty()) fail("plugin '" + plugin + "' offers no model '" + model + "'", model);
+  return found;
+}
+
+std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& findings) {
+  constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
+  std::vector<internal::TextRow> rows;
+  for (const Finding& finding : findings) {
+    std::string words = finding.words;
+    std::replace(words.begin(), words.end(), '\n', ' ');
+    rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, words});
+  }
+  return entry.name + " (" + internal::KindName(entry.kind) + " of " + entry.plugin.string() +
+         ")\n" + internal::TextTable(rows, 2);
+}
+
+bool AnyFailure(const std::vector<Finding>& findings) {
+  return std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.verdict == Finding::Verdict::kFail;
+  });
+}
+
+}  // namespace alidade

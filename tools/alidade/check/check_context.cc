@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/check/check_context.h"
+
+#include <cmath>
+
+#include "alidade/io/log.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kLarge = 1e6;  // the largest edge of RandomStates
+
+/// Whether a large state has an infinite value, which says nothing against the model.
+bool Overflows(const CheckedState& state, const Answer& answer) {
+  bool large = false, infinite = false;
+  for (const auto& value : state.values) {
+    for (const double element : value) large = large || std::abs(element) >= kLarge;
+  }
+  for (const Buffer& value : answer.outputs) {
+    for (int i = 0; i < value.columns(); ++i) infinite = infinite || std::isinf(value(0, i));
+  }
+  return large && infinite;
+}
+
+}  // namespace
+
+Context::Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
+                 const CheckOptions& options, CallRecord& record)
+    : host_(host), entry_(entry), parameters_(parameters), options_(options), record_(record) {
+  model_ = Create();
+}
+
+const std::vector<CheckedState>& Context::states() {
+  if (!states_.empty()) return states_;
+  for (Values& values : RandomStates(*model_, options_.states, options_.seed)) {
+    CheckedState state{std::move(values), false};
+    const Answer answer = Call(main(), state, kNoMatrix);
+    if (answer.ok() && Overflows(state, answer)) continue;
+    state.defined = answer.ok();
+    if (state.defined && model_->is_sensor()) {
+      const Buffer& z = answer.outputs[0];
+      std::vector<double>& slot =
+          state.values[static_cast<std::size_t>(model_->measurement_slot())];
+      for (int i = 0; i < z.columns(); ++i) slot[static_cast<std::size_t>(i)] = z(0, i);
+    }
+    states_.push_back(std::move(state));
+  }
+  return states_;
+}
+
+std::unique_ptr<ModelUnderTest> Context::Create() const {
+  record_.Enter("create");
+  return std::make_unique<ModelUnderTest>(host_.Create(entry_, parameters_));
+}
+
+void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
+  std::string thrown;  // of which the host warns alone
+  record_.Enter("destroy");
+  {
+    const auto take = [&](LogLevel, std::string_view text) { thrown = text; };
+    const LogSubscription warnings(LogLevel::kWarning, take);
+    model.reset();
+  }
+  record_.Enter("");
+  if (!thrown.empty()) throw Error(ExitCode::kPlugin, thrown);
+}
+
+void Context::Close() { Destroy(std::move(model_)); }
+
+Values Context::Inputs(const Function& f, const CheckedState& state) {
+  Values inputs;
+  for (const int slot : f.slots) inputs.push_back(state.values[static_cast<std::size_t>(slot)]);
+  return inputs;
+}
+
+std::vector<Space> Context::InputSpaces(const Function& f) const {
+  std::vector<Space> spaces;
+  for (const int slot : f.slots) spaces.push_back(model_->slots[static_cast<std::size_t>(slot)]);
+  return spaces;
+}
+
+Answer Context::Call(const Function& f, const CheckedState& state, int matrices) const {
+  return CallWith(f, Inputs(f, state), matrices);
+}
+
+Answer Context::CallWith(const Function& f, const Values& inputs, int matrices) const {
+  record_.Enter(f.name.c_str(), StateText(InputSpaces(f), inputs));
+  Answer answer = CallFunction(f, inputs, matrices);
+  record_.Enter("");
+  return answer;
+}
+
+std::string Context::Where(const Function& f, const Values& inputs) const {
+  return f.name + " at " + StateText(InputSpaces(f), inputs);
+}
+
+}  // namespace alidade::internal

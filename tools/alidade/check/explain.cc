@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/check/explain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/words.h"
+#include "alidade/check/explain_parts.h"
+#include "alidade/estimation/built_in.h"
+#include "alidade/estimation/observability.h"
+#include "alidade/estimation/truth_match.h"
+#include "alidade/io/text_table.h"
+#include "alidade/plugin/calibration.h"
+
+namespace alidade {
+namespace {
+
+using internal::Join;
+using internal::NumberText;
+using internal::TextRow;
+using internal::TextTable;
+
+constexpr std::size_t kIndent = 4;
+
+const char* StatusText(BlockStatus status) {
+  switch (status) {
+    case BlockStatus::kEstimated:
+      return "estimated";
+    case BlockStatus::kConsider:
+      return "consider";
+    case BlockStatus::kConstant:
+      break;
+  }
+  return "constant";
+}
+
+/// A number, or a list; the number alone where all are equal and `same` allows it.
+std::string ListText(const std::vector<double>& values, bool same = false) {
+  const bool equal = std::equal(values.begin() + 1, values.end(), values.begin());
+  if (values.size() == 1 || (same && equal)) return NumberText(values[0]);
+  std::vector<std::string> parts;
+  for (const double value : values) parts.push_back(NumberText(value));
+  return '[' + Join(parts) + ']';
+}
+
+std::string SigmasText(const Eigen::MatrixXd& covariance) {
+  std::vector<double> sigmas;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    // Six digits hide the rounding of sigma -> variance -> sigma.
+    char sigma[32];
+    std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(covariance(i, i)));
+    sigmas.push_back(std::strtod(sigma, nullptr));
+  }
+  return ListText(sigmas, true);
+}
+
+std::string PriorText(const Prior& prior, const Block& block) {
+  const bool measured = !prior.from.empty();
+  std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
+  if (block.status == BlockStatus::kConstant) return text + ", exact";
+  if (measured) return text;
+  return text + " +- " + SigmasText(prior.covariance);
+}
+
+/// A line for each block; what constant ones are; for each truth that is of no block, why.
+std::string States(const System& system, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+  std::vector<TextRow> rows = {
+      {"block", "geometry", "size", "unit", "owner", "status", "truth", "starts from"}};
+  for (const Prior& prior : system.priors) {
+    const Block& block = system.layout[prior.block];
+    const Geometry& geometry = block.geometry();
+    std::string size = std::to_string(geometry.ambient);
+    if (geometry.tangent != geometry.ambient) {
+      size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
+    }
+    const int truth = match[static_cast<std::size_t>(prior.block)];
+    rows.push_back({block.name, ToString(geometry.kind), size, block.space.unit, block.owner,
+                    StatusText(block.status),
+                    truth >= 0       ? truths[static_cast<std::size_t>(truth)].name
+                    : truths.empty() ? ""
+                                     : "-",
+                    PriorText(prior, block)});
+  }
+  std::string text = TextTable(rows, kIndent);
+  const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kConstant; };
+  if (std::ranges::any_of(system.layout.blocks(), is_fixed)) {
+    text += "    constant: known exactly, without covariance; nothing moves or corrects it\n";
+  }
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const std::string why = internal::WhyNoBlock(system.layout, truths, t);
+    if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
+  }
+  return text;
+}
+
+/// The control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
+std::string InputText(const MotionBinding& motion) {
+  if (!motion.model.has_input()) return "none";
+  const InputBinding& input = motion.input;
+  return motion.model.input().name + " <- " + input.stream +
+         (std::isfinite(input.timeout_s) ? ", up to " + NumberText(input.timeout_s) + " s old"
+                                         : "");
+}
+
+/// A line for a state or sensor entry whose noise the config gives as a covariance; else "".
+std::string GivenNoise(const std::string& name, const ModelInstance& model, int size) {
+  const std::vector<double>& root = model.given_noise();
+  if (root.empty()) return "";
+  const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
+  return "    noise of " + name + ": the covariance of the config, sigma " +
+         SigmasText(l * l.transpose()) + '\n';
+}
+
+std::string Motions(const System& system) {
+  const bool driven = std::ranges::any_of(
+      system.motions, [](const MotionBinding& motion) { return motion.model.has_input(); });
+  std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
+  if (driven) rows[0].emplace_back("control input");
+  std::string given;
+  for (const MotionBinding& motion : system.motions) {
+    std::vector<std::string> blocks;
+    for (const BlockId id : motion.blocks) {
+      if (system.layout[id].status == BlockStatus::kConstant) continue;
+      blocks.push_back(system.layout[id].name);
+    }
+    const int noise = motion.model.noise_size();
+    const char* const kind = motion.model.discrete_noise() ? " discrete" : " continuous";
+    rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
+                    noise == 0 ? "none" : std::to_string(noise) + kind});
+    if (driven) rows.back().push_back(InputText(motion));
+    given += GivenNoise(motion.name, motion.model.instance(), noise);
+  }
+  return TextTable(rows, kIndent) + given;
+}
+
+const char* ModeText(RoleMode mode) {
+  switch (mode) {
+    case RoleMode::kEstimate:
+      return "estimate";
+    case RoleMode::kConsider:
+      return "consider";
+    case RoleMode::kKnown:
+      break;
+  }
+  return "known";
+}
+
+std::string Sensors(const System& system) {
+  std::vector<TextRow> rows = {
+      {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
+  std::string given;
+  for (const SensorBinding& sensor : system.sensors) {
+    TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
+    given += GivenNoise(sensor.name, sensor.model.instance(),
+                        sensor.model.measurement().geometry.tangent);
+    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+      const RoleBinding& role = sensor.roles[i];
+      TextRow row = std::exchange(front, TextRow(3));
+      row.push_back(sensor.model.roles()[i].name);
+      if (sensor.model.roles()[i].landmark()) {
+        row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
+      } else if (role.block < 0) {
+        row.insert(row.end(), {"(unbound)", "", ""});
+      } else {
+        const bool prediction = role.jacobian_at == JacobianAt::kPrediction;
+        row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
+                               prediction ? "prediction" : "measurement"});
+      }
+      rows.push_back(std::move(row));
+    }
+  }
+  return TextTable(rows, kIndent) + given;
+}
+
+/// What a sensor does with the block that fills a role.
+const char* EffectText(const Block& block, RoleMode mode) {
+  if (block.status == BlockStatus::kConstant || mode == RoleMode::kKnown) return "knows";
+  const bool considers = block.status == BlockStatus::kConsider || mode == RoleMode::kConsider;
+  return considers ? "considers" : "corrects";
+}
+
+/// A line for each block, a column for each motion entry and sensor.
+std::string Touches(const System& system) {
+  std::vector<TextRow> rows(1 + system.layout.blocks().size());
+  rows[0].push_back("block");
+  for (std::size_t b = 0; b + 1 < rows.size(); ++b) {
+    rows[b + 1].push_back(system.layout.blocks()[b].name);
+  }
+  const auto add_column = [&](const std::string& name) {
+    for (TextRow& row : rows) row.emplace_back("-");
+    rows[0].back() = name;
+  };
+  for (const MotionBinding& motion : system.motions) {
+    add_column(motion.name);
+    for (const BlockId id : motion.blocks) {
+      const bool constant = system.layout[id].status == BlockStatus::kConstant;
+      rows[static_cast<std::size_t>(id) + 1].back() = constant ? "knows" : "moves";
+    }
+  }
+  for (const SensorBinding& sensor : system.sensors) {
+    add_column(sensor.name);
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block < 0) continue;
+      rows[static_cast<std::size_t>(role.block) + 1].back() =
+          EffectText(system.layout[role.block], role.mode);
+    }
+  }
+  return TextTable(rows, kIndent);
+}
+
+/// "target.depth together with target.depth_rate"
+std::string DirectionText(const std::vector<std::string>& names) {
+  const std::string rest = Join({names.begin() + 1, names.end()});
+  return names[0] + (rest.empty() ? "" : " together with " + rest);
+}
+
+/// A line for each direction that is observable, but not while the control inputs are constant.
+std::string NeedExcitation(const System& system,
+                           const std::vector<std::vector<std::string>>& unobservable) {
+  const auto constant = internal::UnobservableDirections(system, internal::Excitation::kConstant);
+  std::string text;
+  for (const auto& names : std::set(constant.begin(), constant.end())) {
+    if (std::ranges::count(unobservable, names) > 0) continue;
+    text += "  observable only while the control input changes: " + DirectionText(names) + '\n';
+  }
+  return text;
+}
+
+std::string Unobservable(const System& system) {
+  if (system.landmarks && !internal::PlaceLandmarks(system)) {
+    return "  what can be observed depends on the landmarks\n";
+  }
+  if (!internal::ObservabilityIsTold(system)) {
+    return "  what can be observed is not looked into: the state has more than " +
+           std::to_string(internal::kMostObserved) + " elements\n";
+  }
+  const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(system);
+  std::map<std::vector<std::string>, int> directions;
+  for (const auto& names : unobservable) ++directions[names];
+  std::string text;
+  if (directions.empty()) text = "  every direction of the state can be observed\n";
+  for (const auto& [names, count] : directions) {
+    text += "  cannot be observed: " + DirectionText(names);
+    text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
+    if (names[0] == "scale") {
+      text +=
+          "    scale, of trajectory and map alike, is what the prior makes of it: depth, a stereo "
+          "pair, "
+          "odometry\n    or known landmarks determine it\n";
+    }
+  }
+  return text + NeedExcitation(system, unobservable);
+}
+
+std::string SupportText(const std::string& type) {
+  const internal::EstimatorType* known = internal::FindEstimatorType(type);
+  if (known == nullptr) return {};
+  const Support& can = known->support;
+  const auto either = [](bool can_do, const char* with, const char* without) {
+    return std::string(can_do ? with : without);
+  };
+  std::string lacks;
+  const auto lack = [&](bool can_do, const char* what) {
+    if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
+  };
+  lack(can.consider, "consider blocks and roles");
+  lack(can.at_measurement, "jacobian_at measurement");
+  lack(can.from_measurement, "blocks that start from a measurement");
+  lack(can.recovery, "rejection\n    recovery");
+  lack(can.landmarks, "landmarks");
+  return either(can.consider,
+                "    blocks estimated, consider (Schmidt) or constant; roles estimate, consider, "
+                "known;\n",
+                "    blocks estimated or constant; roles estimate, known;\n") +
+         "    control inputs; jacobian_at prediction" +
+         either(can.at_measurement, " or measurement", "") +
+         either(can.from_measurement, "; blocks that start from a measurement", "") +
+         ";\n    robust losses" + either(can.landmarks, "; landmarks", "") + '.' +
+         (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
+}
+
+/// What is done with out-of-sequence frames, if not the default.
+std::string OutOfSequenceText(const OutOfSequencePolicy& given) {
+  if (given.policy == OutOfSequence::kReject) return "";
+  const bool buffer = given.policy == OutOfSequence::kBuffer;
+  const char* const done = buffer ? "buffer: frames are held back"
+                                  : "rollback: the estimators go back and process them in order";
+  return std::string("  out-of-sequence frames: ") + done +
+         (given.window ? ", up to " + internal::RoundedText(Seconds(*given.window), 6) +
+                             " s behind the newest"
+                       : " to the end of the run") +
+         '\n';
+}
+
+/// A row for each parameter that the data tell: its key, value and place.
+void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow>& rows) {
+  for (const auto& [name, value] : map.Entries()) {
+    const std::string path = key.empty() ? name : key + '.' + name;
+    if (value.is_map()) {
+      AddCalibration(value, path, rows);
+      continue;
+    }
+    std::vector<std::string> texts;
+    for (const Node& item : value.ItemsOrOne()) texts.push_back(item.Text());
+    rows.push_back({path, Join(texts), ToString(value.place())});
+  }
+}
+
+std::string CalibrationText(const Config& config, const Source& source) {
+  const Config with = internal::WithCalibration(config, source);
+  const auto calibration = with.root().Find("calibration");
+  if (!calibration) return "";
+  std::vector<TextRow> rows;
+  AddCalibration(*calibration, "", rows);
+  return "  calibration of the data\n" + TextTable(rows, kIndent);
+}
+
+/// A row for each key of the source that is one value.
+std::string SourceKeys(const Node& source) {
+  std::vector<TextRow> rows;
+  for (const auto& [key, value] : source.Entries()) {
+    if (value.kind() != Node::Kind::kScalar || key == "type" || key == "seed") continue;
+    rows.push_back({key, value.Text()});
+  }
+  return rows.empty() ? "" : "  keys\n" + TextTable(rows, kIndent);
+}
+
+std::string SourceText(const Config& config, const Experiment& experiment) {
+  const Node source = config.root().At("source");
+  std::string text = "source " + source.At("type").Text();
+  text += ", seed " + std::to_string(experiment.seed) + '\n';
+  std::vector<TextRow> rows = {{"stream", "size", "used by"}};
+  for (const StreamInfo& stream : experiment.source->streams()) {
+    std::vector<std::string> users;
+    for (const auto& [name, sensor] : config.root().At("sensors").Entries()) {
+      if (sensor.At("stream").Text() == stream.name) users.push_back(name);
+    }
+    for (const auto& [name, state] : config.root().At("state").Entries()) {
+      const auto input = state.Find("input");
+      if (input && input->At("stream").Text() == stream.name) users.push_back(name + " (input)");
+    }
+    rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
+  }
+  const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
+  text += TextTable(rows, kIndent) + SourceKeys(source);
+  if (const std::string guide = experiment.source->guided_by(); !guide.empty()) {
+    text += "  guide: filter '" + guide + "' says where to look for what is measured\n";
+  }
+  return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
+         CalibrationText(config, *experiment.source) +
+         OutOfSequenceText(experiment.out_of_sequence);
+}
+
+}  // namespace
+
+std::string Explain(const Config& config, const Experiment& experiment) {
+  std::string text = SourceText(config, experiment);
+  for (const NamedEstimator& named : experiment.estimators) {
+    const System& system = named.system;
+    const Node entry = config.root().At("estimators").At(named.name);
+    text += "\nestimator " + named.name + " (" + named.type + ")\n";
+    text += "  state\n" + States(system, experiment.source->truths());
+    text += "  motion\n" + Motions(system);
+    text += "  sensors\n" + Sensors(system);
+    if (system.landmarks)
+      text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
+    text += "  who touches which block\n" + Touches(system);
+    text += Unobservable(system);
+    text += "  options\n" + TextTable(internal::OptionRows(entry, named), kIndent);
+    if (const std::string support = SupportText(named.type); !support.empty()) {
+      text += "  type " + named.type + " supports\n" + support;
+    }
+  }
+  return text;
+}
+
+}  // namespace alidade

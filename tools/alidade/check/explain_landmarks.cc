@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/words.h"
+#include "alidade/check/explain_parts.h"
+
+namespace alidade::internal {
+
+std::vector<TextRow> LandmarkRows(const System& system) {
+  const LandmarkOptions& options = *system.landmarks;
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto sensor = std::ranges::find_if(system.sensors, sees);
+  const auto representation = RepresentationOf(sensor->model.roles());
+  std::vector<TextRow> rows = {
+      {"representation", representation ? ToString(*representation) : "the sensor's own"}};
+  const auto add = [&rows](const std::string& what, const std::string& text) {
+    rows.push_back({what, text});
+  };
+  if (options.prior) {
+    std::string prior = "inverse distance " + NumberText(options.prior->inverse_distance) + " +- " +
+                        NumberText(options.prior->sigma) + " 1/m";
+    if (const int n = options.prior->adapt_after; n > 0) {
+      prior += "; once " + std::to_string(n) + " in view have converged, their median";
+    }
+    if (const int n = options.prior->min_observations; n > 0) {
+      prior += "; taken at observation " + std::to_string(n);
+    }
+    add("prior", prior);
+  }
+  std::string initialise = options.min_observations == 1
+                               ? "at first observation"
+                               : "at observation " + std::to_string(options.min_observations);
+  if (options.max_per_frame < LandmarkOptions::kUnlimited) {
+    initialise += ", while fewer than " + std::to_string(options.max_per_frame) + " are measured";
+  }
+  add("initialise", initialise);
+  std::vector<std::string> prune;
+  if (options.max_missed_frames > 0) {
+    prune.push_back("unseen for " + std::to_string(options.max_missed_frames) + " frames");
+  }
+  if (options.min_match_ratio > 0.0) {
+    prune.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
+                    std::to_string(options.min_attempts) + " or more measurements accepted");
+  }
+  if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
+    prune.emplace_back("inverse distance not above 0");
+  }
+  add("prune", prune.empty() ? "never" : Join(prune, "; "));
+  add("convert to xyz",
+      options.max_linearity_index > 0.0
+          ? "below an index of linearity of " + NumberText(options.max_linearity_index)
+          : "never");
+  if (!options.known.empty()) add("known", std::to_string(options.known.size()));
+  return rows;
+}
+
+}  // namespace alidade::internal

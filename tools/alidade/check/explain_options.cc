@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
+#include "alidade/base/words.h"
+#include "alidade/check/explain_parts.h"
+#include "alidade/estimation/built_in.h"
+
+namespace alidade::internal {
+namespace {
+
+std::string GateText(const EkfOptions& options, const System& system) {
+  if (options.gate >= 1.0) return "none: every measurement is used";
+  std::map<int, std::string> thresholds;
+  for (const SensorBinding& sensor : system.sensors) {
+    const int dof = sensor.model.measurement().geometry.tangent;
+    thresholds[dof] = FixedText(ChiSquareQuantile(options.gate, dof), 2);
+  }
+  std::vector<std::string> parts;
+  for (const auto& [dof, threshold] : thresholds) {
+    parts.push_back(threshold + " at " + std::to_string(dof) + " dof");
+  }
+  return NumberText(options.gate) + ": accepts r' S^-1 r up to " + Join(parts);
+}
+
+std::string FuseText(Fuse fuse, const System& system) {
+  const std::vector<std::string> names = NamesOf(system.sensors);
+  switch (fuse) {
+    case Fuse::kJoint:
+      return "joint: one stacked update for each timestamp";
+    case Fuse::kPerSensor:
+      return "per_sensor: one update for each sensor, in the order " + Join(names);
+    case Fuse::kPerMeasurement:
+      break;
+  }
+  return "per_measurement: one update for each measurement, in the order " + Join(names);
+}
+
+std::string RejectionRecoveryText(const EkfOptions& options, const System& system) {
+  const auto corrects = [&](const RoleBinding& role) {
+    return role.block >= 0 && role.mode == RoleMode::kEstimate &&
+           system.layout[role.block].status == BlockStatus::kEstimated;
+  };
+  std::vector<std::string> without;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
+  }
+  std::string after = " after " + std::to_string(options.rejection_recovery_after) +
+                      " rejections of a sensor in a row";
+  if (!without.empty()) after += "; nothing for " + Join(without);
+  switch (options.rejection_recovery) {
+    case RejectionRecovery::kReset:
+      return "reset its blocks from the measurement, or inflate them," + after;
+    case RejectionRecovery::kInflate:
+      return "inflate its blocks," + after;
+    case RejectionRecovery::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string LossText(const System& system) {
+  std::vector<std::string> losses;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.loss.kind == LossKind::kNone) continue;
+    losses.push_back(sensor.name + ": " + ToString(sensor.loss.kind) + ' ' +
+                     NumberText(sensor.loss.scale));
+  }
+  return Join(losses);
+}
+
+}  // namespace
+
+std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named) {
+  const System& system = named.system;
+  std::vector<TextRow> rows;
+  if (const EstimatorType* const type = FindEstimatorType(named.type)) {
+    const auto [options, own] = type->describe(entry);
+    rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
+    if (type->support.recovery)
+      rows.push_back({"rejection_recovery", RejectionRecoveryText(options, system)});
+    rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
+                                                                : "none: a gap is one step"});
+    rows.insert(rows.end(), own.begin(), own.end());
+  }
+  if (const auto use = entry.Find("use"); use && use->is_map()) {
+    rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
+  }
+  rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
+                                       ? "fail: the run ends with exit code 79"
+                                       : "report: the run goes on"});
+  if (named.on_plugin_failure != OnPluginFailure::kSkip) {
+    rows.push_back({"on_plugin_failure", named.on_plugin_failure == OnPluginFailure::kAbort
+                                             ? "abort: the run ends with exit code 69"
+                                             : "disable: a sensor that fails is no longer used"});
+  }
+  if (const std::string losses = LossText(system); !losses.empty()) {
+    rows.push_back({"loss", losses});
+  }
+  if (system.initial_time_s) rows.push_back({"initial_time_s", NumberText(*system.initial_time_s)});
+  return rows;
+}
+
+}  // namespace alidade::internal

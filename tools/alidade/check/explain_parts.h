@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "alidade/experiment/experiment.h"
+#include "alidade/io/text_table.h"
+
+namespace alidade::internal {
+
+/// How the landmarks of a system that has some are initialised, converted and pruned: what, and
+/// how.
+std::vector<TextRow> LandmarkRows(const System& system);
+
+/// What the entry of an estimator sets, a key and its value in words each.
+std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named);
+
+}  // namespace alidade::internal

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/check/model_under_test.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <numeric>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kPoison = 1e302;
+constexpr double kGuardWord = -7.0546875e-251;  // no value that a model would compute
+
+bool Same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+/// Leaves kPoison where the locals of the next call will lie, so that one which is read before it
+/// is written shows.
+[[gnu::noinline]] void PoisonStack() {
+  volatile double cells[4096];
+  for (volatile double& cell : cells) cell = kPoison;
+}
+
+Space Named(const char* name, const Geometry& geometry) {
+  Space space;
+  space.name = name;
+  space.geometry = geometry;
+  space.elements.resize(static_cast<std::size_t>(geometry.ambient));
+  for (int i = 0; i < geometry.ambient && geometry.ambient > 1; ++i) {
+    space.elements[static_cast<std::size_t>(i)] = std::to_string(i);
+  }
+  return space;
+}
+
+std::vector<int> FirstSlots(int count) {
+  std::vector<int> slots;
+  for (int i = 0; i < count; ++i) slots.push_back(i);
+  return slots;
+}
+
+/// The noise that the config gives, n x n, in rows `stride` apart; false: none.
+bool CopyGiven(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
+  for (int i = 0; i < n && !root.empty(); ++i) std::copy_n(root.data() + i * n, n, l + i * stride);
+  return !root.empty();
+}
+
+void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
+               ModelUnderTest& model) {
+  const AlidadeSensor sensor = *c.sensor;
+  const void* const self = c.self;
+  const int count = static_cast<int>(roles.size()), m = z.geometry.tangent;
+  const auto knowing = [&](std::vector<int> slots) {  // the known numbers are the last input
+    if (model.known_slot >= 0) slots.push_back(model.known_slot);
+    return slots;
+  };
+  const bool knows = model.known_slot >= 0;
+  Function predict{"Predict", knowing(FirstSlots(count)), {z}, {}, count, false, {}};
+  for (const Space& role : roles) predict.matrices.push_back({m, role.geometry.tangent});
+  predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
+                     const std::int32_t* strides) {
+    const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
+    const AlidadeObservation seen = detail::Seen(nullptr, knows ? in[count] : nullptr);
+    return sensor.eval(self, &seen, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
+  };
+  model.functions.push_back(std::move(predict));
+  model.functions.push_back(
+      {"SqrtNoise",
+       knowing(FirstSlots(count + 1)),
+       {},
+       {{m, m}},
+       0,
+       true,
+       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
+                                                   double* const* l, const std::int32_t* strides) {
+         if (CopyGiven(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
+         const AlidadeObservation seen = detail::Seen(in[count], knows ? in[count + 1] : nullptr);
+         return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
+       }});
+  if (sensor.valid != nullptr) {
+    model.functions.push_back(
+        {"Valid",
+         knowing({count}),
+         {},
+         {},
+         0,
+         false,
+         [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
+           const AlidadeObservation seen = detail::Seen(in[0], knows ? in[1] : nullptr);
+           return sensor.valid(self, &seen);
+         }});
+  }
+}
+
+/// The values of several outputs, which lie apart, in one row: in front what is in them, behind the
+/// words after the last one.
+std::vector<double> Gather(const std::vector<Space>& outputs, const double* const* out) {
+  constexpr int kBehind = 8;
+  std::vector<double> row;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const int behind = i + 1 == outputs.size() ? kBehind : 0;
+    row.insert(row.end(), out[i], out[i] + outputs[i].geometry.ambient + behind);
+  }
+  return row;
+}
+
+/// Puts what Gather took back, as a call has left it.
+void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
+             double* const* out) {
+  const double* from = row.data();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const double* const end = from + outputs[i].geometry.ambient;
+    std::copy(from, i + 1 == outputs.size() ? row.data() + row.size() : end, out[i]);
+    from = end;
+  }
+}
+
+/// y = g(other roles, z, prior), y one role or those of a landmark.
+void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
+                   ModelUnderTest& model) {
+  const AlidadeSensor sensor = *c.sensor;
+  const void* const self = c.self;
+  const auto count = roles.size();
+  const std::vector<int> y = model.Initialised();
+  const auto is_y = [y](std::size_t i) { return std::ranges::count(y, static_cast<int>(i)) > 0; };
+  const int prior = c.description->prior_count;
+  Function f{"Initialise", {}, {}, {}, 0, false, {}};
+  int n = 0;
+  for (const int i : y) {
+    f.outputs.push_back(roles[static_cast<std::size_t>(i)]);
+    n += f.outputs.back().geometry.tangent;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (is_y(i)) continue;
+    f.slots.push_back(static_cast<int>(i));
+    f.matrices.push_back({n, roles[i].geometry.tangent});
+  }
+  f.slots.push_back(model.measurement_slot());
+  f.matrices.push_back({n, z.geometry.tangent});
+  if (prior > 0) {
+    f.slots.push_back(model.measurement_slot() + 1);
+    f.matrices.push_back({n, prior});
+  }
+  f.differentiated = static_cast<int>(f.slots.size());
+  const bool knows = model.known_slot >= 0;
+  if (knows) f.slots.push_back(model.known_slot);
+  f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
+                                    const std::int32_t* strides) {
+    std::vector<const double*> all(count, nullptr);
+    std::vector<double*> jx(count, nullptr);
+    std::vector<std::int32_t> jx_strides(count, 0);
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (is_y(i)) continue;
+      all[i] = in[k];
+      jx[i] = j[k];
+      jx_strides[i] = strides[k++];
+    }
+    const bool has_prior = prior > 0, apart = outputs.size() > 1;
+    std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
+    const AlidadeObservation seen =
+        detail::Seen(in[k], knows ? in[k + (has_prior ? 2 : 1)] : nullptr);
+    const std::int32_t code = sensor.initialise(
+        self, &seen, all.data(), has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
+        jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
+        has_prior ? strides[k + 1] : 0);
+    if (apart) Scatter(row, outputs, out);
+    return code;
+  };
+  model.functions.push_back(std::move(f));
+}
+
+void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool has_input,
+               ModelUnderTest& model) {
+  const AlidadeMotion motion = *c.motion;
+  const void* const self = c.self;
+  const int count = static_cast<int>(blocks.size()), n_w = c.description->noise_count;
+  const int dt = static_cast<int>(model.slots.size()) - 1;
+  int n = 0;
+  for (const Space& block : blocks) n += block.geometry.tangent;
+  model.functions.push_back({"Step",
+                             FirstSlots(dt + 1),
+                             blocks,
+                             {{n, n}, {n, n_w}},
+                             count + 1,
+                             false,
+                             [=](const double* const* in, double* const* out, double* const* j,
+                                 const std::int32_t* strides) {
+                               return motion.step(self, in, has_input ? in + count + 1 : nullptr,
+                                                  in[count], in[dt][0], out, j[0], strides[0], j[1],
+                                                  strides[1], nullptr, 0);
+                             }});
+  if (n_w == 0) return;
+  std::vector<int> slots = FirstSlots(count);
+  slots.push_back(dt);
+  if (has_input) slots.push_back(count + 1);
+  model.functions.push_back(
+      {"SqrtQ",
+       std::move(slots),
+       {},
+       {{n_w, n_w}},
+       0,
+       true,
+       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
+                                                   double* const* l, const std::int32_t* strides) {
+         if (CopyGiven(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
+         return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
+                              strides[0]);
+       }});
+}
+
+std::string ValueText(const std::vector<double>& value) {
+  if (value.empty()) return "none";
+  std::string text;
+  for (std::size_t i = 0; i < value.size() && i < 16; ++i) {
+    text += (i > 0 ? ", " : "") + RoundedText(value[i], 6);
+  }
+  if (value.size() > 16) text += ", ...";
+  return value.size() == 1 ? text : '(' + text + ')';
+}
+
+}  // namespace
+
+Buffer::Buffer(int rows, int columns)
+    : rows_(rows),
+      columns_(columns),
+      cells_(2 * std::size_t{kGuard} +
+                 static_cast<std::size_t>(rows) * (static_cast<std::size_t>(columns) + kGap),
+             kGuardWord) {
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) cells_[Index(r, c)] = kPoison;
+  }
+}
+
+bool Buffer::Untouched() const { return *this == Buffer(rows_, columns_); }
+
+bool Buffer::GuardsWhole() const {
+  const Buffer fresh(rows_, columns_);
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    if (Same(fresh.cells_[i], kGuardWord) && !Same(cells_[i], kGuardWord)) return false;
+  }
+  return true;
+}
+
+bool operator==(const Buffer& a, const Buffer& b) {
+  return a.rows_ == b.rows_ && a.columns_ == b.columns_ &&
+         std::equal(a.cells_.begin(), a.cells_.end(), b.cells_.begin(), Same);
+}
+
+bool Unwritten(double cell) { return Same(cell, kPoison); }
+
+ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
+    : instance(std::move(from)) {
+  const AlidadeInstance& c = instance->c();
+  slots = instance->spaces();
+  if (is_sensor()) {
+    slots.push_back(instance->space());
+    const int prior = c.description->prior_count;
+    if (prior > 0) slots.push_back(Named("prior", Geometry::Vector(prior)));
+    if (!instance->known().name.empty()) {
+      known_slot = static_cast<int>(slots.size());
+      slots.push_back(instance->known());
+    }
+    AddSensor(c, instance->spaces(), instance->space(), *this);
+    if ((instance->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
+      AddInitialise(c, instance->spaces(), instance->space(), *this);
+    }
+    return;
+  }
+  const bool has_input = instance->has_input();
+  slots.push_back(Named("w", Geometry::Vector(c.description->noise_count)));
+  if (has_input) slots.push_back(instance->space());
+  slots.push_back(Named("dt", Geometry::Vector(1)));
+  AddMotion(c, instance->spaces(), has_input, *this);
+}
+
+std::vector<int> ModelUnderTest::Initialised() const {
+  const SensorModel sensor(instance);
+  std::vector<int> roles(static_cast<std::size_t>(sensor.inverse().count));
+  std::iota(roles.begin(), roles.end(), sensor.inverse().role);
+  return roles;
+}
+
+const Function* ModelUnderTest::Find(const std::string& name) const {
+  const auto found = std::find_if(functions.begin(), functions.end(),
+                                  [&](const Function& f) { return f.name == name; });
+  return found == functions.end() ? nullptr : &*found;
+}
+
+Answer CallFunction(const Function& function, const Values& inputs, int matrices) {
+  Answer answer;
+  std::vector<const double*> in;
+  std::vector<double*> out, wanted;
+  std::vector<std::int32_t> strides;
+  const Values given(inputs.begin(), inputs.end());  // lent: the model may write to it
+  for (const auto& input : given) in.push_back(input.empty() ? nullptr : input.data());
+  for (const Space& space : function.outputs)
+    answer.outputs.emplace_back(1, space.geometry.ambient);
+  for (const Shape& shape : function.matrices) {
+    answer.matrices.emplace_back(shape.rows, shape.columns);
+  }
+  for (Buffer& buffer : answer.outputs) out.push_back(buffer.data());
+  for (std::size_t i = 0; i < function.matrices.size(); ++i) {
+    Buffer& buffer = answer.matrices[i];
+    // The Jacobian by a role that is not bound does not exist.
+    const bool exists =
+        buffer.columns() > 0 && (!function.jacobian_per_input() || in[i] != nullptr);
+    const bool asked = matrices == kAllMatrices || matrices == static_cast<int>(i);
+    wanted.push_back(exists && (asked || function.is_noise) ? buffer.data() : nullptr);
+    strides.push_back(buffer.stride());
+  }
+  PoisonStack();
+  answer.code = function.call(in.data(), out.data(), wanted.data(), strides.data());
+  for (std::size_t i = 0; i < given.size() && answer.written_input < 0; ++i) {
+    if (!std::ranges::equal(given[i], inputs[i], Same)) answer.written_input = static_cast<int>(i);
+  }
+  return answer;
+}
+
+std::string StateText(const std::vector<Space>& spaces, const Values& values) {
+  std::string text;
+  for (std::size_t i = 0; i < spaces.size(); ++i) {
+    if (spaces[i].geometry.ambient == 0) continue;
+    text += (text.empty() ? "" : ", ") + spaces[i].name + " = " + ValueText(values[i]);
+  }
+  return text;
+}
+
+}  // namespace alidade::internal

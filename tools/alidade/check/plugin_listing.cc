@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/check/plugin_listing.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <tuple>
+#include <utility>
+
+#include "alidade/base/words.h"
+#include "alidade/estimation/built_in.h"
+#include "alidade/io/json.h"
+#include "alidade/io/text_table.h"
+#include "alidade/plugin/plugin_file.h"
+
+namespace alidade {
+namespace {
+
+using internal::EstimatorType;
+using internal::EstimatorTypes;
+using internal::FindEstimatorType;
+using internal::Join;
+using internal::Json;
+using internal::KindName;
+using internal::TextRow;
+using internal::TextTable;
+
+std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
+  std::vector<const PluginEntry*> entries;
+  for (const PluginEntry& entry : host.entries()) entries.push_back(&entry);
+  std::sort(entries.begin(), entries.end(), [](const PluginEntry* a, const PluginEntry* b) {
+    return std::tie(a->kind, a->name, a->plugin) < std::tie(b->kind, b->name, b->plugin);
+  });
+  return entries;
+}
+
+/// `keys`, and those that every estimator has.
+std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
+  const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
+                       std::vector<std::string> choices = {}) {
+    keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
+  };
+  add("sensors", "list", "all", "names of those it uses, in the order of their updates");
+  add("use", "choice or map", "all", "or {accepted_by: NAME}: what that filter accepted");
+  add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
+  add("on_plugin_failure", "choice", "skip",
+      "a call of a sensor that fails: leave that measurement out, or the sensor, or end the run",
+      {"skip", "disable", "abort"});
+  add("overrides", "map", "none",
+      "its own state, sensors, landmarks and initial_time_s, merged in");
+  return keys;
+}
+
+std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) {
+  const std::vector<ParamInfo> keys = host.Schema(entry);
+  return entry.kind == PluginEntry::Kind::kEstimator ? WithCommonKeys(keys) : keys;
+}
+
+/// The entries called `name`; there may be none for a built-in estimator only.
+std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
+  std::vector<const PluginEntry*> entries = Sorted(host);
+  std::vector<std::string> names;
+  for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
+  for (const PluginEntry* entry : entries) names.push_back(entry->name);
+  std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
+  if (entries.empty() && FindEstimatorType(name) == nullptr) {
+    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
+                                             "a name that `alidade plugins list` prints, or a "
+                                             "type of estimator",
+                                             Nearest(name, names)) +
+                                       "\n" + PluginPlaces(host));
+  }
+  return entries;
+}
+
+std::string Parameters(const std::vector<ParamInfo>& schema) {
+  std::vector<TextRow> rows = {
+      {"parameter", "unit", "type", "range", "default", "only where", "meaning"}};
+  for (const ParamInfo& info : schema) {
+    // The keys that a source lists itself have no type.
+    const std::string fallback =
+        !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
+    const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");
+    rows.push_back({info.key, info.unit, info.type, range, fallback, info.when, info.doc});
+  }
+  return rows.size() > 1 ? TextTable(rows, 2) : "  no parameters\n";
+}
+
+Json JsonOf(const PluginEntry& entry) {
+  return {{"name", entry.name}, {"kind", KindName(entry.kind)}, {"family", entry.family},
+          {"doc", entry.doc},   {"citation", entry.citation},   {"file", entry.plugin.string()}};
+}
+
+Json JsonOf(const std::vector<ParamInfo>& schema) {
+  Json parameters = Json::array();
+  for (const ParamInfo& info : schema) {
+    Json json = {
+        {"key", info.key}, {"unit", info.unit}, {"type", info.type}, {"range", info.range}};
+    if (!info.fallback.empty()) json["default"] = info.fallback;
+    json["choices"] = info.choices;
+    json["when"] = info.when;
+    json["doc"] = info.doc;
+    parameters.push_back(std::move(json));
+  }
+  return parameters;
+}
+
+}  // namespace
+
+std::string PluginList(const PluginHost& host, bool files) {
+  std::vector<TextRow> rows = {{"name", "kind", "description", "file"}};
+  for (const PluginEntry* entry : Sorted(host)) {
+    rows.push_back({entry->name, KindName(entry->kind), entry->doc, entry->plugin.string()});
+  }
+  const std::string none = rows.size() > 1 ? "" : "\nno plugin was found\n";
+  for (const EstimatorType& type : EstimatorTypes()) {
+    rows.push_back({type.name, KindName(PluginEntry::Kind::kEstimator), type.doc, "built in"});
+  }
+  for (TextRow& row : rows) {
+    if (!files) row.pop_back();
+  }
+  return TextTable(rows) + none;
+}
+
+std::string PluginListJson(const PluginHost& host) {
+  Json json = Json::array();
+  for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
+  for (const EstimatorType& type : EstimatorTypes()) {
+    json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0,
+                           &type.support, type.kind}));
+  }
+  return internal::JsonText(json);
+}
+
+std::string PluginInfo(const PluginHost& host, const std::string& name) {
+  std::string text;
+  if (const EstimatorType* type = FindEstimatorType(name)) {
+    text =
+        name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
+  }
+  for (const PluginEntry* entry : Named(host, name)) {
+    if (!text.empty()) text += '\n';
+    text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
+    if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
+    text += "  plugin: " + entry->plugin.string() + '\n';
+    text += '\n';
+    const std::vector<std::string> lines = host.Describe(*entry);
+    for (const std::string& line : lines) text += "  " + line + '\n';
+    if (!lines.empty()) text += '\n';
+    text += Parameters(KeysOf(host, *entry));
+  }
+  return text;
+}
+
+std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
+  Json json = Json::array();
+  if (const EstimatorType* type = FindEstimatorType(name)) {
+    json.push_back({{"name", type->name},
+                    {"kind", "estimator"},
+                    {"doc", type->doc},
+                    {"parameters", JsonOf(WithCommonKeys(type->schema()))}});
+  }
+  for (const PluginEntry* entry : Named(host, name)) {
+    Json& one = json.emplace_back(JsonOf(*entry));
+    one["describes"] = host.Describe(*entry);
+    one["parameters"] = JsonOf(KeysOf(host, *entry));
+  }
+  return internal::JsonText(json);
+}
+
+}  // namespace alidade

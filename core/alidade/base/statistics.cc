@@ -1,21 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/base/statistics.h"
 
-#include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "alidade/base/error.h"
 
 namespace alidade {
+namespace {
+
+/// y^a e^-y / Gamma(a).
+double GammaKernel(double a, double y) {
+  constexpr double kSmall = 10.0;
+  if (a <= kSmall) return std::pow(y, a) * std::exp(-y) / std::tgamma(a);
+  // By Stirling's series of ln Gamma(a), of which the next term is below 1e-15, and with the two
+  // large terms of the exponent taken together: a (ln(y / a) - mu).
+  const double mu = (y - a) / a, square = 1.0 / (a * a);
+  const double log_ratio = mu < -0.5 ? std::log(y / a) : std::log1p(mu);
+  constexpr double kSeries[] = {1.0 / 12.0,    -1.0 / 360.0, 1.0 / 1260.0,
+                                -1.0 / 1680.0, 1.0 / 1188.0, -691.0 / 360360.0};
+  double stirling = 0.0, power = 1.0 / a;
+  for (const double coefficient : kSeries) {
+    stirling += coefficient * power;
+    power *= square;
+  }
+  return std::sqrt(a / (2.0 * std::numbers::pi)) * std::exp(a * (log_ratio - mu) - stirling);
+}
+
+/// Probabilities that a value of chi-square is below and above x.
+struct Tails {
+  double below, above;
+};
+
+/// The regularised incomplete gamma functions P(a, y) and Q(a, y), a = dof / 2, y = x / 2: the
+/// smaller one by its series or its continued fraction, the other one as its complement
+/// [Press2007, sec. 6.2].
+Tails ChiSquareTails(double x, double dof) {
+  const double a = 0.5 * dof, y = 0.5 * x;
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  if (!(y > 0.0)) return {0.0, 1.0};
+  const double kernel = GammaKernel(a, y);
+  if (y < a + 1.0) {
+    double term = 1.0 / a, sum = term;
+    for (double k = a + 1.0; term > 0.1 * kEpsilon * sum; k += 1.0) sum += term *= y / k;
+    return {kernel * sum, 1.0 - kernel * sum};
+  }
+  // Lentz's method; no denominator vanishes, for y > a - 1.
+  double b = y + 1.0 - a, c = std::numeric_limits<double>::max(), d = 1.0 / b, fraction = d;
+  for (double k = 1.0, factor = 0.0; std::abs(factor - 1.0) > kEpsilon; k += 1.0) {
+    b += 2.0;
+    d = 1.0 / (k * (a - k) * d + b);
+    c = b + k * (a - k) / c;
+    factor = c * d;
+    fraction *= factor;
+  }
+  return {1.0 - kernel * fraction, kernel * fraction};
+}
+
+}  // namespace
 
 double ChiSquareQuantile(double q, double dof) {
   ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0.0);
+  if (q == 0.0) return 0.0;
   if (q == 1.0) return std::numeric_limits<double>::infinity();
-  return boost::math::quantile(boost::math::chi_squared(dof), q);
+  // By the tail that is not rounded to 1.
+  const auto is_below = [q, dof](double x) {
+    const Tails tails = ChiSquareTails(x, dof);
+    return q <= 0.5 ? tails.below < q : tails.above > 1.0 - q;
+  };
+  double low = 0.0, high = dof;
+  while (is_below(high)) {
+    low = high;
+    high *= 2.0;
+  }
+  while (true) {
+    const double middle = 0.5 * (low + high);
+    if (middle <= low || middle >= high) return high;
+    (is_below(middle) ? low : high) = middle;
+  }
 }
 
 Interval ConsistencyBounds(double dof, double n, double cut) {
@@ -23,135 +88,13 @@ Interval ConsistencyBounds(double dof, double n, double cut) {
   double m = 1.0, v = 2.0 / dof;
   if (std::isfinite(cut)) {
     // x chi2(x; dof) = dof chi2(x; dof + 2), of the densities.
-    const auto below = [cut](double k) {
-      return boost::math::cdf(boost::math::chi_squared(k), cut);
-    };
+    const auto below = [cut](double k) { return ChiSquareTails(cut, k).below; };
     const double all = below(dof);
     m = below(dof + 2.0) / all;
     v = (dof + 2.0) / dof * below(dof + 4.0) / all - m * m;
   }
   const double nu = 2.0 * n * m * m / v;
   return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
-}
-
-double AutocorrelationTime(const std::vector<double>& series, double mean) {
-  const Eigen::VectorXd x = Eigen::VectorXd::Map(series.data(), std::ssize(series)).array() - mean;
-  const Eigen::Index n = x.size();
-  const double square = x.squaredNorm();
-  if (!(square > 0.0) || !std::isfinite(square)) return 1.0;
-  const auto rho = [&](Eigen::Index k) { return x.head(n - k).dot(x.tail(n - k)) / square; };
-  double tau = -1.0;
-  for (Eigen::Index k = 0; k + 1 < n; k += 2) {
-    const double pair = rho(k) + rho(k + 1);
-    if (!(pair > 0.0)) break;
-    tau += 2.0 * pair;
-  }
-  return std::clamp(tau, 1.0, static_cast<double>(n));
-}
-
-namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// A series less its mean, with the sums of its first k values and squares.
-struct Centred {
-  Eigen::VectorXd values, sums, squares;
-
-  explicit Centred(const std::vector<double>& series)
-      : values(Eigen::VectorXd::Map(series.data(), static_cast<Eigen::Index>(series.size()))),
-        sums(values.size() + 1),
-        squares(values.size() + 1) {
-    const double scale = values.cwiseAbs().maxCoeff();
-    values.array() -= values.mean();
-    // What is left of a constant is rounding.
-    if (!(values.cwiseAbs().maxCoeff() > 1e-13 * scale)) values.setZero();
-    sums[0] = squares[0] = 0.0;
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      sums[i + 1] = sums[i] + values[i];
-      squares[i + 1] = squares[i] + values[i] * values[i];
-    }
-  }
-  double Sum(Eigen::Index first, Eigen::Index count) const {
-    return sums[first + count] - sums[first];
-  }
-  /// Sum of squares about the mean of the window.
-  double Spread(Eigen::Index first, Eigen::Index count) const {
-    const double sum = Sum(first, count);
-    return squares[first + count] - squares[first] - sum * sum / static_cast<double>(count);
-  }
-};
-
-/// The samples of two series of n values where both are, one `shift` after the other.
-struct Overlap {
-  Eigen::Index signal, reference, count;
-
-  Overlap(Eigen::Index n, Eigen::Index shift)
-      : signal(std::max<Eigen::Index>(0, shift)),
-        reference(std::max<Eigen::Index>(0, -shift)),
-        count(n - std::abs(shift)) {}
-};
-
-/// Correlation coefficient of reference(i) and signal(i + shift).
-double Correlation(const Centred& signal, const Centred& reference, Eigen::Index shift) {
-  const Overlap o(reference.values.size(), shift);
-  const double product =
-      reference.values.segment(o.reference, o.count).dot(signal.values.segment(o.signal, o.count)) -
-      reference.Sum(o.reference, o.count) * signal.Sum(o.signal, o.count) /
-          static_cast<double>(o.count);
-  const double spread = reference.Spread(o.reference, o.count) * signal.Spread(o.signal, o.count);
-  return spread > 0.0 ? product / std::sqrt(spread) : kNaN;
-}
-
-/// Minus the mean of (reference(i) - signal(i + shift))^2.
-double Closeness(const std::vector<double>& signal, const std::vector<double>& reference,
-                 Eigen::Index shift) {
-  const Overlap o(std::ssize(reference), shift);
-  const auto r = Eigen::VectorXd::Map(reference.data() + o.reference, o.count);
-  const auto s = Eigen::VectorXd::Map(signal.data() + o.signal, o.count);
-  return -(r - s).squaredNorm() / static_cast<double>(o.count);
-}
-
-/// Whether the series looks like itself at every shift up to `reach`, but for offset and scale.
-bool IsRamp(const Centred& series, Eigen::Index reach) {
-  constexpr double kAlike = 0.9;
-  for (Eigen::Index k = 1; k <= reach; ++k) {
-    if (!(Correlation(series, series, k) > kAlike)) return false;
-  }
-  return true;
-}
-
-/// Where a parabola through the largest score and its neighbours has its top, from the middle. NaN
-/// where the largest one is at the edge, or no higher than its neighbours but for rounding.
-double Peak(const Eigen::VectorXd& scores) {
-  constexpr double kRounding = 1e-12;
-  const Eigen::Index middle = scores.size() / 2;
-  Eigen::Index best = 0;
-  if (!scores.allFinite()) return kNaN;
-  scores.maxCoeff(&best);
-  if (best == 0 || best == scores.size() - 1) return kNaN;
-  const double before = scores[best - 1], after = scores[best + 1];
-  const double curvature = before - 2.0 * scores[best] + after;
-  if (!(curvature < -kRounding)) return kNaN;
-  return static_cast<double>(best - middle) + 0.5 * (before - after) / curvature;
-}
-
-}  // namespace
-
-double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step) {
-  ALIDADE_EXPECTS(signal.size() == reference.size());
-  constexpr Eigen::Index kMinSize = 8, kMaxShift = 2000;
-  const Eigen::Index n = static_cast<Eigen::Index>(signal.size());
-  if (n < kMinSize) return kNaN;
-  const Centred s(signal), r(reference);
-  if (!s.values.allFinite() || s.values.isZero(0.0) || r.values.isZero(0.0)) return kNaN;
-  const Eigen::Index reach = std::min(n / 4, kMaxShift);
-  const bool ramp = IsRamp(r, reach);
-  const double variance = r.Spread(0, n) / static_cast<double>(n);
-  Eigen::VectorXd scores(2 * reach + 1);
-  for (Eigen::Index k = -reach; k <= reach; ++k) {
-    scores[k + reach] = ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
-  }
-  return Peak(scores) * step;
 }
 
 double Quantile(const std::vector<double>& ascending, double q) {
@@ -166,6 +109,7 @@ double Quantile(const std::vector<double>& ascending, double q) {
 }
 
 Spread SpreadOf(std::vector<double> values) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::erase_if(values, [](double value) { return std::isnan(value); });
   if (values.empty()) return {kNaN, kNaN, kNaN, kNaN};
   std::sort(values.begin(), values.end());
@@ -173,27 +117,6 @@ Spread SpreadOf(std::vector<double> values) {
   for (const double value : values) sum += value;
   return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
           Quantile(values, 0.95)};
-}
-
-Settling SettlingOf(const std::vector<double>& rms) {
-  constexpr std::ptrdiff_t kFewest = 40, kReach = 4;
-  constexpr double kBand = 0.2;
-  const std::ptrdiff_t n = std::ssize(rms);
-  if (n < kFewest) return {kNaN, kNaN};
-  std::vector<double> last(rms.begin() + n / 2, rms.end());
-  std::ranges::sort(last);
-  const double level = Quantile(last, 0.5);
-  const auto values = Eigen::VectorXd::Map(rms.data(), n);
-  std::ptrdiff_t outside = n - kReach - 1;  // the last centre that is outside the band, or -1
-  for (; outside >= 0; --outside) {
-    const std::ptrdiff_t reach = std::min(outside, kReach);
-    const auto window = values.segment(outside - reach, 2 * reach + 1);
-    const double centred = window.norm() / std::sqrt(static_cast<double>(window.size()));
-    if (!(std::abs(centred - level) <= kBand * level)) break;
-  }
-  const bool never = outside == n - kReach - 1;
-  return {level,
-          never ? std::numeric_limits<double>::infinity() : static_cast<double>(outside + 2)};
 }
 
 }  // namespace alidade

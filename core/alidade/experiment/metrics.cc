@@ -17,6 +17,7 @@
 #include "alidade/experiment/implied_state.h"
 #include "alidade/experiment/joint_nees.h"
 #include "alidade/experiment/similarity.h"
+#include "alidade/experiment/time_series.h"
 #include "alidade/model/geometry.h"
 #include "alidade/state/element_names.h"
 

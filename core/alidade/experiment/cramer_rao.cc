@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "alidade/estimation/linear.h"
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/model/landmark.h"
 
 namespace alidade::internal {

@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/state/quaternion_sign.h"
 
 namespace alidade::internal {

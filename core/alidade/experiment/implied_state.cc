@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 
 namespace alidade::internal {
 namespace {

@@ -12,12 +12,12 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
 #include "alidade/base/words.h"
-#include "alidade/estimation/truth_match.h"
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/implied_state.h"
 #include "alidade/experiment/joint_nees.h"
 #include "alidade/experiment/similarity.h"
 #include "alidade/experiment/time_series.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/model/geometry.h"
 #include "alidade/state/element_names.h"
 

@@ -7,8 +7,8 @@
 
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
-#include "alidade/estimation/built_in.h"
 #include "alidade/estimation/compression.h"
+#include "alidade/experiment/estimator_types.h"
 #include "alidade/plugin/calibration.h"
 #include "alidade/plugin/plugin_host.h"
 

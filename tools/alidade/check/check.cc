@@ -9,7 +9,7 @@
 #include "alidade/base/words.h"
 #include "alidade/check/check_context.h"
 #include "alidade/check/plugin_listing.h"
-#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/estimator_types.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/plugin_file.h"
 

@@ -12,9 +12,9 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/check/explain_parts.h"
-#include "alidade/estimation/built_in.h"
 #include "alidade/estimation/observability.h"
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/calibration.h"
 

@@ -7,7 +7,7 @@
 #include "alidade/base/statistics.h"
 #include "alidade/base/words.h"
 #include "alidade/check/explain_parts.h"
-#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/estimator_types.h"
 
 namespace alidade::internal {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "alidade/base/words.h"
-#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/estimator_types.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/plugin_file.h"

@@ -7,7 +7,7 @@
 #include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
-#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/estimator_types.h"
 #include "alidade/experiment/named_estimator.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/calibration.h"

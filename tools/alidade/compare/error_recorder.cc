@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/estimation/truth_match.h"
 #include "alidade/experiment/joint_nees.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/record/errors_file.h"
 
 namespace alidade::internal {

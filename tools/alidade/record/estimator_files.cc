@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
-#include "alidade/estimation/truth_match.h"
 #include "alidade/experiment/frame_innovation.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/record/estimate_series.h"
 #include "alidade/state/element_names.h"
 

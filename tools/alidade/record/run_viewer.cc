@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/record/feature_trails.h"
 #include "alidade/record/images.h"
 #include "alidade/record/map_from_above.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade::internal {

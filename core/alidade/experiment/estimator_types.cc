@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/built_in.h"
+#include "alidade/experiment/estimator_types.h"
 
 #include <algorithm>
 #include <memory>

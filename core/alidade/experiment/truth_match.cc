@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/truth_match.h"
+#include "alidade/experiment/truth_match.h"
 
 #include <algorithm>
 #include <string_view>

@@ -107,8 +107,8 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries, c
               CheckOptions options) {
   options.other_keys = true;
   bool failed = false, any = false;
-  constexpr std::pair<const char*, PluginEntry::Kind> kSections[] = {
-      {"state", PluginEntry::Kind::kMotion}, {"sensors", PluginEntry::Kind::kSensor}};
+  constexpr std::pair<const char*, const char*> kSections[] = {{"state", kMotionKind},
+                                                               {"sensors", kSensorKind}};
   for (const auto& [section, kind] : kSections) {
     const auto map = config.root().Find(section);
     if (!map) continue;

@@ -11,6 +11,8 @@
 #include <thread>
 
 #include "alidade/check/plugin_listing.h"
+#include "alidade/experiment/estimator_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/state/vector_kernels.h"
 #include "command.h"
 #include "console.h"
@@ -91,7 +93,7 @@ std::string RemedyFor(const Refusal& refusal) {
 /// A filter is compared with a batch, which is built only if its solver is installed.
 void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
   const auto is_batch = [](const PluginEntry& entry) {
-    return entry.kind == PluginEntry::Kind::kEstimator && entry.estimator == EstimatorKind::kBatch;
+    return entry.kind == kEstimatorKind && EstimatorOf(entry).kind == EstimatorKind::kBatch;
   };
   const auto batch = std::ranges::find_if(host.entries(), is_batch);
   if (batch != host.entries().end()) {
@@ -108,11 +110,11 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   for (const Refusal& refusal : host.refusals()) {
     diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));
   }
-  const auto count = [&](PluginEntry::Kind kind) {
+  const auto count = [&](const char* kind) {
     return static_cast<int>(std::ranges::count(host.entries(), kind, &PluginEntry::kind));
   };
-  const int sources = count(PluginEntry::Kind::kSource);
-  const int estimators = count(PluginEntry::Kind::kEstimator);
+  const int sources = count(kSourceKind);
+  const int estimators = count(kEstimatorKind);
   const int models = static_cast<int>(host.entries().size()) - sources - estimators;
   const auto counted = [](int n, const char* what) {
     return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");

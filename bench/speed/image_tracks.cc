@@ -27,6 +27,7 @@
 #include "alidade/base/error.h"
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/experiment.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/io/read_file.h"
 #include "bench/speed/interleaved.h"
 #include "support/temporary_folder.h"
@@ -199,7 +200,7 @@ int Main(int argc, char** argv) {
 
   const testing::TemporaryFolder temporary;
   const PluginHost host;
-  const auto scene = host.CreateSource(Config::FromFile(example + "/scene.yaml"), 1);
+  const auto scene = CreateSource(host, Config::FromFile(example + "/scene.yaml"), 1);
   SourceFrame frame;
   for (int k = 0; scene->Next(frame); ++k) {
     GreyImage drawn = scene->Draw(0);

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
@@ -13,14 +13,13 @@ namespace alidade {
 /// it is loaded when its source is made. Errors: kPlugin, kNotTrusted, those of the source.
 inline std::unique_ptr<Source> CreateOnDemand(const std::string& name,
                                               const SourceArguments& arguments) {
-  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
-      name, {},
+  const void* const factory = internal::FactoryOnDemand(
+      kSourceKind, name, {},
       ErrorLine(arguments.entry.place(), arguments.entry.path(),
                 "this build of alidade reads no images",
                 "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
                 "again"));
-  if (plugin.table->source_count != 1) internal::Refuse(plugin.file, "has not the one source");
-  return plugin.table->sources[0].create(arguments);
+  return static_cast<const SourceEntry*>(factory)->create(arguments);
 }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "depth_target.h"
 
 ALIDADE_SOURCE_PLUGIN({"depth_target",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <opencv2/core/utils/logger.hpp>
 
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/record/images.h"
 #include "mat_writer.h"
 #include "window_process.h"
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/record/images.h"
 #include "mat_writer.h"
 
 namespace alidade {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "models.h"
 
 ALIDADE_SOURCE_PLUGIN({"models",

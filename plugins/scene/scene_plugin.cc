@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "scene.h"
 
 ALIDADE_SOURCE_PLUGIN({"scene", "simulator: points in space, seen by a camera that moves",

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 #include "alidade/plugin/source.h"
 #include "support/program.h"
@@ -656,7 +657,7 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
   const PluginHost host;
   // Of 5 that are found outside, all are lost; where it is more than half, the filter is wrong.
   for (const int aside : {0, 5, 1000}) {
-    const auto source = host.CreateSource(config, 1);
+    const auto source = CreateSource(host, config, 1);
     Aside guide(aside, 3.0);
     SourceFrame first, second;
     ASSERT_TRUE(source->Next(first));
@@ -711,7 +712,7 @@ class EstimatedNoise : public ImageTracks {
     Config config = Config::FromFile((folder_ / "config.yaml").string());
     config.Set("source.path", (folder_ / "scene/images").string(), "test");
     const PluginHost host;
-    const auto source = host.CreateSource(config, 1);
+    const auto source = CreateSource(host, config, 1);
     SourceFrame frame;
     ASSERT_TRUE(source->Next(frame));
     std::map<std::int64_t, Measurement> first;
@@ -784,7 +785,7 @@ TEST_F(ImageTracks, AreFoundWithoutAGuideThatIsFarOff) {
   Config config = Config::FromFile((folder_ / "config.yaml").string());
   config.Set("source.path", (folder_ / "scene/images").string(), "test");
   const PluginHost host;
-  const auto source = host.CreateSource(config, 1);
+  const auto source = CreateSource(host, config, 1);
   Aside guide(1000, 200.0);
   SourceFrame first, second;
   ASSERT_TRUE(source->Next(first));

@@ -35,6 +35,11 @@ std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& suppor
 
 }  // namespace
 
+const char* ToString(EstimatorKind kind) {
+  constexpr const char* kNames[] = {"filter", "smoother", "batch", "sliding_window"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
 std::optional<Unsupported> FindUnsupported(const System& system, const Support& support) {
   if (auto found = OfBlocks(system, support)) return found;
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {

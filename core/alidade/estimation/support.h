@@ -8,6 +8,17 @@
 
 namespace alidade {
 
+/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
+/// can be compared with.
+enum class EstimatorKind {
+  kFilter,    ///< takes each measurement once, as it comes
+  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
+  kBatch,  ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
+  kSlidingWindow,  ///< solves for the last states anew
+};
+/// `filter`, `smoother`, `batch`, `sliding_window`.
+const char* ToString(EstimatorKind kind);
+
 /// What an estimator can do with a system, beyond blocks that are estimated or constant.
 struct Support {
   bool consider = false;          ///< consider blocks and roles (Schmidt)

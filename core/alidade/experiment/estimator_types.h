@@ -7,9 +7,8 @@
 
 #include "alidade/config/config.h"
 #include "alidade/estimation/ekf.h"
-#include "alidade/estimation/support.h"
+#include "alidade/experiment/estimator_plugin.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
 

@@ -7,6 +7,7 @@
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/named_estimator.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
 #include "alidade/plugin/calibration.h"
@@ -252,8 +253,8 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
   experiment.out_of_sequence = ReadOutOfSequence(config.root());
-  experiment.source = host.CreateSource(
-      config, experiment.seed, experiment.out_of_sequence.policy != OutOfSequence::kReject);
+  experiment.source = CreateSource(host, config, experiment.seed,
+                                   experiment.out_of_sequence.policy != OutOfSequence::kReject);
   const Config calibrated = internal::WithCalibration(config, *experiment.source);
   source.RejectUnread();
   const Node root = calibrated.root();

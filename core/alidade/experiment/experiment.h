@@ -11,6 +11,7 @@
 
 #include "alidade/config/config.h"
 #include "alidade/estimation/estimator.h"
+#include "alidade/estimation/support.h"
 #include "alidade/estimation/system.h"
 #include "alidade/plugin/plugin_host.h"
 

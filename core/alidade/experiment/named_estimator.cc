@@ -15,8 +15,13 @@
 namespace alidade::internal {
 namespace {
 
-/// What a plugin's estimator that does not say is given: it refuses by itself what it cannot do.
-constexpr Support kUnsaid = {.consider = true, .at_measurement = true, .from_measurement = true};
+/// What the estimator of a plugin can do. One that does not say refuses by itself what it cannot do.
+const Support& SupportOf(const PluginEntry& entry) {
+  static constexpr Support kUnsaid = {
+      .consider = true, .at_measurement = true, .from_measurement = true};
+  const Support* const support = EstimatorOf(entry).support;
+  return support != nullptr ? *support : kUnsaid;
+}
 
 /// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
 int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
@@ -89,7 +94,7 @@ void CheckName(const std::string& name, const Node& entry) {
   std::vector<std::string> of_core, of_plugins;
   for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
+    if (entry.kind == kEstimatorKind) of_plugins.push_back(entry.name);
   }
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
@@ -108,7 +113,7 @@ void CheckName(const std::string& name, const Node& entry) {
 /// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
 const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind == PluginEntry::Kind::kEstimator && entry.name == type) return entry;
+    if (entry.kind == kEstimatorKind && entry.name == type) return entry;
   }
   if (!host.complete()) FailOffered(type, host.Complete(), node);
   FailOffered(type, host, node);
@@ -321,12 +326,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const EstimatorType* const of_core = FindEstimatorType(named.type);
   const PluginEntry* const of_plugin =
       of_core == nullptr ? &FindOffered(named.type, host, type) : nullptr;
-  named.kind = of_core != nullptr ? of_core->kind : of_plugin->estimator;
-  const Support& support = of_core != nullptr              ? of_core->support
-                           : of_plugin->support != nullptr ? *of_plugin->support
-                                                           : kUnsaid;
+  named.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
+  const Support& support = of_core != nullptr ? of_core->support : SupportOf(*of_plugin);
   const EstimatorMaker make =
-      of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
+      of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }

@@ -8,7 +8,6 @@
 
 #include "alidade/base/words.h"
 #include "alidade/plugin/abi_read.h"
-#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/given_noise.h"
 #include "alidade/plugin/param_reader.h"
 #include "alidade/plugin/plugin_file.h"
@@ -20,8 +19,8 @@ namespace {
 using internal::ParamReader;
 using internal::ParamRecorder;
 
-std::uint32_t ToKind(PluginEntry::Kind kind) {
-  return kind == PluginEntry::Kind::kSensor ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
+std::uint32_t ToKind(const std::string& kind) {
+  return kind == kSensorKind ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
 }
 
 /// For what takes some microseconds, as most creations do: to look again takes less than to sleep.
@@ -66,16 +65,14 @@ class NewInstance {
   AlidadeInstance c_{};
 };
 
-std::string Named(PluginEntry::Kind kind, const std::string& name) {
-  const bool model = kind != PluginEntry::Kind::kSource && kind != PluginEntry::Kind::kEstimator;
-  return std::string(model ? "model" : internal::KindName(kind)) + " '" + name + "'";
+std::string Named(const PluginEntry& entry) {
+  return (entry.is_model() ? "model" : entry.kind) + " '" + entry.name + "'";
 }
 
 [[noreturn]] void FailCreation(const PluginEntry& entry, const Node& node, const std::string& why) {
-  throw Error(ExitCode::kPlugin,
-              ErrorLine(node.place(), node.path(),
-                        Named(entry.kind, entry.name) + " of plugin " + entry.plugin.string() +
-                            " failed while being created: " + why));
+  throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
+                                           Named(entry) + " of plugin " + entry.plugin.string() +
+                                               " failed while being created: " + why));
 }
 
 std::string Line(const std::string& what, const Space& space) {
@@ -113,38 +110,10 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   return lines;
 }
 
-/// What `create` of a C++ plugin makes of its parameters, checked.
-template <class Create>
-auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mutex& mutex,
-                 const Create& create) {
-  ParamReader reader(node, Named(entry.kind, entry.name));
-  Params params(&reader.host());
-  decltype(create(params)) made;
-  try {
-    const auto lock = LockShortly(mutex);
-    made = create(params);
-  } catch (const Error&) {
-    reader.Check();
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& e) {
-    reader.Check();
-    FailCreation(entry, node, e.what());
-  } catch (...) {
-    reader.Check();
-    FailCreation(entry, node, "an exception of unknown type");
-  }
-  reader.Check();
-  if (!reader.failure().empty()) node.Fail(reader.failure());
-  if (made == nullptr) FailCreation(entry, node, "it gives nothing");
-  return made;
-}
-
-/// The `keys` of a source: `key  meaning` on each line.
-std::vector<ParamInfo> ListedKeys(const char* keys) {
+/// The `keys` of a factory: `key  meaning` on each line.
+std::vector<ParamInfo> ListedKeys(const std::string& keys) {
   std::vector<ParamInfo> result;
-  std::istringstream lines(keys == nullptr ? "" : keys);
+  std::istringstream lines(keys);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
     ParamInfo info;
@@ -166,27 +135,11 @@ AlidadeEntry PluginHost::EntryOf(const PluginEntry& entry) const {
   throw ContractViolation("no such entry: " + entry.name);
 }
 
-const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
-  const CppPluginTable& table = *LoadedFrom(entry.plugin).cpp_table;
-  for (int i = 0; i < table.source_count; ++i) {
-    if (entry.name == table.sources[i].name) return table.sources[i];
-  }
-  throw ContractViolation("no such entry: " + entry.name);
-}
-
-const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
-  const CppPluginTable& table = *LoadedFrom(entry.plugin).cpp_table;
-  for (int i = 0; i < table.estimator_count; ++i) {
-    if (entry.name == table.estimators[i].name) return table.estimators[i];
-  }
-  throw ContractViolation("no such entry: " + entry.name);
-}
-
 std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
                                                         const std::string& representation) const {
   const AlidadeEntry c = EntryOf(entry);
   const std::optional<Node> covariance = internal::GivenCovariance(node, c.kind);
-  ParamReader reader(node, Named(entry.kind, entry.name), representation, covariance.has_value());
+  ParamReader reader(node, Named(entry), representation, covariance.has_value());
   NewInstance instance(entry);
   std::int32_t code;
   {
@@ -208,71 +161,74 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
 
 SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,
                                      const std::string& representation) const {
-  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, representation));
+  return SensorModel(Create(Find(kSensorKind, name, entry), entry, representation));
 }
 
 MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
-  return MotionModel(Create(Find(PluginEntry::Kind::kMotion, name, entry), entry));
+  return MotionModel(Create(Find(kMotionKind, name, entry), entry));
 }
 
-std::unique_ptr<Source> PluginHost::CreateSource(const Config& config, std::uint64_t seed,
-                                                 bool any_order) const {
-  const Node node = config.root().At("source", "a run: where measurements come from");
-  const PluginEntry& entry =
-      Find(PluginEntry::Kind::kSource, node.At("type", "a source").Text(), node);
-  return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
-    return SourceOf(entry).create(
-        SourceArguments{node, params, seed, config.folder(), any_order, &config, this});
-  });
-}
-
-EstimatorMaker PluginHost::CreateEstimator(const std::string& name, const Node& node) const {
-  const PluginEntry& entry = Find(PluginEntry::Kind::kEstimator, name, node);
-  return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
-    return EstimatorOf(entry).create(EstimatorArguments{node, params});
-  });
+void PluginHost::CallFactory(const PluginEntry& entry, const Node& node,
+                             const std::function<bool(Params&)>& call) const {
+  ParamReader reader(node, Named(entry));
+  Params params(&reader.host());
+  bool made = false;
+  try {
+    const auto lock = LockShortly(create_mutex_);
+    made = call(params);
+  } catch (const Error&) {
+    reader.Check();
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& e) {
+    reader.Check();
+    FailCreation(entry, node, e.what());
+  } catch (...) {
+    reader.Check();
+    FailCreation(entry, node, "an exception of unknown type");
+  }
+  reader.Check();
+  if (!reader.failure().empty()) node.Fail(reader.failure());
+  if (!made) FailCreation(entry, node, "it gives nothing");
 }
 
 std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   ParamRecorder recorder;
   const std::lock_guard lock(create_mutex_);
-  if (entry.kind != PluginEntry::Kind::kSource && entry.kind != PluginEntry::Kind::kEstimator) {
-    const AlidadeEntry c = EntryOf(entry);
-    recorder.Run([&] {
-      NewInstance instance(entry);
-      static_cast<void>(instance.Create(c, recorder.host()));
-    });
-    return recorder.Result();
-  }
-  const bool is_source = entry.kind == PluginEntry::Kind::kSource;
-  const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
+  const AlidadeEntry c = EntryOf(entry);
+  recorder.Run([&] {
+    NewInstance instance(entry);
+    static_cast<void>(instance.Create(c, recorder.host()));
+  });
+  return recorder.Result();
+}
+
+std::vector<ParamInfo> PluginHost::FactorySchema(const PluginEntry& entry,
+                                                 const std::function<void(Params&)>& call) const {
+  ParamRecorder recorder;
+  const std::lock_guard lock(create_mutex_);
   recorder.Run([&] {
     Params params(&recorder.host());
     try {
-      if (is_source) {
-        static_cast<void>(SourceOf(entry).create(SourceArguments{stand_in.root(), params, 1, {}}));
-      } else {
-        static_cast<void>(EstimatorOf(entry).create(EstimatorArguments{stand_in.root(), params}));
-      }
+      call(params);
     } catch (...) {
       // It wants a file, say, that stand-ins do not give; what it read before counts.
     }
   });
-  std::vector<ParamInfo> result = ListedKeys(is_source ? SourceOf(entry).keys : nullptr);
+  std::vector<ParamInfo> result = ListedKeys(entry.keys);
   for (const ParamInfo& info : recorder.Result()) result.push_back(info);
   return result;
 }
 
 std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
-  if (entry.kind == PluginEntry::Kind::kSource || entry.kind == PluginEntry::Kind::kEstimator) {
-    return {};
-  }
+  if (!entry.is_model()) return {};
   ParamRecorder recorder;
   NewInstance instance(entry);
   const std::lock_guard lock(create_mutex_);
   if (instance.Create(EntryOf(entry), recorder.host()) != ALIDADE_OK) return {};
   const ModelInstance model(instance.Release(), entry.name, entry.plugin.string());
-  const bool sensor = entry.kind == PluginEntry::Kind::kSensor;
+  const bool sensor = entry.kind == kSensorKind;
   std::vector<std::string> lines;
   for (const Space& space : model.spaces()) lines.push_back(Line(sensor ? "role" : "block", space));
   if (!model.space().name.empty()) {

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "alidade/base/words.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/instruction_sets.h"
@@ -56,8 +57,8 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
   return plugin;
 }
 
-PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
-                            const std::string& missing) {
+const void* FactoryOnDemand(const std::string& kind, const std::string& name,
+                            const std::filesystem::path& folder, const std::string& missing) {
   std::filesystem::path searched = folder;
   if (searched.empty()) {
     const std::filesystem::path program = FolderOfProgram();
@@ -75,8 +76,9 @@ PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path
   if (files.size() > 1)
     Refuse(searched, "holds " + std::to_string(files.size()) + " plugins; expected one");
   const OpenedPlugin opened = OpenPlugin(files.front(), files.front());
-  if (opened.cpp_table == nullptr) Refuse(files.front(), "holds models alone");
-  return {files.front(), opened.cpp_table};
+  if (opened.cpp_table == nullptr || opened.cpp_table->entries[0].kind != kind)
+    Refuse(files.front(), "does not offer " + WithArticle(kind));
+  return opened.cpp_table->entries[0].factory;
 }
 
 }  // namespace alidade::internal

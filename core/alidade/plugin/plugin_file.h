@@ -42,17 +42,12 @@ bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& na
 /// its symbolic links resolved. Errors: kPlugin, kNotTrusted.
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
-/// A C++ plugin that is loaded only when it is needed.
-struct PluginOnDemand {
-  std::filesystem::path file;
-  const CppPluginTable* table;
-};
-
-/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` next to this library.
-/// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one,
-/// or one of models; those of OpenPlugin.
-PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
-                            const std::string& missing);
+/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` next to this library,
+/// and returns the factory of its first entry, of the kind `kind`. Errors: kPlugin if there is no
+/// plugin, made of `missing` and where it was searched, or more than one, or one of another kind;
+/// those of OpenPlugin.
+const void* FactoryOnDemand(const std::string& kind, const std::string& name,
+                            const std::filesystem::path& folder, const std::string& missing);
 
 /// Whether the entry is of a kind that this version knows; another is left out.
 bool IsKnown(const AlidadeEntry& entry);
@@ -60,9 +55,6 @@ bool IsKnown(const AlidadeEntry& entry);
 /// What breaks the rules of plugin_abi.h or cpp_plugin.h in a table, or "".
 std::string Defect(const AlidadeTable* table);
 std::string Defect(const CppPluginTable* table);
-
-/// `sensor`, `motion model`, `source`, `estimator`.
-const char* KindName(PluginEntry::Kind kind);
 
 }  // namespace internal
 

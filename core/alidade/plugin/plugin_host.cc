@@ -18,7 +18,6 @@ namespace alidade {
 namespace fs = std::filesystem;
 namespace {
 
-using internal::KindName;
 using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
@@ -34,8 +33,8 @@ std::optional<fs::path> UserFolder() {
 /// The origin of places that are given.
 constexpr const char* kGiven = "given";
 
-PluginEntry::Kind ToKind(std::uint32_t kind) {
-  return kind == ALIDADE_KIND_SENSOR ? PluginEntry::Kind::kSensor : PluginEntry::Kind::kMotion;
+const char* ToKind(std::uint32_t kind) {
+  return kind == ALIDADE_KIND_SENSOR ? kSensorKind : kMotionKind;
 }
 
 }  // namespace
@@ -152,15 +151,10 @@ void PluginHost::Load(const fs::path& file) {
 
 void PluginHost::AddEntries(const Loaded& plugin) {
   if (plugin.cpp_table != nullptr) {
-    for (int i = 0; i < plugin.cpp_table->source_count; ++i) {
-      const SourceEntry& source = plugin.cpp_table->sources[i];
-      entries_.push_back(
-          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file});
-    }
-    for (int i = 0; i < plugin.cpp_table->estimator_count; ++i) {
-      const EstimatorEntry& one = plugin.cpp_table->estimators[i];
-      entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.support, one.kind});
+    for (int i = 0; i < plugin.cpp_table->entry_count; ++i) {
+      const CppEntry& entry = plugin.cpp_table->entries[i];
+      entries_.push_back({entry.kind, entry.name, Text(entry.doc), Text(entry.citation), "",
+                          plugin.file, 0, Text(entry.keys), entry.factory});
     }
     return;
   }
@@ -180,43 +174,39 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   }
 }
 
-const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& name,
-                                    const Node& entry) const {
+const PluginEntry& PluginHost::Find(const std::string& kind, const std::string& name,
+                                    const Node& node) const {
   const auto matches = [&](const PluginEntry& e) { return e.kind == kind && e.name == name; };
   const auto found = std::find_if(entries_.begin(), entries_.end(), matches);
-  if (found == entries_.end()) FailMissing(kind, name, entry);
+  if (found == entries_.end()) FailMissing(kind, name, node);
   const auto other = std::find_if(found + 1, entries_.end(), matches);
   if (other != entries_.end()) {
-    throw Error(ExitCode::kPlugin,
-                ErrorLine(entry.place(), entry.path(),
-                          std::string("two plugins offer the ") + KindName(kind) + " '" + name +
-                              "': " + found->plugin.string() + " and " + other->plugin.string() +
-                              "; remove one of them"));
+    throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
+                                             "two plugins offer the " + kind + " '" + name +
+                                                 "': " + found->plugin.string() + " and " +
+                                                 other->plugin.string() + "; remove one of them"));
   }
   return *found;
 }
 
-void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
-                             const Node& entry) const {
-  if (!complete()) Complete().FailMissing(kind, name, entry);
-  const bool model = kind != PluginEntry::Kind::kSource && kind != PluginEntry::Kind::kEstimator;
-  const char* const key = model ? "model" : "type";
-  const Node at = entry.is_map() ? entry.Find(key).value_or(entry) : entry;
-  std::string what = std::string("no plugin offers the ") + KindName(kind) + " '" + name + "'";
+void PluginHost::FailMissing(const std::string& kind, const std::string& name,
+                             const Node& node) const {
+  if (!complete()) Complete().FailMissing(kind, name, node);
+  const char* const key = kind == kSensorKind || kind == kMotionKind ? "model" : "type";
+  const Node at = node.is_map() ? node.Find(key).value_or(node) : node;
+  std::string what = "no plugin offers the " + kind + " '" + name + "'";
   std::vector<std::string> names;
   for (const PluginEntry& other : entries_) {
     if (other.kind == kind && other.name == name) {
       throw Error(ExitCode::kPlugin,
                   ErrorLine(at.place(), at.path(),
-                            std::string("the ") + KindName(kind) + " '" + name + "' of " +
-                                other.plugin.string() +
+                            "the " + kind + " '" + name + "' of " + other.plugin.string() +
                                 " is asked for, but not named in the config, so that the plugin "
                                 "was not opened",
                             "its name in the config, or the plugin in `plugins:`"));
     }
     if (other.kind == kind) names.push_back(other.name);
-    if (other.name == name)
-      what += "; there is " + WithArticle(KindName(other.kind)) + " of that name";
+    if (other.name == name) what += "; there is " + WithArticle(other.kind) + " of that name";
   }
   ExitCode code = ExitCode::kPlugin;
   for (const Refusal& refusal : refusals_) {
@@ -235,11 +225,6 @@ const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
   const auto found = std::find_if(loaded_.begin(), loaded_.end(), same);
   ALIDADE_EXPECTS(found != loaded_.end());
   return **found;
-}
-
-const char* ToString(EstimatorKind kind) {
-  constexpr const char* kNames[] = {"filter", "smoother", "batch", "sliding_window"};
-  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::string PluginPlaces(const PluginHost& host) {

@@ -12,20 +12,10 @@
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/model/params.h"
 #include "alidade/plugin/model_instance.h"
-#include "alidade/plugin/source.h"
 
 namespace alidade {
-
-class Estimator;        // in alidade/estimation/estimator.h
-struct Support;         // in alidade/estimation/support.h
-struct System;          // in alidade/estimation/system.h
-struct SourceEntry;     // in alidade/plugin/cpp_plugin.h
-struct EstimatorEntry;  // likewise
-
-/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
-using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
-    const System& system, const std::vector<StreamInfo>& streams)>;
 
 /// One parameter of a model, as declared by being read.
 struct ParamInfo {
@@ -37,25 +27,20 @@ struct ParamInfo {
   std::string when;  ///< `noise_model = constant` where only that choice reads it, else ""
 };
 
-/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
-/// can be compared with.
-enum class EstimatorKind {
-  kFilter,    ///< takes each measurement once, as it comes
-  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
-  kBatch,  ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
-  kSlidingWindow,  ///< solves for the last states anew
-};
-/// `filter`, `smoother`, `batch`, `sliding_window`.
-const char* ToString(EstimatorKind kind);
+/// The kinds of models; those of C++ plugins are named by the headers of their interfaces.
+inline constexpr const char* kSensorKind = "sensor";
+inline constexpr const char* kMotionKind = "motion model";
 
-/// A model, source or estimator that a loaded plugin offers.
+/// A model, or a factory of a C++ plugin, that a loaded plugin offers.
 struct PluginEntry {
-  enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
+  std::string kind;  ///< kSensorKind, kMotionKind, or that of the factory
   std::string name, doc, citation, family;
-  std::filesystem::path plugin;      ///< the file it came from
-  unsigned thread_flags = 0;         ///< ALIDADE_THREAD_*; of a source or estimator 0
-  const Support* support = nullptr;  ///< of an estimator: EstimatorEntry::support
-  EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
+  std::filesystem::path plugin;   ///< the file it came from
+  unsigned thread_flags = 0;      ///< ALIDADE_THREAD_*; of a factory 0
+  std::string keys = {};          ///< of a factory: CppEntry::keys
+  const void* factory = nullptr;  ///< CppEntry::factory; of a model null
+
+  bool is_model() const { return factory == nullptr; }
 };
 
 /// Why a file in a searched folder was not loaded.
@@ -95,11 +80,14 @@ class PluginHost {
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
                                               const std::string& representation = {}) const;
-  /// The source of a config, of its map `source`; `any_order` as in SourceArguments.
-  std::unique_ptr<Source> CreateSource(const Config& config, std::uint64_t seed,
-                                       bool any_order = false) const;
-  /// The maker of an estimator whose options are in `entry`; its errors are the same.
-  EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
+  /// The only entry of that kind and name, which `node` asks for. Errors: kPlugin with the places
+  /// searched if there is none, and if there are two.
+  const PluginEntry& Find(const std::string& kind, const std::string& name, const Node& node) const;
+  /// Runs `call`, which calls the factory of `entry` with the parameters in `node` and returns
+  /// whether it made something; one call at a time. Errors: those of the parameters before those of
+  /// the factory, kPlugin for anything else that it throws.
+  void CallFactory(const PluginEntry& entry, const Node& node,
+                   const std::function<bool(Params&)>& call) const;
 
   /// Whether no plugin was left closed for its names.
   bool complete() const { return !only_; }
@@ -109,6 +97,9 @@ class PluginHost {
   const std::vector<PluginEntry>& entries() const { return entries_; }
   /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
   std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
+  /// The keys of a factory, and the parameters that `call` reads with stand-in values.
+  std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
+                                       const std::function<void(Params&)>& call) const;
   /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
   /// each, for `plugins info`.
   std::vector<std::string> Describe(const PluginEntry& entry) const;
@@ -124,13 +115,10 @@ class PluginHost {
   void Load(const std::filesystem::path& file);
   void AddEntries(const Loaded& plugin);
 
-  const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;
-  [[noreturn]] void FailMissing(PluginEntry::Kind kind, const std::string& name,
-                                const Node& entry) const;
+  [[noreturn]] void FailMissing(const std::string& kind, const std::string& name,
+                                const Node& node) const;
   const Loaded& LoadedFrom(const std::filesystem::path& file) const;
   AlidadeEntry EntryOf(const PluginEntry& entry) const;
-  const SourceEntry& SourceOf(const PluginEntry& entry) const;
-  const EstimatorEntry& EstimatorOf(const PluginEntry& entry) const;
 
   const std::vector<std::filesystem::path> given_;
   const std::optional<std::set<std::string>> only_;

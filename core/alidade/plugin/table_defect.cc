@@ -3,6 +3,7 @@
 #include <set>
 #include <utility>
 
+#include "alidade/base/words.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_file.h"
@@ -33,17 +34,10 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   return {};
 }
 
-template <class Entry>
-std::string BuildDefect(const Entry* entries, int count, const char* kind) {
-  std::set<std::string> names;
-  for (int i = 0; i < count; ++i) {
-    const Entry& entry = entries[i];
-    if (!GoodName(entry.name)) return std::string(kind) + " has no name";
-    if (entry.create == nullptr) return std::string(entry.name) + " cannot be created";
-    if (!names.insert(entry.name).second) {
-      return std::string("its table names '") + entry.name + "' twice";
-    }
-  }
+std::string EntryDefect(const CppEntry& entry) {
+  if (Text(entry.kind).empty()) return "an entry of its table has no kind";
+  if (!GoodName(entry.name)) return WithArticle(entry.kind) + " has no name";
+  if (entry.factory == nullptr) return std::string(entry.name) + " cannot be created";
   return {};
 }
 
@@ -90,27 +84,17 @@ std::string Defect(const CppPluginTable* table) {
   if (table->struct_size != sizeof(CppPluginTable)) {
     return "its table states a size of " + Number(table->struct_size) + " bytes";
   }
-  const int sources = table->sources == nullptr ? 0 : table->source_count;
-  const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
-  const bool other = table->images != nullptr || table->adjust != nullptr;
-  if (sources < 1 && estimators < 1 && !other) return "its table is empty";
-  std::string defect = BuildDefect(table->sources, sources, "a source");
-  if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");
-  return defect;
-}
-
-const char* KindName(PluginEntry::Kind kind) {
-  switch (kind) {
-    case PluginEntry::Kind::kSensor:
-      return "sensor";
-    case PluginEntry::Kind::kMotion:
-      return "motion model";
-    case PluginEntry::Kind::kSource:
-      return "source";
-    case PluginEntry::Kind::kEstimator:
-      return "estimator";
+  if (table->entries == nullptr || table->entry_count < 1) return "its table is empty";
+  std::set<std::pair<std::string, std::string>> names;
+  for (int i = 0; i < table->entry_count; ++i) {
+    const CppEntry& entry = table->entries[i];
+    const std::string defect = EntryDefect(entry);
+    if (!defect.empty()) return defect;
+    if (!names.emplace(entry.kind, entry.name).second) {
+      return std::string("its table names '") + entry.name + "' twice";
+    }
   }
-  return "";
+  return {};
 }
 
 }  // namespace alidade::internal

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/estimation/support.h"
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/estimator_plugin.h"
 #include "condensed_run.h"
 #include "fixed_lag.h"
 #include "incremental_solve.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "alidade/estimation/support.h"
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/estimator_plugin.h"
 
 namespace alidade::ceres_batch {
 

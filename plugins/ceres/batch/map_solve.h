@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/model/params.h"
 #include "condensed_run.h"
 
 namespace alidade::ceres_batch {

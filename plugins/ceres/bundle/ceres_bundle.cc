@@ -11,7 +11,6 @@
 #include <memory>
 
 #include "alidade/bundle/bundle.h"
-#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/state/covariance.h"
 #include "alidade/state/dense_algebra.h"
 #include "geometry_manifold.h"

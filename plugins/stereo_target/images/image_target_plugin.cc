@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "image_target.h"
 
 // Opened by the source stereo_target in stereo_target.cc, which has the texts.

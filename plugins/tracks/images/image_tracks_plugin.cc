@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/source_plugin.h"
 #include "image_tracks.h"
 
 // Opened by the source of that name in tracks_plugin.cc, which has the texts.

@@ -2,7 +2,7 @@
 // C++ plugin: an estimator that throws while its options are read, and one without a maker.
 #include <stdexcept>
 
-#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/experiment/estimator_plugin.h"
 
 namespace {
 

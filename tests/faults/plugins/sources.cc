@@ -2,8 +2,8 @@
 // C++ plugin: sources that work and one that throws.
 #include <stdexcept>
 
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/model/camera.h"
-#include "alidade/plugin/cpp_plugin.h"
 
 namespace {
 

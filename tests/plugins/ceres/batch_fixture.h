@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "alidade/experiment/estimator_plugin.h"
 #include "plugins/host/host_fixture.h"
 #include "support/systems.h"
 
@@ -19,13 +20,13 @@ inline const PluginHost& Shipped() {
 /// A batch with these options, one a line.
 inline std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
   const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
-  return Shipped().CreateEstimator("ceres_batch", config.root())(system, StreamsOf(system));
+  return CreateEstimator(Shipped(), "ceres_batch", config.root())(system, StreamsOf(system));
 }
 
 /// A fixed-lag smoother likewise.
 inline std::unique_ptr<Estimator> MakeFixedLag(const System& system, const std::string& options) {
   const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
-  return Shipped().CreateEstimator("fixed_lag", config.root())(system, StreamsOf(system));
+  return CreateEstimator(Shipped(), "fixed_lag", config.root())(system, StreamsOf(system));
 }
 
 /// A point with a linear sensor of 0.3 m; its second block is measured by none.

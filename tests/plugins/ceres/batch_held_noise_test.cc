@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/estimation/rts.h"
+#include "alidade/experiment/estimator_plugin.h"
 #include "batch_fixture.h"
 
 namespace alidade {
@@ -72,8 +73,8 @@ std::vector<Frame> Frames(int count, int parts) {
 std::unique_ptr<Estimator> Make(const char* type, const std::string& options) {
   const System system = HeldSystem();
   const Config config = Config::FromText(std::string("type: ") + type + "\n" + options, "e.yaml");
-  return testing::Shipped().CreateEstimator(type, config.root())(system,
-                                                                 testing::StreamsOf(system));
+  return CreateEstimator(testing::Shipped(), type, config.root())(system,
+                                                                  testing::StreamsOf(system));
 }
 
 struct Case {

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/experiment.h"
 #include "batch_landmarks_fixture.h"
 #include "plugins/scene/scene_fixture.h"
@@ -87,7 +88,7 @@ TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");
   const System system = BuildSystem(config.root(), testing::Shipped(), {});
   const Config entry = Config::FromText("type: ceres_batch", "batch.yaml");
-  const auto batch = testing::Shipped().CreateEstimator("ceres_batch", entry.root())(
+  const auto batch = CreateEstimator(testing::Shipped(), "ceres_batch", entry.root())(
       system, made.scene->streams());
   std::vector<Frame> frames;
   for (SourceFrame frame; made.scene->Next(frame);) frames.push_back(frame);

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 
@@ -183,7 +184,7 @@ TEST(CeresBatchLoss, AResidualWithoutAFiniteSquareIsNoSolution) {
   const System system = PointWith({LossKind::kCauchy, 2.0});
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
   const auto batch =
-      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+      CreateEstimator(Shipped(), "ceres_batch", config.root())(system, testing::StreamsOf(system));
   double t_s = 0.0;
   for (const double z : {1.0, 1e160, 1.2}) batch->Process(FrameAt(t_s += 0.1, {{0, z}}));
   std::string said;

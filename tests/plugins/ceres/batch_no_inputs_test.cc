@@ -3,6 +3,7 @@
 // Problems without a noise input: no prior, no process noise. There is nothing to solve for.
 #include <cmath>
 
+#include "alidade/experiment/estimator_plugin.h"
 #include "batch_fixture.h"
 #include "motion_models/constant.h"
 #include "support/landmark_models.h"
@@ -41,7 +42,7 @@ Estimated Estimate(const std::string& options, const System& system,
   const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
   const std::string type = config.root().At("type").Text();
   const auto estimator =
-      testing::Shipped().CreateEstimator(type, config.root())(system, testing::StreamsOf(system));
+      CreateEstimator(testing::Shipped(), type, config.root())(system, testing::StreamsOf(system));
   Estimated result;
   const auto note = [&](const State& state, const UpdateReport& report) {
     result.states.push_back(state);
@@ -137,7 +138,7 @@ TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   for (const std::string& options : {kAll[0], kAll[1]}) {
     SCOPED_TRACE(options);
     const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
-    const auto batch = testing::Shipped().CreateEstimator("ceres_batch", config.root())(
+    const auto batch = CreateEstimator(testing::Shipped(), "ceres_batch", config.root())(
         system, testing::StreamsOf(system));
     for (const Frame& frame : frames) batch->Process(frame);
     if (batch->offline()) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});

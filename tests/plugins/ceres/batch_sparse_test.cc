@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
+#include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/run.h"
 #include "batch_landmarks_fixture.h"
 #include "support/driven.h"
@@ -266,7 +267,7 @@ struct InertialRun {
   }
   Found Solve(const std::string& options) const {
     const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
-    const auto batch = Shipped().CreateEstimator("ceres_batch", config.root())(
+    const auto batch = CreateEstimator(Shipped(), "ceres_batch", config.root())(
         WithLoss(system), {{"fix", 3}, {"readings", 6}});
     return testing::Solve(*batch, frames);
   }

@@ -3,6 +3,7 @@
 // Every shipped model, from its one struct: as a plugin under the engine and the batch, composed at
 // compile time, and under the checker. A model without a row fails.
 #include "alidade/check/check.h"
+#include "alidade/experiment/estimator_plugin.h"
 #include "every_model_fixture.h"
 
 namespace alidade::testing {
@@ -22,7 +23,7 @@ TEST_P(EveryModel, GivesTheBatchItsFactors) {
   }
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
   const std::unique_ptr<Estimator> batch =
-      Shipped().CreateEstimator("ceres_batch", config.root())(system_, AllStreams(system_));
+      CreateEstimator(Shipped(), "ceres_batch", config.root())(system_, AllStreams(system_));
   Ekf ekf(system_, {}, AllStreams(system_));
   const std::vector<Frame> frames = FramesOf(system_, 20);
   for (const Frame& frame : frames) {
@@ -76,9 +77,7 @@ TEST(Models, HaveARow) {
     }
   }
   for (const PluginEntry& entry : Shipped().entries()) {
-    const bool model =
-        entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
-    if (model && fs::equivalent(entry.plugin.parent_path(), ShippedFolder()))
+    if (entry.is_model() && fs::equivalent(entry.plugin.parent_path(), ShippedFolder()))
       shipped.insert(entry.name);
   }
   EXPECT_EQ(rows, shipped) << "a row in tests/plugins/every_model for each model that is shipped";

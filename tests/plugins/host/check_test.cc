@@ -327,9 +327,8 @@ TEST_F(CheckTest, ShippedModelsPass) {
   const std::filesystem::path shipped = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
   int checked = 0;
   for (const PluginEntry& entry : host_.entries()) {
-    const bool model =
-        entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
-    if (!model || entry.plugin.parent_path() != std::filesystem::canonical(shipped)) continue;
+    if (!entry.is_model() || entry.plugin.parent_path() != std::filesystem::canonical(shipped))
+      continue;
     const auto [first, last] = parameters.equal_range(entry.name);
     EXPECT_NE(first, last) << "no parameters here for " << entry.name;
     for (auto row = first; row != last; ++row, ++checked) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "alidade/experiment/estimator_plugin.h"
+#include "alidade/experiment/source_plugin.h"
+#include "alidade/plugin/plugin_file.h"
 #include "host_fixture.h"
 
 namespace alidade {
@@ -9,7 +12,7 @@ namespace {
 TEST_F(HostTest, CreatesASourceOfACppPlugin) {
   const PluginHost host({Built("sources")});
   const Config config = Parse("source: {type: counter, last: 2, unit: sheep}");
-  const auto source = host.CreateSource(config, 1);
+  const auto source = CreateSource(host, config, 1);
   EXPECT_EQ(source->streams().at(0).name, "count");
   SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));
@@ -24,12 +27,12 @@ TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
   const Config incomplete = Parse("source: {type: counter}");
   ExpectError(ExitCode::kPlugin,
               {"source 'throwing_source'", Built("sources").string(), "no such thing"},
-              [&] { host.CreateSource(config, 1); });
+              [&] { CreateSource(host, config, 1); });
   ExpectError(ExitCode::kBadConfig, {"source.last: missing; source 'counter' needs it ([1, 100]"},
-              [&] { host.CreateSource(incomplete, 1); });
+              [&] { CreateSource(host, incomplete, 1); });
   const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
                                     [](const PluginEntry& e) { return e.name == "counter"; });
-  const std::vector<ParamInfo> schema = host.Schema(*counter);
+  const std::vector<ParamInfo> schema = SourceSchema(host, *counter);
   EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
   EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
 }
@@ -41,12 +44,22 @@ TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {
     const char* why = name[0] == 't' ? "no such thing" : "it gives nothing";
     ExpectError(ExitCode::kPlugin,
                 {std::string("estimator '") + name + "'", Built("estimators").string(), why},
-                [&] { host.CreateEstimator(name, config.root()); });
+                [&] { CreateEstimator(host, name, config.root()); });
   }
   ExpectError(ExitCode::kBadConfig, {"gain: missing; estimator 'throwing_estimator' needs it (> 0"},
-              [&] { host.CreateEstimator("throwing_estimator", empty.root()); });
+              [&] { CreateEstimator(host, "throwing_estimator", empty.root()); });
   ExpectError(ExitCode::kPlugin, {"no plugin offers the estimator 'none'", "searched"},
-              [&] { host.CreateEstimator("none", config.root()); });
+              [&] { CreateEstimator(host, "none", config.root()); });
+}
+
+TEST_F(HostTest, APluginOnDemandOfferingAnotherKindIsRefused) {
+  const std::filesystem::path file = Copy("sources", "alone/sources.so");
+  const auto ask = [&](const char* kind) {
+    return internal::FactoryOnDemand(kind, "alone", file.parent_path(), "none");
+  };
+  EXPECT_STREQ(static_cast<const SourceEntry*>(ask(kSourceKind))->name, "counter");
+  ExpectError(ExitCode::kPlugin, {file.string(), "does not offer an estimator"},
+              [&] { ask(kEstimatorKind); });
 }
 
 }  // namespace

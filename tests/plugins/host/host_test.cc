@@ -24,7 +24,7 @@ TEST_F(HostTest, LoadsAPluginAndCreatesItsModel) {
   const auto has_name = [](const PluginEntry& entry) { return entry.name == "probe"; };
   const auto found = std::find_if(host.entries().begin(), host.entries().end(), has_name);
   ASSERT_NE(found, host.entries().end());
-  EXPECT_EQ(found->kind, PluginEntry::Kind::kSensor);
+  EXPECT_EQ(found->kind, kSensorKind);
   EXPECT_EQ(found->doc, "gain times x");
   EXPECT_EQ(found->plugin, fs::canonical(Built("good")));
   const Config config = Parse("model: probe");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Parameters that sensors and source share: the maps `camera` and `landmarks` at the root.
+#include "alidade/experiment/source_plugin.h"
 #include "host_fixture.h"
 #include "support/numeric_jacobian.h"
 
@@ -101,10 +102,10 @@ TEST_F(SharedParametersTest, OtherKeysAreTheEntrysOwn) {
 TEST_F(SharedParametersTest, ASourceSharesThem) {
   const PluginHost host({Built("sources")});
   const Config config = Parse(kCamera + "source: {type: sees}");
-  EXPECT_NO_THROW(host.CreateSource(config, 1));
+  EXPECT_NO_THROW(CreateSource(host, config, 1));
   const Config none = Parse("source: {type: sees}");
   ExpectError(ExitCode::kBadConfig, {"camera.fx: missing; source 'sees' needs it"},
-              [&] { host.CreateSource(none, 1); });
+              [&] { CreateSource(host, none, 1); });
 }
 
 }  // namespace

@@ -186,10 +186,6 @@ std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   return child->is_map() ? TextAt(*child, key.substr(dot + 1)) : std::nullopt;
 }
 
-bool IsModel(const PluginEntry& entry) {
-  return entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
-}
-
 /// `scale_2d`, `scale_2d with noise_model: constant`: a model alone, or with one of its choices.
 std::string With(const PluginEntry& model, const ParamInfo& param, const std::string& choice) {
   return model.name + " with " + param.key + ": " + choice;
@@ -212,7 +208,7 @@ std::set<std::string> UsedBy(const Config& config) {
       const std::string model = node.At("model").Text();
       used.insert(model);
       for (const PluginEntry& entry : AllModels().entries()) {
-        if (!IsModel(entry) || entry.name != model) continue;
+        if (!entry.is_model() || entry.name != model) continue;
         for (const ParamInfo& param : ChoicesOf(entry)) {
           const auto own = TextAt(node, param.key);
           const auto shared = own ? own : TextAt(config.root(), param.key);
@@ -231,7 +227,7 @@ TEST(ModelsProblems, AreThereForEveryModelAndChoice) {
     const fs::path folder = entry.plugin.parent_path();
     const bool ours =
         fs::equivalent(folder, kShippedPlugins) || fs::equivalent(folder, ALIDADE_TEST_PLUGINS);
-    if (!IsModel(entry) || !ours) continue;
+    if (!entry.is_model() || !ours) continue;
     needed.insert(entry.name);
     for (const ParamInfo& param : ChoicesOf(entry)) {
       for (const std::string& choice : param.choices) needed.insert(With(entry, param, choice));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/model/geometry.h"
 #include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
@@ -105,7 +106,7 @@ TEST(GivenNoiseRuns, EveryFilterIsTheKalmanFilter) {
     SCOPED_TRACE(type);
     Config config = testing::Read(kProblem);
     config.Set("estimators.ekf.type", type, "test");
-    const std::unique_ptr<Source> source = Models().CreateSource(config, 3);
+    const std::unique_ptr<Source> source = CreateSource(Models(), config, 3);
     const Experiment experiment = BuildExperiment(config, Models());
     Estimator& filter = *experiment.estimators.at(0).estimator;
     Kalman kalman;

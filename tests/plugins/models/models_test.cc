@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
 #include "support/sanitized.h"
@@ -41,14 +42,14 @@ const PluginHost& Shipped() {
 }
 
 std::vector<SourceFrame> FramesOf(const Config& config, std::uint64_t seed = 1) {
-  const auto source = Shipped().CreateSource(config, seed);
+  const auto source = CreateSource(Shipped(), config, seed);
   std::vector<SourceFrame> frames;
   for (SourceFrame frame; source->Next(frame);) frames.push_back(frame);
   return frames;
 }
 
 std::string Refusal(const std::string& text) {
-  return Message([&] { Shipped().CreateSource(Parse(text), 1); });
+  return Message([&] { CreateSource(Shipped(), Parse(text), 1); });
 }
 
 /// Expects that the mean over `runs` seeds of a metric of the first estimator is 1; no run fails.
@@ -116,7 +117,7 @@ TEST(Models, DrawsLandmarks) {
       EXPECT_TRUE(one.values[0] >= -0.5 && one.values[0] <= 639.5);  // on the image
     }
   }
-  const auto source = Shipped().CreateSource(config, 1);
+  const auto source = CreateSource(Shipped(), config, 1);
   for (int id = 0; id < 30; ++id) {
     const auto place = source->TrueLandmark(id);
     ASSERT_TRUE(place);

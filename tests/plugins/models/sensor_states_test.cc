@@ -11,6 +11,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/experiment/run.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 #include "support/config_text.h"
 #include "support/sanitized.h"
@@ -173,7 +174,7 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
   constexpr int kDraws = testing::kSanitized ? 5 : 600;
   double sum = 0.0, squares = 0.0, lagged = 0.0;
   for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
-    const auto source = TheHost().CreateSource(config, seed);
+    const auto source = CreateSource(TheHost(), config, seed);
     double last = 0.0, before = 0.0;
     for (SourceFrame frame; source->Next(frame);) {
       before = std::exchange(last, frame.truth.back().at(0) - 3.0);

@@ -9,7 +9,6 @@
 #include <set>
 
 #include "alidade/base/words.h"
-#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
@@ -242,15 +241,15 @@ BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           Short(kBundleLossScaleMin) + " to " + Short(kBundleLossScaleMax) +
                               " standard deviations"));
   }
-  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
-      "bundle", folder,
+  const void* const factory = internal::FactoryOnDemand(
+      kBundleAdjusterKind, "bundle", folder,
       ErrorLine({}, {}, "this build of alidade adjusts no bundles",
                 "one that found the Ceres solver: apt-get install libceres-dev, then configure and "
                 "build again"));
-  if (plugin.table->adjust == nullptr) internal::Refuse(plugin.file, "adjusts no bundles");
   const Gauge gauge(problem);
   const double extent = gauge.Extent(problem);
-  BundleResult result = plugin.table->adjust(sensor, problem, options);
+  BundleResult result =
+      static_cast<const BundleAdjusterEntry*>(factory)->adjust(sensor, problem, options);
   const double factor = extent / gauge.Extent(problem);
   if (TellsNoScale(sensor) && factor > 0.0 && factor != 1.0 && std::isfinite(factor))
     gauge.Scale(factor, problem);

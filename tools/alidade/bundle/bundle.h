@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/estimation/robust_loss.h"
+#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/model_instance.h"
 #include "alidade/plugin/plugin_host.h"
 
@@ -108,6 +109,17 @@ int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
 /// in the unit of z, px; 0 where none is used.
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
+inline constexpr const char* kBundleAdjusterKind = "bundle adjuster";
+
+/// The factory of a bundle adjustment: the adjustment itself.
+struct BundleAdjusterEntry {
+  BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
+                         const BundleOptions& options);
+};
+constexpr CppEntry EntryOf(const BundleAdjusterEntry& adjuster) {
+  return {kBundleAdjusterKind, "bundle", "", "", "", &adjuster};
+}
+
 /// Moves cameras, points and, but for what is fixed, intrinsics of `problem` to the minimum. The
 /// pose of the first camera that is used stays. If the sensor measures two numbers, which cannot
 /// determine the scale, cameras and points are scaled about the first camera after the solution, so
@@ -124,3 +136,6 @@ std::vector<std::string> Undetermined(const BundleProblem& problem, const Sensor
                                       const BundleResult& result);
 
 }  // namespace alidade
+
+/// Exports the bundle adjustment of this plugin: ALIDADE_BUNDLE_PLUGIN(&Adjust)
+#define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_CPP_PLUGIN(alidade::BundleAdjusterEntry, {adjust})

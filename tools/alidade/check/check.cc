@@ -11,7 +11,6 @@
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/estimator_types.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
@@ -21,10 +20,6 @@ using internal::Check;
 using internal::ChildEnd;
 using internal::Context;
 using internal::NumberText;
-
-bool IsModel(const PluginEntry& entry) {
-  return entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
-}
 
 /// The child's answers: a verdict, or an error of the set-up with its exit code.
 constexpr char kError = 'E';
@@ -95,7 +90,7 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
 
 std::vector<Finding> CheckModel(const PluginHost& host, const PluginEntry& entry,
                                 const Node& parameters, const CheckOptions& options) {
-  ALIDADE_EXPECTS(IsModel(entry) && options.states > 0 && options.timeout_s > 0.0);
+  ALIDADE_EXPECTS(entry.is_model() && options.states > 0 && options.timeout_s > 0.0);
   std::vector<Finding> findings;
   std::string stopped_by;
   for (const Check& check : internal::kChecks) {
@@ -121,7 +116,7 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
   const auto collect = [&](const auto& matches) {
     if (!found.empty()) return;
     for (const PluginEntry& entry : host.entries()) {
-      if (IsModel(entry) && matches(entry)) found.push_back(entry);
+      if (entry.is_model() && matches(entry)) found.push_back(entry);
     }
   };
   if (!error) collect([&](const PluginEntry& entry) { return entry.plugin == file; });
@@ -137,14 +132,13 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
     const auto other = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
     const bool built_in = internal::FindEstimatorType(plugin) != nullptr;
     if (built_in || other != host.entries().end()) {
-      const std::string is =
-          built_in ? "built-in estimator" : std::string(internal::KindName(other->kind));
+      const std::string is = built_in ? "built-in estimator" : other->kind;
       throw Error(ExitCode::kPlugin,
                   ErrorLine({}, {}, "'" + plugin + "' is " + internal::WithArticle(is),
                             "a sensor or motion model, which is what is checked"));
     }
     for (const PluginEntry& entry : host.entries()) {
-      if (IsModel(entry)) names.push_back(entry.name);
+      if (entry.is_model()) names.push_back(entry.name);
     }
     throw Error(ExitCode::kPlugin,
                 ErrorLine({}, {}, "no plugin '" + plugin + "' with a sensor or motion model", {},
@@ -166,8 +160,8 @@ std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& find
     std::replace(words.begin(), words.end(), '\n', ' ');
     rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, words});
   }
-  return entry.name + " (" + internal::KindName(entry.kind) + " of " + entry.plugin.string() +
-         ")\n" + internal::TextTable(rows, 2);
+  return entry.name + " (" + entry.kind + " of " + entry.plugin.string() + ")\n" +
+         internal::TextTable(rows, 2);
 }
 
 bool AnyFailure(const std::vector<Finding>& findings) {

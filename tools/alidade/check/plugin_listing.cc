@@ -2,15 +2,17 @@
 #include "alidade/check/plugin_listing.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <tuple>
 #include <utility>
 
 #include "alidade/base/words.h"
 #include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace {
@@ -20,15 +22,21 @@ using internal::EstimatorTypes;
 using internal::FindEstimatorType;
 using internal::Join;
 using internal::Json;
-using internal::KindName;
 using internal::TextRow;
 using internal::TextTable;
+
+/// The place of a kind in a list.
+std::ptrdiff_t RankOf(const std::string& kind) {
+  constexpr std::array kOrder = {kSensorKind, kMotionKind, kSourceKind, kEstimatorKind};
+  return std::ranges::find(kOrder, kind) - kOrder.begin();
+}
 
 std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   std::vector<const PluginEntry*> entries;
   for (const PluginEntry& entry : host.entries()) entries.push_back(&entry);
   std::sort(entries.begin(), entries.end(), [](const PluginEntry* a, const PluginEntry* b) {
-    return std::tie(a->kind, a->name, a->plugin) < std::tie(b->kind, b->name, b->plugin);
+    return std::tuple(RankOf(a->kind), a->kind, a->name, a->plugin) <
+           std::tuple(RankOf(b->kind), b->kind, b->name, b->plugin);
   });
   return entries;
 }
@@ -51,8 +59,9 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
 }
 
 std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) {
-  const std::vector<ParamInfo> keys = host.Schema(entry);
-  return entry.kind == PluginEntry::Kind::kEstimator ? WithCommonKeys(keys) : keys;
+  if (entry.kind == kEstimatorKind) return WithCommonKeys(EstimatorSchema(host, entry));
+  if (entry.kind == kSourceKind) return SourceSchema(host, entry);
+  return entry.is_model() ? host.Schema(entry) : std::vector<ParamInfo>();
 }
 
 /// The entries called `name`; there may be none for a built-in estimator only.
@@ -86,8 +95,8 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
 }
 
 Json JsonOf(const PluginEntry& entry) {
-  return {{"name", entry.name}, {"kind", KindName(entry.kind)}, {"family", entry.family},
-          {"doc", entry.doc},   {"citation", entry.citation},   {"file", entry.plugin.string()}};
+  return {{"name", entry.name}, {"kind", entry.kind},         {"family", entry.family},
+          {"doc", entry.doc},   {"citation", entry.citation}, {"file", entry.plugin.string()}};
 }
 
 Json JsonOf(const std::vector<ParamInfo>& schema) {
@@ -109,11 +118,11 @@ Json JsonOf(const std::vector<ParamInfo>& schema) {
 std::string PluginList(const PluginHost& host, bool files) {
   std::vector<TextRow> rows = {{"name", "kind", "description", "file"}};
   for (const PluginEntry* entry : Sorted(host)) {
-    rows.push_back({entry->name, KindName(entry->kind), entry->doc, entry->plugin.string()});
+    rows.push_back({entry->name, entry->kind, entry->doc, entry->plugin.string()});
   }
   const std::string none = rows.size() > 1 ? "" : "\nno plugin was found\n";
   for (const EstimatorType& type : EstimatorTypes()) {
-    rows.push_back({type.name, KindName(PluginEntry::Kind::kEstimator), type.doc, "built in"});
+    rows.push_back({type.name, kEstimatorKind, type.doc, "built in"});
   }
   for (TextRow& row : rows) {
     if (!files) row.pop_back();
@@ -125,8 +134,7 @@ std::string PluginListJson(const PluginHost& host) {
   Json json = Json::array();
   for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
   for (const EstimatorType& type : EstimatorTypes()) {
-    json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0,
-                           &type.support, type.kind}));
+    json.push_back(JsonOf({kEstimatorKind, type.name, type.doc, "", "", ""}));
   }
   return internal::JsonText(json);
 }
@@ -139,7 +147,7 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
   }
   for (const PluginEntry* entry : Named(host, name)) {
     if (!text.empty()) text += '\n';
-    text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
+    text += entry->name + ": " + entry->kind + "\n  " + entry->doc + '\n';
     if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
     text += "  plugin: " + entry->plugin.string() + '\n';
     text += '\n';

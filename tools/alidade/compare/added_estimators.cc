@@ -90,7 +90,7 @@ std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
     if (type.kind == kind) return type.name;
   }
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind == PluginEntry::Kind::kEstimator && entry.estimator == kind) return entry.name;
+    if (entry.kind == kEstimatorKind && EstimatorOf(entry).kind == kind) return entry.name;
   }
   return "";
 }

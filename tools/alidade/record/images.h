@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/source.h"
 #include "alidade/record/run_view.h"
 
@@ -38,6 +39,16 @@ struct ImageArguments {
   int width, height;  ///< px, of images that are drawn from points
 };
 
+inline constexpr const char* kImageWriterKind = "image writer";
+
+/// The factory of an image writer.
+struct ImageWriterEntry {
+  std::unique_ptr<ImageWriter> (*create)(const ImageArguments& arguments);
+};
+constexpr CppEntry EntryOf(const ImageWriterEntry& writer) {
+  return {kImageWriterKind, "images", "", "", "", &writer};
+}
+
 /// Makes the image writer of the C++ plugin in `folder`; of the one that was built with
 /// this library where "". It is loaded when it is first asked for, because its libraries are slow
 /// to load. A window is of a plugin of its own. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
@@ -45,3 +56,6 @@ std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder = {});
 
 }  // namespace alidade
+
+/// Exports the image writer of this plugin: ALIDADE_IMAGE_PLUGIN(&Create)
+#define ALIDADE_IMAGE_PLUGIN(create) ALIDADE_CPP_PLUGIN(alidade::ImageWriterEntry, {create})

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "alidade/experiment/source_plugin.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/io/json.h"
 #include "alidade/record/images.h"
@@ -27,7 +28,7 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
   if (const auto node = entry.Find("seed")) {
     seed = static_cast<std::uint64_t>(node->Integer(0, INT64_MAX));
   }
-  std::unique_ptr<Source> source = host.CreateSource(config, seed);
+  std::unique_ptr<Source> source = CreateSource(host, config, seed);
   entry.Declare("calibration");
   entry.RejectUnread();
   return source;

@@ -168,9 +168,7 @@ std::vector<fs::path> PluginsNamed(const std::vector<Config>& configs, const Plu
   }
   std::vector<fs::path> files;
   for (const PluginEntry& entry : host.entries()) {
-    const bool model =
-        entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
-    if (!(model ? names.models : names.types).contains(entry.name)) continue;
+    if (!(entry.is_model() ? names.models : names.types).contains(entry.name)) continue;
     if (std::ranges::find(files, entry.plugin) == files.end()) files.push_back(entry.plugin);
   }
   return files;

@@ -123,9 +123,7 @@ class Queue {
 /// has opened: which ones a config uses is known only to those who build it.
 bool MayRunInParallel(const PluginHost& host) {
   return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
-    return entry.kind == PluginEntry::Kind::kSource ||
-           entry.kind == PluginEntry::Kind::kEstimator ||
-           (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
+    return !entry.is_model() || (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
   });
 }
 

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/plugin_host.h"
+#include "alidade/plugin/source.h"
+
+/// Sources as C++ plugins.
+namespace alidade {
+
+inline constexpr const char* kSourceKind = "source";
+
+/// The factory of a source.
+struct SourceEntry {
+  const char* name;
+  const char* doc;
+  /// Keys that are not read through Params, one a line: `key  meaning`.
+  const char* keys;
+  std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
+};
+constexpr CppEntry EntryOf(const SourceEntry& source) {
+  return {kSourceKind, source.name, source.doc, "", source.keys, &source};
+}
+
+/// The source of a config, of its map `source`; `any_order` as in SourceArguments. Errors: kPlugin
+/// with the places searched, kBadConfig, those of the source.
+std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
+                                     std::uint64_t seed, bool any_order = false);
+
+/// The parameters of a source, one of the entries of `host`.
+std::vector<ParamInfo> SourceSchema(const PluginHost& host, const PluginEntry& entry);
+
+}  // namespace alidade
+
+/// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
+#define ALIDADE_SOURCE_PLUGIN(...) ALIDADE_CPP_PLUGIN(alidade::SourceEntry, __VA_ARGS__)

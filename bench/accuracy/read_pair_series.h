@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 #include "bench/accuracy/pair_series.h"
 
 namespace alidade::bench {

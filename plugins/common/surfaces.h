@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
+#include "alidade/experiment/source.h"
 #include "alidade/model/camera.h"
-#include "alidade/plugin/source.h"
 
 /// Textured surfaces of a simulated world, and what a camera sees of them.
 namespace alidade {

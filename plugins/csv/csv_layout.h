@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/plugin/source.h"
+#include "alidade/estimation/frame.h"
 
 namespace alidade {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/model/params.h"
-#include "alidade/plugin/source.h"
 #include "trajectory.h"
 
 namespace alidade::scene {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade {
 

@@ -3,7 +3,8 @@
 
 #include <cstdint>
 
-#include "alidade/plugin/source.h"
+#include "alidade/base/timestamp.h"
+#include "alidade/model/params.h"
 
 namespace alidade {
 

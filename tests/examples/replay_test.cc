@@ -22,7 +22,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/experiment/run.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 #include "drives.h"
 
 namespace alidade {

@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
+#include "alidade/experiment/source.h"
 #include "alidade/model/params.h"
 #include "alidade/plugin/param_reader.h"
-#include "alidade/plugin/source.h"
 #include "fuzz.h"
 
 namespace alidade::fuzz {

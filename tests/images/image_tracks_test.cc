@@ -20,9 +20,9 @@
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/experiment/source.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/plugin_host.h"
-#include "alidade/plugin/source.h"
 #include "support/program.h"
 
 namespace alidade {

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "alidade/estimation/frame.h"
 #include "alidade/estimation/system.h"
-#include "alidade/plugin/source.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/model/status.h"
-#include "alidade/plugin/source.h"
 #include "alidade/state/state.h"
 
 namespace alidade {

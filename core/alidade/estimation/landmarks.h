@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmark_representation.h"
-#include "alidade/plugin/source.h"
 #include "alidade/state/eigen_alignment.h"
 
 /// Landmarks: the part of the state that comes and goes with what is seen.

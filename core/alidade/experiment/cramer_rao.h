@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "alidade/estimation/frame_loop.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade::internal {
 

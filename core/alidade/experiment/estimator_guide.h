@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/experiment/experiment.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade::internal {
 

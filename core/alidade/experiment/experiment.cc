@@ -4,13 +4,13 @@
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/filter.h"
+#include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/named_estimator.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/calibration.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade {

@@ -13,6 +13,7 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/support.h"
 #include "alidade/estimation/system.h"
+#include "alidade/experiment/source.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade {

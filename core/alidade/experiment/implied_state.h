@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/estimation/system.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade::internal {
 

@@ -7,7 +7,7 @@
 
 #include "alidade/estimation/landmarks.h"
 #include "alidade/experiment/run.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade::internal {
 

@@ -8,14 +8,14 @@
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/compression.h"
+#include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
-#include "alidade/plugin/calibration.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
 namespace {
 
-/// What the estimator of a plugin can do. One that does not say refuses by itself what it cannot do.
+/// What the estimator of a plugin can do. One that does not state it refuses by itself the rest.
 const Support& SupportOf(const PluginEntry& entry) {
   static constexpr Support kUnsaid = {
       .consider = true, .at_measurement = true, .from_measurement = true};

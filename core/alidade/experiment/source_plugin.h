@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "alidade/experiment/source.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
-#include "alidade/plugin/source.h"
 
 /// Sources as C++ plugins.
 namespace alidade {

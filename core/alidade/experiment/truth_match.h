@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/plugin/source.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {

@@ -14,9 +14,9 @@
 
 #include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmark_representation.h"
 #include "alidade/estimation/timeline.h"
-#include "alidade/plugin/source.h"
 #include "alidade/state/state.h"
 
 namespace alidade::ceres_batch {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade {
 

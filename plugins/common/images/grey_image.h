@@ -3,7 +3,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade {
 

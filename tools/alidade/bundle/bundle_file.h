@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/timestamp.h"
 #include "alidade/bundle/bundle.h"
-#include "alidade/plugin/source.h"
 
 /// Files of bundle adjustment problems.
 ///

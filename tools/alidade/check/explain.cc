@@ -13,10 +13,10 @@
 #include "alidade/base/words.h"
 #include "alidade/check/explain_parts.h"
 #include "alidade/estimation/observability.h"
+#include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/calibration.h"
 
 namespace alidade {
 namespace {

@@ -7,10 +7,10 @@
 #include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
+#include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
 #include "alidade/experiment/named_estimator.h"
 #include "alidade/io/text_table.h"
-#include "alidade/plugin/calibration.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {

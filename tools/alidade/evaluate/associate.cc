@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/evaluate/evaluate.h"
 #include "alidade/io/text_cell.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/plugin/source.h"
+#include "alidade/base/timestamp.h"
 #include "alidade/state/eigen_alignment.h"
 
 namespace alidade {

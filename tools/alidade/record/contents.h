@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/plugin/source.h"
+#include "alidade/base/timestamp.h"
 
 /// What the csv files of a run folder hold, for those who draw them. Columns go by their names.
 namespace alidade::internal {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/source.h"
 #include "alidade/io/sha256.h"
-#include "alidade/plugin/source.h"
 
 namespace alidade::internal {
 

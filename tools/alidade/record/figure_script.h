@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/plugin/source.h"
+#include "alidade/base/timestamp.h"
 
 namespace alidade::internal {
 

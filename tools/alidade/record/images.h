@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/source.h"
 #include "alidade/plugin/cpp_plugin.h"
-#include "alidade/plugin/source.h"
 #include "alidade/record/run_view.h"
 
 namespace alidade {

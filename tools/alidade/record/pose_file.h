@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/experiment/source.h"
 #include "alidade/io/output_folder.h"
-#include "alidade/plugin/source.h"
 
 namespace alidade::internal {
 

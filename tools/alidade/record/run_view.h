@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade {
 

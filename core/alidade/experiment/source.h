@@ -4,33 +4,16 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade/base/timestamp.h"
 #include "alidade/config/config.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/model/params.h"
 
 namespace alidade {
-
-/// One value of one stream.
-struct Measurement {
-  Timestamp timestamp = 0;
-  int stream = 0;  ///< index into Source::streams()
-  std::int64_t landmark = -1;
-  std::vector<double> values;
-  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
-  /// What its sensor takes as known with it: where the satellite was. Mostly empty.
-  std::vector<double> known = {};
-};
-
-/// What was measured at one timestamp, in the order of the source: all that an estimator sees.
-struct Frame {
-  Timestamp timestamp = 0;
-  std::vector<Measurement> measurements;
-};
 
 /// The true values at one timestamp, one for each entry of Source::truths() and of its size; what
 /// is empty, or lacks at the end, is unknown.
@@ -39,14 +22,6 @@ using Truth = std::vector<std::vector<double>>;
 /// What a source gives: a frame, and the truth that it is compared with.
 struct SourceFrame : Frame {
   Truth truth = {};
-};
-
-/// A named stream or truth value of a source.
-struct StreamInfo {
-  std::string name;
-  int size = 1;
-  double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
-  int known = 0;       ///< known numbers that come with each measurement
 };
 
 /// An image, 8 bit grey, row by row from the top.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "alidade/config/config.h"
-#include "alidade/plugin/source.h"
+#include "alidade/experiment/source.h"
 
 namespace alidade::internal {
 

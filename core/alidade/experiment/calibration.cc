@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin/calibration.h"
+#include "alidade/experiment/calibration.h"
 
 #include <optional>
 

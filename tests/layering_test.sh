@@ -21,7 +21,8 @@
 #   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools alone;
 #             of nlohmann-json the forward declarations also in core/alidade/io/json.h, which
 #             names the type for all, and the whole in its test; CLI11 in cli, OpenCV in
-#             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone
+#             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone;
+#             model, state and estimation include Eigen alone, and base the standard library
 #   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
 #   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
@@ -114,6 +115,9 @@ sources() {
           !(path == "nlohmann/json_fwd.hpp" && FILENAME == "core/alidade/io/json.h") &&
           !(path == "nlohmann/json.hpp" && FILENAME == "tests/core/io/json_test.cc"))
         report("library", "only sources of core and tools include " path)
+      if (bracket && path ~ /\// && FILENAME ~ /^core\/alidade\/(model|base|state|estimation)\// &&
+          (path !~ /^Eigen\// || FILENAME ~ /\/base\//))
+        report("library", "estimation includes Eigen alone, base not even that: " path)
       if (path ~ /^CLI\// && folder != "cli" && folder != "bench")
         report("library", "only cli and bench include " path)
       if (path ~ /^ceres\// && own_plugin != "ceres" && folder != "bench")
@@ -331,6 +335,11 @@ done
 for file in core/alidade/experiment/new.cc plugins/csv/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
 done
+for header in boost/math/distributions/chi_squared.hpp spdlog/spdlog.h sys/stat.h; do
+  plant library core/alidade/estimation/new.cc "$licence\n#include <$header>"
+done
+plant library core/alidade/base/new.cc "$licence\n#include <Eigen/Core>"
+allow core/alidade/state/new.h "$licence\n#include <Eigen/Core>\n#include \"alidade/base/error.h\""
 plant library core/alidade/experiment/new.cc "$licence\n#include <ceres/problem.h>"
 plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
 plant library core/alidade/experiment/new.cc "$licence\n#include <opencv2/core.hpp>"

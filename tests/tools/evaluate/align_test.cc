@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "alidade/base/error.h"
 #include "alidade/evaluate/evaluate.h"
 #include "support/trajectories.h"
 

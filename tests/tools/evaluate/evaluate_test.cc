@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/base/error.h"
 #include "support/recording.h"
 #include "support/trajectories.h"
 

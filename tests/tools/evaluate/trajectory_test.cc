@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "alidade/base/error.h"
 #include "support/recording.h"
 
 namespace alidade {

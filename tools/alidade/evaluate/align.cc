@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/error.h"
 #include "alidade/evaluate/evaluate.h"
 
 namespace alidade {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/evaluate/evaluate.h"
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/error.h"
 #include "alidade/base/statistics.h"
 #include "alidade/evaluate/errors.h"
 #include "alidade/evaluate/warnings.h"

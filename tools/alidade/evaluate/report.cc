@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/experiment/metric_rows.h"

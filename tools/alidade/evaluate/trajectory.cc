@@ -8,6 +8,7 @@
 #include <numeric>
 #include <optional>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/io/number_rows.h"
 #include "alidade/state/dense_algebra.h"

@@ -9,8 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/config/config.h"
-#include "alidade/estimation/frame.h"
+#include "alidade/base/timestamp.h"
 #include "alidade/estimation/landmark_representation.h"
 #include "alidade/state/eigen_alignment.h"
 
@@ -54,10 +53,6 @@ struct LandmarkOptions {
   /// What is done where an update leaves an inverse distance at or below zero.
   NegativeDepth negative_depth = NegativeDepth::kKeep;
   std::vector<KnownLandmark> known;
-
-  /// Reads the config's map `landmarks`. `representation`, which the sensors read, is left to them.
-  /// Errors: kBadConfig.
-  static LandmarkOptions FromNode(const Node& node);
 };
 
 /// Matches of landmarks that agree, found by 1-point RANSAC [Civera2010]: one match alone corrects
@@ -69,10 +64,6 @@ struct OnePointRansac {
   double confidence = 0.99;  ///< of having tried one match that is right, when no more are tried
   double rescue_probability =
       0.99;  ///< probability with which a match that fits joins after the update
-
-  /// Reads a sensor's map `outlier_rejection`: `method: one_point_ransac`, and the numbers by these
-  /// names. Errors: kBadConfig.
-  static OnePointRansac FromNode(const Node& node);
 };
 
 /// A landmark in the state, or as it was when it was removed; for the record.

@@ -141,8 +141,8 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   std::optional<BundleFolder> folder;
   if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);
   BundleFile file = Read(arguments, host);
-  const SensorModel sensor = BundleSensor(host, file.problem);
-  const int left_out = LeaveOutUndefined(sensor, file.problem);
+  const SharedSensor sensor = BundleSensor(host, file.problem);
+  const int left_out = LeaveOutUndefined(*sensor, file.problem);
   if (left_out == std::ssize(file.problem.observations)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
@@ -150,7 +150,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
                                                     : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
-  const double before = BundleRms(sensor, file.problem);
+  const double before = BundleRms(*sensor, file.problem);
 
   Progress progress("iterations", arguments.quiet);
   BundleOptions options;
@@ -161,16 +161,16 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   options.stop = StopRequested;
   options.progress = [&](int done) { progress.Show(done, -1); };
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
-  const BundleResult result = AdjustBundle(sensor, file.problem, options);
+  const BundleResult result = AdjustBundle(*sensor, file.problem, options);
   progress.Clear();
-  const double after = BundleRms(sensor, file.problem);
+  const double after = BundleRms(*sensor, file.problem);
 
   std::string text = Describe(file, left_out) + '\n';
   text += "rms " + Short(before) + " px -> " + Short(after) + " px, " + ToString(result.end) +
           " after " + std::to_string(result.iterations) + " iterations, " +
           std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
           " unknowns\n";
-  for (const std::string& line : Undetermined(file.problem, sensor, result)) text += line + '\n';
+  for (const std::string& line : Undetermined(file.problem, *sensor, result)) text += line + '\n';
   if (folder && result.end != BundleEnd::kFailed) {
     const std::vector<std::string> names = folder->Save(file, result, before, after);
     text += "wrote " + arguments.folder + '\n';

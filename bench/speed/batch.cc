@@ -29,8 +29,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/estimator.h"
-#include "alidade/plugin/in_process.h"
 #include "bench/speed/interleaved.h"
 #include "motion_models/quaternion_pose.h"
 #include "plugins/ceres/batch/kkt_covariance.h"
@@ -149,7 +149,7 @@ struct Scene {
 
 System SystemOf(const Scene& scene) {
   System system;
-  const MotionModel motion = InProcessMotion(
+  const SharedMotion motion = MakeMotion(
       QuaternionPose({kAcceleration, kAcceleration, kAcceleration}, {kAngular, kAngular, kAngular}),
       "quaternion_pose");
   MotionBinding binding{"cam", motion, {}};
@@ -162,7 +162,7 @@ System SystemOf(const Scene& scene) {
   const std::array<double, 4> sigmas = {0.0, 0.0, 1.0, 0.5};
   for (std::size_t i = 0; i < 4; ++i) {
     const BlockId id =
-        system.layout.Declare("cam." + motion.blocks()[i].name, "cam", motion.blocks()[i]);
+        system.layout.Declare("cam." + motion->blocks()[i].name, "cam", motion->blocks()[i]);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;
@@ -173,11 +173,11 @@ System SystemOf(const Scene& scene) {
   const Camera camera(2000, 2000, kFocal, kFocal, kCentre, kCentre);
   SensorBinding pixels{"pixels",
                        "pixels",
-                       InProcessSensor(InverseDepthFeature<InverseDepth>(camera, kPixel), "pixels"),
+                       MakeSensor(InverseDepthFeature<InverseDepth>(camera, kPixel), "pixels"),
                        {}};
   SensorBinding depth{"depth",
                       "depth",
-                      InProcessSensor(DepthFeature<InverseDepth>(camera, kPixel, kDepth), "depth"),
+                      MakeSensor(DepthFeature<InverseDepth>(camera, kPixel, kDepth), "depth"),
                       {}};
   for (SensorBinding* sensor : {&pixels, &depth}) {
     sensor->roles.resize(sensor->model.roles().size());

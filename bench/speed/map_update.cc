@@ -8,9 +8,9 @@
 #include <cstdio>
 #include <vector>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/model/model.h"
-#include "alidade/plugin/in_process.h"
 #include "bench/speed/interleaved.h"
 
 namespace alidade::bench {
@@ -50,11 +50,11 @@ double PlaceOf(int landmark, int axis) { return std::sin(1.0 + landmark * (axis 
 
 System MapSystem(BlockStatus bias) {
   System system;
-  const MotionModel walk = InProcessMotion(Walk(), "walk");
+  const SharedMotion walk = MakeMotion(Walk(), "walk");
   for (const char* owner : {"cam", "bias"}) {
     const BlockStatus status = *owner == 'b' ? bias : BlockStatus::kEstimated;
     const std::string name = std::string(owner) + ".position";
-    const BlockId id = system.layout.Declare(name, owner, walk.blocks()[0], status);
+    const BlockId id = system.layout.Declare(name, owner, walk->blocks()[0], status);
     system.motions.push_back({owner, walk, {id}});
     Prior prior;
     prior.block = id;
@@ -62,7 +62,7 @@ System MapSystem(BlockStatus bias) {
     prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
     system.priors.push_back(prior);
   }
-  SensorBinding sensor{"tracks", "tracks", InProcessSensor(Offset(), "offset"), {}};
+  SensorBinding sensor{"tracks", "tracks", MakeSensor(Offset(), "offset"), {}};
   sensor.roles.resize(3);
   sensor.roles[0].block = 0;
   sensor.roles[1].block = 1;

@@ -21,7 +21,7 @@
 #include <numbers>
 #include <vector>
 
-#include "alidade/plugin/in_process.h"
+#include "alidade/estimation/direct_models.h"
 #include "alidade/sweep/sweep.h"
 #include "bench/speed/interleaved.h"
 #include "plugins/ceres/bundle/geometry_manifold.h"
@@ -248,14 +248,14 @@ double QuantileOf(std::vector<double> values, double q) {
 struct Ways {
   PinholeClosed analytic;
   Pinhole automatic;
-  SensorModel abi_analytic = InProcessSensor(analytic, "analytic");
-  SensorModel abi_automatic = InProcessSensor(automatic, "automatic");
+  SharedSensor abi_analytic = MakeSensor(analytic, "analytic");
+  SharedSensor abi_automatic = MakeSensor(automatic, "automatic");
   std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
   std::vector<double> plain{1.0, 0.0, 0.0, 1.0};  // W of 1 px
   CostKind<PinholeClosed> analytic_kind{analytic, places, {kPose, 3}, plain};
   CostKind<Pinhole> automatic_kind{automatic, places, {kPose, 3}, plain};
-  CostKind<SensorModel> abi_analytic_kind{abi_analytic, places, {kPose, 3}, plain};
-  CostKind<SensorModel> abi_automatic_kind{abi_automatic, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_analytic_kind{*abi_analytic, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_automatic_kind{*abi_automatic, places, {kPose, 3}, plain};
 
   static ceres::Manifold* Tangent() {
     return new GeometryManifold(

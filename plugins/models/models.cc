@@ -83,7 +83,7 @@ class Models : public Source {
   };
   struct Sensor {
     const SensorBinding* binding;
-    SensorModel model;  ///< of landmarks that are xyz
+    SharedSensor model;  ///< of landmarks that are xyz
     int stream;
     models::Schedule schedule;
     Random noise;
@@ -163,8 +163,8 @@ class Models : public Source {
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& binding = system_.motions[i];
       Motion motion{&binding, Random(seed, 100 + i), -1, nullptr, {}, {}, {}, 0.0, {}, false};
-      motion.w.resize(static_cast<std::size_t>(binding.model.noise_size()));
-      if (binding.model.has_input()) ReadInput(entry, inputs, motion);
+      motion.w.resize(static_cast<std::size_t>(binding.model->noise_size()));
+      if (binding.model->has_input()) ReadInput(entry, inputs, motion);
       motions_.push_back(std::move(motion));
     }
     if (inputs) inputs->RejectUnread();
@@ -187,7 +187,7 @@ class Models : public Source {
       motion.of = &other;
       return;
     }
-    const Geometry& geometry = motion.binding->model.input().geometry;
+    const Geometry& geometry = motion.binding->model->input().geometry;
     const auto size = static_cast<std::size_t>(geometry.ambient);
     motion.mean.resize(size);
     motion.amplitude.resize(size);
@@ -225,7 +225,7 @@ class Models : public Source {
     for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
       const SensorBinding& binding = system_.sensors[i];
       const auto own = settings ? settings->Find(binding.name) : std::nullopt;
-      const int known = binding.model.known_size();
+      const int known = binding.model->known_size();
       const models::Schedule schedule =
           models::ReadSchedule(own, rate_hz, known, seed, 1001 + 2 * i);
       const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
@@ -249,20 +249,20 @@ class Models : public Source {
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
                           schedule, Random(seed, 1000 + 2 * i), max_per_frame});
       streams_.push_back(
-          {binding.stream, binding.model.measurement().geometry.ambient, 0.0, known});
+          {binding.stream, binding.model->measurement().geometry.ambient, 0.0, known});
     }
     if (settings) settings->RejectUnread();
   }
 
   /// The model with landmarks that are points, or poses.
-  static SensorModel ModelOf(const Node& entry, const SensorBinding& binding) {
-    if (!binding.model.has_landmark()) return binding.model;
+  static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
+    if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
-    if (binding.xyz) return *binding.xyz;
-    if (HasPose(binding.model)) return binding.model;
-    const auto representation = RepresentationOf(binding.model.roles());
+    if (binding.xyz) return binding.xyz;
+    if (HasPose(*binding.model)) return binding.model;
+    const auto representation = RepresentationOf(binding.model->roles());
     if (!representation || !IsXyz(*representation)) {
-      entry.Fail("model '" + binding.model.name() + "' of sensor '" + binding.name +
+      entry.Fail("model '" + binding.model->name() + "' of sensor '" + binding.name +
                      "' has no representation xyz, which the points are drawn in",
                  "a source with landmarks of its own");
     }
@@ -323,8 +323,8 @@ class Models : public Source {
     const double t_s = Time();
     std::vector<std::vector<double>> next = x_;
     for (Motion& motion : motions_) {
-      const MotionModel& model = motion.binding->model;
-      if (model.stationary()) continue;
+      const SharedMotion& model = motion.binding->model;
+      if (model->stationary()) continue;
       std::vector<const double*> blocks;
       std::vector<double*> moved;
       for (const BlockId id : motion.binding->blocks) {
@@ -333,14 +333,13 @@ class Models : public Source {
       }
       Status status = Status::kOk;
       const double* const input = motion.input.empty() ? nullptr : motion.input.data();
-      if (!motion.held || !model.discrete_noise()) status = DrawNoise(blocks, input, motion);
+      if (!motion.held || !model->discrete_noise()) status = DrawNoise(blocks, input, motion);
       if (status == Status::kOk) {
-        status = model.Step(blocks.data(), input, motion.w.data(), dt_s_, moved.data(), nullptr,
-                            nullptr);
+        status = model->Step(blocks.data(), input, motion.w.data(), dt_s_, {moved.data()});
       }
       if (status != Status::kOk) {
         throw Error(ExitCode::kBadData, "source 'models': the truth leaves the domain of model '" +
-                                            model.name() + "' of '" + motion.binding->name +
+                                            model->name() + "' of '" + motion.binding->name +
                                             "' before t = " + std::to_string(t_s) + " s");
       }
       for (const BlockId id : motion.binding->blocks) {
@@ -358,7 +357,7 @@ class Models : public Source {
                    Motion& motion) const {
     const auto n = static_cast<Eigen::Index>(motion.w.size());
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(n, n);
-    const Status status = motion.binding->model.SqrtQ(blocks.data(), input, dt_s_, l.data());
+    const Status status = motion.binding->model->SqrtQ(blocks.data(), input, dt_s_, l.data());
     Eigen::VectorXd drawn(n);
     for (double& value : drawn) value = motion.noise.Normal();
     Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;
@@ -369,7 +368,7 @@ class Models : public Source {
   void Measure(Sensor& sensor, Frame& frame) {
     if (!sensor.schedule.IsDue(index_)) return;
     for (const std::vector<double>& known : sensor.schedule.known) {
-      if (!sensor.model.has_landmark()) {
+      if (!sensor.model->has_landmark()) {
         MeasureOne(sensor, -1, known, frame);
         continue;
       }
@@ -383,15 +382,15 @@ class Models : public Source {
   /// Whether there is something to measure; what is missing counts.
   bool MeasureOne(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
                   Frame& frame) {
-    const Geometry& geometry = sensor.model.measurement().geometry;
+    const Geometry& geometry = sensor.model->measurement().geometry;
     std::vector<const double*> roles;
     for (const RoleBinding& role : sensor.binding->roles) {
       roles.push_back(role.block < 0 ? nullptr : x_[static_cast<std::size_t>(role.block)].data());
     }
     if (landmark >= 0) {
       const auto id = static_cast<std::size_t>(landmark);
-      const bool has_pose = HasPose(sensor.model);
-      roles.resize(sensor.model.roles().size() - (has_pose ? 2 : 1));
+      const bool has_pose = HasPose(*sensor.model);
+      roles.resize(sensor.model->roles().size() - (has_pose ? 2 : 1));
       roles.push_back(points_[id].data());
       if (has_pose) roles.push_back(orientations_[id].data());
     }
@@ -402,14 +401,14 @@ class Models : public Source {
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
     const auto fate = sensor.schedule.Draw();
-    if (sensor.model.Predict(roles.data(), z.data(), known.data()) != Status::kOk ||
-        sensor.model.Valid(z.data(), known.data()) != Status::kOk ||
-        sensor.model.SqrtNoise(roles.data(), z.data(), l.data(), known.data()) != Status::kOk) {
+    if (sensor.model->Predict(roles.data(), z.data(), known.data()) != Status::kOk ||
+        sensor.model->Valid({z.data(), known.data()}) != Status::kOk ||
+        sensor.model->SqrtNoise(roles.data(), z.data(), l.data(), known.data()) != Status::kOk) {
       return false;
     }
     const Eigen::VectorXd d = fate.sigma_scale * (l * n);
     geometry.Plus(z.data(), d.data(), z.data());
-    if (sensor.model.Valid(z.data(), known.data()) != Status::kOk) return false;
+    if (sensor.model->Valid({z.data(), known.data()}) != Status::kOk) return false;
     if (fate.missing) return true;
     Measurement& measurement = frame.measurements.emplace_back();
     measurement.timestamp = frame.timestamp;

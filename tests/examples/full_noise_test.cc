@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/experiment/run.h"
-#include "alidade/plugin/in_process.h"
 #include "sensors/inverse_depth_feature.h"
 
 namespace alidade {
@@ -72,7 +72,7 @@ TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
   Ekf by_measurement(BuildSystem(other.root(), host, {"pixels"}), {}, streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
   system.sensors.at(0).model =
-      InProcessSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");
+      MakeSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");
   Ekf by_model(system, {}, streams);
 
   int used = 0, frames = 0;

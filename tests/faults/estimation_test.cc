@@ -37,14 +37,14 @@ struct Difference : Sensor<Vec<1>, Vec<2>> {
 System TwoElements(const Eigen::Matrix2d& p, double sigma) {
   System system;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
-  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model.blocks()[0]));
+  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {1.0, 2.0};
   prior.covariance = p;
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "difference", InProcessSensor(Difference(sigma), "difference"), {"p.x"});
+  AddSensor(system, "difference", MakeSensor(Difference(sigma), "difference"), {"p.x"});
   return system;
 }
 

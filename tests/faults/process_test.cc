@@ -64,13 +64,13 @@ TEST(OneProcess, WhatAHostMadeOutlivesIt) {
   std::optional<Experiment> other(Build(*host));
   const Config entry = Config::FromText(
       "{model: stereo_disparity, focal_px: 400, baseline_m: 0.065, sigma_px: 1}", "entry.yaml");
-  const SensorModel sensor = host->CreateSensor("stereo_disparity", entry.root());
+  const SharedSensor sensor = host->CreateSensor("stereo_disparity", entry.root());
   host.reset();
   other.reset();
   const double depth = 0.5;
   const double* const role = &depth;
   double disparity = 0.0;
-  EXPECT_EQ(sensor.Predict(&role, &disparity), Status::kOk);
+  EXPECT_EQ(sensor->Predict(&role, &disparity), Status::kOk);
   EXPECT_DOUBLE_EQ(disparity, 52.0);
   EXPECT_FALSE(Finish(kept).metrics.empty());
 }

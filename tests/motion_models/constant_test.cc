@@ -9,26 +9,26 @@
 namespace alidade {
 namespace {
 
+using testing::AbiMotion;
 using testing::Blocks;
 using testing::Covariance;
 using testing::ExpectSame;
 using testing::ExpectTrueJacobians;
-using testing::MakeMotion;
 using testing::Step;
 using testing::Stepped;
 
 TEST(Constant, StaysAndHasNoNoise) {
-  const MotionModel constant = MakeMotion<Constant<>>();
-  EXPECT_EQ(constant.noise_size(), 0);
+  const auto constant = AbiMotion<Constant<>>();
+  EXPECT_EQ(constant->noise_size(), 0);
   const Stepped out = Step(constant, {{3.3}}, nullptr, nullptr, 0.1);
   EXPECT_EQ(out.next[0][0], 3.3);
   EXPECT_EQ(out.f[0], 1.0);
 }
 
 TEST(Constant, WalksWithTheRootOfTime) {
-  const MotionModel walk = MakeMotion<Constant<>>({{"size", {3}}, {"noise.random_walk", {0.2}}});
-  ASSERT_EQ(walk.noise_size(), 3);
-  EXPECT_EQ(walk.blocks()[0].elements, (std::vector<std::string>{"0", "1", "2"}));
+  const auto walk = AbiMotion<Constant<>>({{"size", {3}}, {"noise.random_walk", {0.2}}});
+  ASSERT_EQ(walk->noise_size(), 3);
+  EXPECT_EQ(walk->blocks()[0].elements, (std::vector<std::string>{"0", "1", "2"}));
   const Blocks x{{1, 2, 3}};
   EXPECT_EQ(Step(walk, x, nullptr, nullptr, 0.25).next, x) << "no noise given is zero noise";
   ExpectTrueJacobians(walk, x, nullptr, {0.1, -0.2, 0.3}, 0.25);

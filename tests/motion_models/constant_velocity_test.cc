@@ -9,22 +9,22 @@
 namespace alidade {
 namespace {
 
+using testing::AbiMotion;
 using testing::Blocks;
 using testing::Covariance;
 using testing::ExpectTrueJacobians;
-using testing::MakeMotion;
 using testing::Step;
 using testing::Stepped;
 
 template <int D, bool kContinuous>
 void CheckConstantVelocity() {
   const double sigma = 0.7, dt_s = 0.2;
-  const MotionModel motion =
-      MakeMotion<ConstantVelocity<D, kContinuous>>({{"noise.acceleration", {sigma}}});
-  ASSERT_EQ(motion.noise_size(), kContinuous ? 2 * D : D);
-  EXPECT_EQ(motion.discrete_noise(), !kContinuous);
+  const SharedMotion motion =
+      AbiMotion<ConstantVelocity<D, kContinuous>>({{"noise.acceleration", {sigma}}});
+  ASSERT_EQ(motion->noise_size(), kContinuous ? 2 * D : D);
+  EXPECT_EQ(motion->discrete_noise(), !kContinuous);
   Blocks x{std::vector<double>(D), std::vector<double>(D)};
-  std::vector<double> w(motion.noise_size());
+  std::vector<double> w(motion->noise_size());
   for (int i = 0; i < D; ++i) x[0][i] = 1.0 + i, x[1][i] = -0.5 * i + 0.25;
   for (std::size_t i = 0; i < w.size(); ++i) w[i] = 0.3 - 0.1 * static_cast<double>(i);
   const Stepped out = Step(motion, x, nullptr, nullptr, dt_s);
@@ -41,7 +41,7 @@ void CheckConstantVelocity() {
   const double pv = kContinuous ? t * t / 2 : t * t * t / 2;
   const double vv = kContinuous ? t : t * t;
   const std::vector<double> q = Covariance(motion, x, dt_s);
-  const int n = 2 * D, m = motion.noise_size();
+  const int n = 2 * D, m = motion->noise_size();
   for (int r = 0; r < n; ++r) {
     for (int c = 0; c < n; ++c) {
       double sum = 0.0;

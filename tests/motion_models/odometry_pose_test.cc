@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
+using testing::AbiMotion;
 using testing::Blocks;
-using testing::MakeMotion;
 using testing::MapHost;
 using testing::Stepped;
 
@@ -52,8 +52,8 @@ void ExpectPose(const Blocks& a, const Blocks& b) {
 }
 
 TEST(OdometryPose, FollowsTheVehicle) {
-  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
-  ASSERT_TRUE(motion.has_input());
+  const auto motion = AbiMotion<OdometryPose>(kMounted);
+  ASSERT_TRUE(motion->has_input());
   // 2 m/s ahead for 3 s
   const double straight[6] = {2, 0, 0, 0, 0, 0};
   ExpectPose(testing::Step(motion, Camera(5, 6, 0), straight, nullptr, 3.0).next, Camera(11, 6, 0));
@@ -77,7 +77,7 @@ TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
   const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};
   const Blocks truth =
-      testing::Step(MakeMotion<OdometryPose>(kMounted), Camera(5, 6, 1), input, nullptr, 0.7).next;
+      testing::Step(AbiMotion<OdometryPose>(kMounted), Camera(5, 6, 1), input, nullptr, 0.7).next;
 
   MapHost::Values not_mounted = kMounted;  // 0.5 m lower; turned by 0.1 rad about y
   not_mounted["vehicle_from_cam.position"] = {1, 0, 1};
@@ -95,13 +95,13 @@ TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   x[3].assign(tilt, tilt + 4);
   x[4] = {0.25};
   const Blocks next =
-      testing::Step(MakeMotion<OdometryPose>(not_mounted), x, wrong, nullptr, 0.7).next;
+      testing::Step(AbiMotion<OdometryPose>(not_mounted), x, wrong, nullptr, 0.7).next;
   ExpectPose(next, truth);
   for (std::size_t i = 2; i < 5; ++i) EXPECT_EQ(next[i], x[i]);  // they stay
 }
 
 TEST(OdometryPose, HasTrueJacobiansAlsoWithoutTurning) {
-  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
+  const auto motion = AbiMotion<OdometryPose>(kMounted);
   const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.1, -0.2, 0.3}, {0.8, -0.4, 0.2, 0.4}, {0.1}};
   const std::vector<double> none(6), w{0.3, -0.2, 0.5, 0.4, 0.1, -0.6};
   const double turning[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9}, straight[6] = {2, 0.1, -0.3, 0, 0, 0};
@@ -110,7 +110,7 @@ TEST(OdometryPose, HasTrueJacobiansAlsoWithoutTurning) {
 }
 
 TEST(OdometryPose, NoiseIsPerAxis) {
-  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
+  const auto motion = AbiMotion<OdometryPose>(kMounted);
   const std::vector<double> q = testing::Covariance(motion, Camera(0, 0, 0), 0.1);
   const double sigma[6] = {0.03, 0.3, 0.3, 0.002, 0.002, 0.002};
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(q[7 * i], sigma[i] * sigma[i], 1e-17);
@@ -121,12 +121,11 @@ TEST(OdometryPose, NoiseIsPerAxis) {
 TEST(OdometryPose, NoiseOfEitherKindIsThatOfTheWholeGap) {
   MapHost::Values values = kMounted;
   values["noise.kind"] = {0};
-  const MotionModel held = MakeMotion<OdometryPose>(kMounted),
-                    adds = MakeMotion<OdometryPose>(values);
-  EXPECT_TRUE(held.discrete_noise());
-  EXPECT_FALSE(adds.discrete_noise());
+  const auto held = AbiMotion<OdometryPose>(kMounted), adds = AbiMotion<OdometryPose>(values);
+  EXPECT_TRUE(held->discrete_noise());
+  EXPECT_FALSE(adds->discrete_noise());
   const double still[6] = {}, straight[6] = {2, 0, 0, 0, 0, 0}, turning[6] = {2, 0, 0, 0, 0, 0.5};
-  for (const MotionModel& motion : {held, adds}) {
+  for (const SharedMotion& motion : {held, adds}) {
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), still, 0.03, 0.07), 1e-14);
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), straight, 0.5e-3, 0.5e-3), 1e-5);
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), turning, 0.5e-3, 0.5e-3), 1e-3);

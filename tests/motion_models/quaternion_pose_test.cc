@@ -6,17 +6,17 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/estimation/ukf.h"
-#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 #include "support/model_maker.h"
 
 namespace alidade {
 namespace {
 
+using testing::AbiMotion;
 using testing::Blocks;
-using testing::MakeMotion;
 using testing::MapHost;
 using testing::Stepped;
 
@@ -28,7 +28,7 @@ TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[6] = {0, 2, 0, 0, 0, pi / 2};
-  const Stepped out = testing::Step(MakeMotion<QuaternionPose>(kNoise), x, nullptr, w, 1.0);
+  const Stepped out = testing::Step(AbiMotion<QuaternionPose>(kNoise), x, nullptr, w, 1.0);
   EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(out.next[2], (std::vector<double>{1, 2, 0}));
   EXPECT_EQ(out.next[3], (std::vector<double>{0, 0, pi}));
@@ -37,7 +37,7 @@ TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
 }
 
 TEST(QuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
-  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
+  const auto motion = AbiMotion<QuaternionPose>(kNoise);
   const std::vector<double> w{0.3, -0.2, 0.5, 0.4, 0.1, -0.6}, none(6);
   const Blocks moving{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
   Blocks still = moving;
@@ -50,7 +50,7 @@ TEST(QuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
 }
 
 TEST(QuaternionPose, NoiseIsOneNumberOrOneForEachAxis) {
-  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
+  const auto motion = AbiMotion<QuaternionPose>(kNoise);
   const Blocks x{{1, 2, 3}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   const std::vector<double> q = testing::Covariance(motion, x, 0.1);
   const double expected[6] = {0.36, 0.36, 0.36, 0.01, 0.04, 0.09};
@@ -84,30 +84,30 @@ struct Itself : Sensor<G, G> {
 };
 
 /// A body at rest at first, whose position and orientation are measured.
-System MeasuredPose(const MotionModel& model) {
+System MeasuredPose(const SharedMotion& model) {
   System system;
   MotionBinding binding{"body", model, {}};
   const Blocks means{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   for (std::size_t i = 0; i < means.size(); ++i) {
-    const Space& space = model.blocks()[i];
+    const Space& space = model->blocks()[i];
     const BlockId id = system.layout.Declare("body." + space.name, "body", space);
     binding.blocks.push_back(id);
     system.priors.push_back({id, means[i], 0.0025 * Eigen::Matrix3d::Identity(), ""});
   }
   system.motions.push_back(binding);
-  const auto add = [&](const std::string& name, const SensorModel& sensor, BlockId id) {
+  const auto add = [&](const std::string& name, const SharedSensor& sensor, BlockId id) {
     SensorBinding& bound = system.sensors.emplace_back(name, name, sensor);
     bound.roles.resize(1);
     bound.roles[0].block = id;
   };
-  add("position", InProcessSensor(Itself<Vec<3>>(), "position"), 0);
-  add("orientation", InProcessSensor(Itself<UnitQuaternion>(), "orientation"), 1);
+  add("position", MakeSensor(Itself<Vec<3>>(), "position"), 0);
+  add("orientation", MakeSensor(Itself<UnitQuaternion>(), "orientation"), 1);
   return system;
 }
 
 // Velocities of some 0.3 m/s and rad/s: the filters differ by what a step of 0.03 rad bends.
 TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
-  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
+  const auto motion = AbiMotion<QuaternionPose>(kNoise);
   const System system = MeasuredPose(motion);
   for (const double alpha : {1e-4, 1e-3, 0.01, 0.1, 1.0}) {
     UkfOptions options;
@@ -118,11 +118,11 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
     Random random(43);
     Blocks x{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     for (int k = 0; k < 1000; ++k) {
-      Blocks next = testing::Filled(motion.blocks(), 0.0);
+      Blocks next = testing::Filled(motion->blocks(), 0.0);
       double w[6];
       for (double& element : w) element = 0.2 * random.Normal();
-      ASSERT_EQ(motion.Step(testing::Pointers(x).data(), nullptr, w, 0.1,
-                            testing::Pointers(next).data(), nullptr, nullptr),
+      ASSERT_EQ(motion->Step(testing::Pointers(x).data(), nullptr, w, 0.1,
+                             {testing::Pointers(next).data(), nullptr, nullptr}),
                 Status::kOk);
       x = next;
       for (const std::size_t i : {2u, 3u}) {
@@ -131,7 +131,7 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
       Frame frame;
       frame.timestamp = TimestampFromSeconds(0.1 * (k + 1));
       for (int i = 0; i < 2; ++i) {
-        const Geometry& geometry = motion.blocks()[static_cast<std::size_t>(i)].geometry;
+        const Geometry& geometry = motion->blocks()[static_cast<std::size_t>(i)].geometry;
         std::vector<double> z(x[static_cast<std::size_t>(i)]);
         const double n[3] = {0.02 * random.Normal(), 0.02 * random.Normal(),
                              0.02 * random.Normal()};
@@ -146,7 +146,7 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
       ekf.Process(frame);
       for (BlockId id = 0; id < 4; ++id) {
         double between[3];
-        motion.blocks()[static_cast<std::size_t>(id)].geometry.Minus(
+        motion->blocks()[static_cast<std::size_t>(id)].geometry.Minus(
             ukf.state().value(id), ekf.state().value(id), between);
         for (const double d : between) ASSERT_LT(std::abs(d), 0.01) << alpha << ' ' << k;
       }
@@ -156,8 +156,8 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
 
 // One w is held: r' has v', so that half of a sigma_a dt^2 hangs on the parts, and no more.
 TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
-  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
-  EXPECT_TRUE(motion.discrete_noise());
+  const auto motion = AbiMotion<QuaternionPose>(kNoise);
+  EXPECT_TRUE(motion->discrete_noise());
   const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
   EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.5e-3, 0.5e-3), 1e-3);
   EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.5e-6, 0.5e-6), 1e-6);
@@ -169,7 +169,7 @@ TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
   const Stepped out =
-      testing::Step(MakeMotion<ContinuousQuaternionPose>(kNoise), x, nullptr, w, 1.0);
+      testing::Step(AbiMotion<ContinuousQuaternionPose>(kNoise), x, nullptr, w, 1.0);
   EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(out.next[2], (std::vector<double>{1, 0, 4}));
   EXPECT_EQ(out.next[3], (std::vector<double>{0, 1, pi / 2}));
@@ -178,7 +178,7 @@ TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
 }
 
 TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
-  const MotionModel motion = MakeMotion<ContinuousQuaternionPose>(kNoise);
+  const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
   std::vector<double> w(12);
   for (std::size_t i = 0; i < w.size(); ++i) w[i] = 0.3 * std::sin(2.0 * static_cast<double>(i));
   const Blocks moving{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
@@ -194,8 +194,8 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
 
 // Per axis sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] of (r, v) and, without turning, of (q, omega).
 TEST(ContinuousQuaternionPose, NoiseAddsUp) {
-  const MotionModel motion = MakeMotion<ContinuousQuaternionPose>(kNoise);
-  EXPECT_FALSE(motion.discrete_noise());
+  const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
+  EXPECT_FALSE(motion->discrete_noise());
   const Blocks still{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0, 0, 0}};
   Blocks turning = still;
   turning[3] = {0.7, -0.4, 1.1};

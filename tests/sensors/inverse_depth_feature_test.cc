@@ -13,8 +13,8 @@ using namespace testing;  // NOLINT(google-build-using-namespace)
 const Vec3 kAnchor{-0.5, 0.2, -0.8};
 
 template <class Representation>
-SensorModel InverseDepthSensor(const Camera& camera) {
-  return InProcessSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
+SharedSensor InverseDepthSensor(const Camera& camera) {
+  return MakeSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
 }
 
 /// The landmark that the camera at kPose sees at `pixel`, 4 m away, first seen from kAnchor.
@@ -34,12 +34,12 @@ TEST(InverseDepthFeature, PredictsWorkedNumbers) {
     using Representation = decltype(representation);
     const Blocks landmark = LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} + landmark;
-    const SensorModel sensor = InverseDepthSensor<Representation>(Pinhole());
+    const SharedSensor sensor = InverseDepthSensor<Representation>(Pinhole());
     const std::vector<double> z = Predicted(sensor, roles);
     EXPECT_NEAR(z[0], 57.5, 1e-12);
     EXPECT_NEAR(z[1], 345.0, 1e-12);
     double l[4] = {kPoison, kPoison, kPoison, kPoison};
-    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z.data(), l), Status::kOk);
+    ASSERT_EQ(sensor->SqrtNoise(Pointers(roles).data(), z.data(), l), Status::kOk);
     EXPECT_EQ(std::vector<double>(l, l + 4), (std::vector<double>{1.5, 0, 0, 1.5}));
   });
 }
@@ -63,8 +63,8 @@ TEST(InverseDepthFeature, SeesAtInfinityAndBeyond) {
   for (const double rho : {0.0, 1e-9, -0.01}) {
     const Blocks pose{{0.1, 0, 0}, {1, 0, 0, 0}};
     const Ray<double> ray{{0, 0, 0}, {0.0, 0.6, 0.8}, rho};
-    const SensorModel angles = InverseDepthSensor<InverseDepth>(Pinhole());
-    const SensorModel anchored = InverseDepthSensor<Anchored>(Pinhole());
+    const SharedSensor angles = InverseDepthSensor<InverseDepth>(Pinhole());
+    const SharedSensor anchored = InverseDepthSensor<Anchored>(Pinhole());
     const Blocks a = pose + LandmarkOn<InverseDepth>(ray), b = pose + LandmarkOn<Anchored>(ray);
     ExpectTrueJacobians(angles, a);
     ExpectTrueJacobians(anchored, b);
@@ -79,7 +79,7 @@ TEST(InverseDepthFeature, SeesNearThePoles) {
   const Blocks pose{{0, 0, 0}, {half, half, 0, 0}};
   const double phi = 1.5707963267948966 - 1e-6;
   const Blocks roles = pose + Blocks{{0, 0, 0, 0.7, phi, 0.2}};
-  const SensorModel sensor = InverseDepthSensor<InverseDepth>(Pinhole());
+  const SharedSensor sensor = InverseDepthSensor<InverseDepth>(Pinhole());
   ExpectTrueJacobians(sensor, roles);
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 320.0 + 525.0 * 1e-6 * std::sin(0.7), 1e-9);
@@ -93,11 +93,11 @@ TEST(InverseDepthFeature, InitialisesFromAPrior) {
                         Blocks{kPose[0], kPose[1], {411.0, 87.5}, {0.25}});
     });
   }
-  const SensorModel sensor = InverseDepthSensor<InverseDepth>(Pinhole());
+  const SharedSensor sensor = InverseDepthSensor<InverseDepth>(Pinhole());
   const double pixel[2] = {411.0, 87.5};
   double y[6];
   std::vector<const double*> roles{kPose[0].data(), kPose[1].data(), nullptr};
-  EXPECT_EQ(sensor.Initialise(roles.data(), pixel, y, nullptr, nullptr), Status::kInvalid);
+  EXPECT_EQ(sensor->Initialise(roles.data(), {pixel}, nullptr, {.y = y}), Status::kInvalid);
 }
 
 TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
@@ -106,7 +106,7 @@ TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
     const Blocks roles =
         Blocks{{0, 0, 3}, {1, 0, 0, 0}} + LandmarkAt<Representation>({0, 0, 0}, {0.1, 0.2, 2.0});
     double z[2] = {kPoison, kPoison};
-    EXPECT_EQ(InverseDepthSensor<Representation>(Pinhole()).Predict(Pointers(roles).data(), z),
+    EXPECT_EQ(InverseDepthSensor<Representation>(Pinhole())->Predict(Pointers(roles).data(), z),
               Status::kOutOfDomain);
     EXPECT_EQ(z[0], kPoison);
     EXPECT_EQ(z[1], kPoison);
@@ -114,34 +114,34 @@ TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
 }
 
 TEST(InverseDepthFeature, IsValidOnTheImage) {
-  const SensorModel sensor = InverseDepthSensor<Xyz>(Pinhole());
+  const SharedSensor sensor = InverseDepthSensor<Xyz>(Pinhole());
   const double on[2] = {639.4, -0.4}, beside[2] = {639.6, 10.0}, none[2] = {kNaN, 10.0};
-  EXPECT_EQ(sensor.Valid(on), Status::kOk);
-  EXPECT_EQ(sensor.Valid(beside), Status::kInvalid);
-  EXPECT_EQ(sensor.Valid(none), Status::kInvalid);
+  EXPECT_EQ(sensor->Valid({on}), Status::kOk);
+  EXPECT_EQ(sensor->Valid({beside}), Status::kInvalid);
+  EXPECT_EQ(sensor->Valid({none}), Status::kInvalid);
 }
 
 TEST(InverseDepthFeature, DescribesItsLandmark) {
-  const SensorModel anchored = InverseDepthSensor<Anchored>(Pinhole());
-  EXPECT_TRUE(anchored.has_landmark());
-  EXPECT_EQ(anchored.inverse().role, 2);
-  EXPECT_EQ(anchored.inverse().count, 3);
-  EXPECT_EQ(anchored.inverse().prior_size, 1);
-  EXPECT_NE(anchored.roles()[2].flags & ALIDADE_ROLE_SHARED, 0u);
-  const SensorModel angles = InverseDepthSensor<InverseDepth>(Pinhole());
-  EXPECT_EQ(angles.inverse().count, 1);
-  EXPECT_FALSE(angles.roles()[1].landmark());
-  EXPECT_EQ(angles.roles()[2].elements.back(), "rho");
+  const SharedSensor anchored = InverseDepthSensor<Anchored>(Pinhole());
+  EXPECT_TRUE(anchored->has_landmark());
+  EXPECT_EQ(anchored->inverse().role, 2);
+  EXPECT_EQ(anchored->inverse().count, 3);
+  EXPECT_EQ(anchored->inverse().prior_size, 1);
+  EXPECT_NE(anchored->roles()[2].flags & ALIDADE_ROLE_SHARED, 0u);
+  const SharedSensor angles = InverseDepthSensor<InverseDepth>(Pinhole());
+  EXPECT_EQ(angles->inverse().count, 1);
+  EXPECT_FALSE(angles->roles()[1].landmark());
+  EXPECT_EQ(angles->roles()[2].elements.back(), "rho");
 }
 
 TEST(InverseDepthFeature, MayHaveAnotherNoiseInUThanInV) {
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
-    const SensorModel sensor = InProcessSensor(
+    const SharedSensor sensor = MakeSensor(
         InverseDepthFeature<Representation>(Pinhole(), std::array{1.5, 0.25}), "feature");
     const Blocks roles = kPose + SeenAt<Representation>(Pinhole(), {100, 200});
     double z[2], l[4] = {kPoison, kPoison, kPoison, kPoison};
-    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z, l), Status::kOk);
+    ASSERT_EQ(sensor->SqrtNoise(Pointers(roles).data(), z, l), Status::kOk);
     EXPECT_EQ(std::vector<double>(l, l + 4), (std::vector<double>{1.5, 0, 0, 0.25}));
   });
 }

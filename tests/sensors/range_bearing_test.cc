@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "alidade/plugin/in_process.h"
+#include "alidade/estimation/direct_models.h"
 #include "support/model_checks.h"
 
 namespace alidade {
@@ -19,50 +19,51 @@ using testing::Linearised;
 using testing::NumericallyLinearised;
 using testing::Pointers;
 
-SensorModel MakeRangeBearing() {
-  return InProcessSensor(RangeBearing<Xyz>(0.1, 0.02, 10.0), "range_bearing");
+SharedSensor MakeRangeBearing() {
+  return MakeSensor(RangeBearing<Xyz>(0.1, 0.02, 10.0), "range_bearing");
 }
 
 // A sensor at (1, 0, 0) m that is turned by 90 deg about z; a point at (1, 3, 4) m.
 const Blocks kRangeBearingRoles{{1, 0, 0}, {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 3, 4}};
 
 TEST(RangeBearing, PredictsWorkedNumbers) {
-  const SensorModel sensor = MakeRangeBearing();
+  const SharedSensor sensor = MakeRangeBearing();
   std::vector<double> z(4, kPoison);
-  ASSERT_EQ(sensor.Predict(Pointers(kRangeBearingRoles).data(), z.data()), Status::kOk);
+  ASSERT_EQ(sensor->Predict(Pointers(kRangeBearingRoles).data(), z.data()), Status::kOk);
   ExpectSame(z, {5.0, 0.6, 0.0, 0.8}, 1e-15);  // the world's y is the sensor's x
-  EXPECT_EQ(sensor.measurement().elements,
+  EXPECT_EQ(sensor->measurement().elements,
             (std::vector<std::string>{"range", "bearing.x", "bearing.y", "bearing.z"}));
   ExpectSame(Linearised(sensor, kRangeBearingRoles),
              NumericallyLinearised(sensor, kRangeBearingRoles), kNumeric);
   std::vector<double> l(9, kPoison);
-  ASSERT_EQ(sensor.SqrtNoise(Pointers(kRangeBearingRoles).data(), z.data(), l.data()), Status::kOk);
+  ASSERT_EQ(sensor->SqrtNoise(Pointers(kRangeBearingRoles).data(), z.data(), l.data()),
+            Status::kOk);
   EXPECT_EQ(l, (std::vector<double>{0.1, 0, 0, 0, 0.02, 0, 0, 0, 0.02}));
 }
 
 TEST(RangeBearing, SeesNothingWhereItStandsNorFurtherThanItsRange) {
-  const SensorModel sensor = MakeRangeBearing();
+  const SharedSensor sensor = MakeRangeBearing();
   std::vector<double> z(4, kPoison);
   const Blocks at_the_sensor{{1, 0, 0}, {1, 0, 0, 0}, {1, 0, 0}};
-  EXPECT_EQ(sensor.Predict(Pointers(at_the_sensor).data(), z.data()), Status::kOutOfDomain);
+  EXPECT_EQ(sensor->Predict(Pointers(at_the_sensor).data(), z.data()), Status::kOutOfDomain);
   EXPECT_EQ(z, std::vector<double>(4, kPoison));
   for (const auto& [range, status] : {std::pair{9.9, Status::kOk},
                                       {10.1, Status::kInvalid},
                                       {0.0, Status::kInvalid},
                                       {-1.0, Status::kInvalid}}) {
     z = {range, 0, 0, 1};
-    EXPECT_EQ(sensor.Valid(z.data()), status) << range;
+    EXPECT_EQ(sensor->Valid({z.data()}), status) << range;
   }
 }
 
 // Predict gives back what Initialise was made from, and its Jacobian is that of the inverse.
 TEST(RangeBearing, TellsThePoint) {
-  const SensorModel sensor = MakeRangeBearing();
+  const SharedSensor sensor = MakeRangeBearing();
   const std::vector<double> z{5.0, 0.6, 0.0, 0.8};
   std::vector<double> y(3, kPoison), jz(9, kPoison);
   std::vector<double*> jx(3, nullptr);
-  ASSERT_EQ(sensor.Initialise(Pointers(kRangeBearingRoles).data(), z.data(), nullptr, y.data(),
-                              jx.data(), jz.data(), nullptr),
+  ASSERT_EQ(sensor->Initialise(Pointers(kRangeBearingRoles).data(), {z.data()}, nullptr,
+                               {.y = y.data(), .jx = jx.data(), .jz = jz.data()}),
             Status::kOk);
   ExpectSame(y, kRangeBearingRoles[2], 1e-15);
   const std::vector<double> j =

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/plugin/in_process.h"
+#include "alidade/estimation/direct_models.h"
 #include "support/model_checks.h"
 
 namespace alidade {
@@ -21,39 +21,40 @@ using testing::Pointers;
 const double kHalf = std::sqrt(0.5);
 const Blocks kRoles{{1, 2, 3}, {kHalf, 0, 0, kHalf}, {1, 6, 3.5}, {kHalf, kHalf, 0, 0}};
 
-SensorModel MakeRelativePose() {
-  return InProcessSensor(RelativePose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "relative_pose");
+SharedSensor MakeRelativePose() {
+  return MakeSensor(RelativePose({0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}), "relative_pose");
 }
 
 TEST(RelativePose, IsThatOfTheLandmarkInTheBody) {
-  const SensorModel sensor = MakeRelativePose();
+  const SharedSensor sensor = MakeRelativePose();
   std::vector<double> z(7, kPoison);
-  ASSERT_EQ(sensor.Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
+  ASSERT_EQ(sensor->Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
   // 4 m ahead and 0.5 m above. Turned back by 90 degrees about z, then by 90 degrees about x.
   ExpectSame(z, {4, 0, 0.5, 0.5, 0.5, -0.5, -0.5}, 1e-15);
   ExpectSame(Linearised(sensor, kRoles), NumericallyLinearised(sensor, kRoles), kNumeric);
 }
 
 TEST(RelativePose, PlacesTheLandmarkWhereItWasMeasured) {
-  const SensorModel sensor = MakeRelativePose();
-  ASSERT_EQ(sensor.inverse().role, 2);
+  const SharedSensor sensor = MakeRelativePose();
+  ASSERT_EQ(sensor->inverse().role, 2);
   std::vector<double> z(7), y(7, kPoison), j_z(36, kPoison), j_r(18, kPoison), j_q(18, kPoison);
-  ASSERT_EQ(sensor.Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
+  ASSERT_EQ(sensor->Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
   std::vector<double*> j{j_r.data(), j_q.data(), nullptr, nullptr};
-  ASSERT_EQ(sensor.Initialise(Pointers(kRoles).data(), z.data(), y.data(), j.data(), j_z.data()),
+  ASSERT_EQ(sensor->Initialise(Pointers(kRoles).data(), {z.data()}, nullptr,
+                               {.y = y.data(), .jx = j.data(), .jz = j_z.data()}),
             Status::kOk);
   ExpectSame(y, {1, 6, 3.5, kHalf, kHalf, 0, 0}, 1e-15);
 }
 
 // At the neutral pose it is the body itself: dy = (dr, dq).
 TEST(RelativePose, AKeyframeIsACloneOfTheBody) {
-  const SensorModel sensor = MakeRelativePose();
+  const SharedSensor sensor = MakeRelativePose();
   const std::vector<double> neutral{0, 0, 0, 1, 0, 0, 0};
   std::vector<double> y(7, kPoison), j_z(36, kPoison), j_r(18, kPoison), j_q(18, kPoison);
   std::vector<double*> j{j_r.data(), j_q.data(), nullptr, nullptr};
-  ASSERT_EQ(
-      sensor.Initialise(Pointers(kRoles).data(), neutral.data(), y.data(), j.data(), j_z.data()),
-      Status::kOk);
+  ASSERT_EQ(sensor->Initialise(Pointers(kRoles).data(), {neutral.data()}, nullptr,
+                               {.y = y.data(), .jx = j.data(), .jz = j_z.data()}),
+            Status::kOk);
   ExpectSame(y, {1, 2, 3, kHalf, 0, 0, kHalf}, 0.0);
   for (std::size_t i = 0; i < 18; ++i) {
     EXPECT_NEAR(j_r[i], i < 9 && i % 4 == 0 ? 1.0 : 0.0, 1e-15) << i;

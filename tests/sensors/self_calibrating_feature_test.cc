@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/model/camera.h"
-#include "alidade/plugin/in_process.h"
 #include "support/landmarks.h"
 #include "support/model_checks.h"
 
@@ -14,8 +14,8 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
 template <class Lens>
-SensorModel Made() {
-  return InProcessSensor(SelfCalibratingFeature<Lens>(0.5), "self_calibrating_feature");
+SharedSensor Made() {
+  return MakeSensor(SelfCalibratingFeature<Lens>(0.5), "self_calibrating_feature");
 }
 
 /// A camera that is turned and moved, and a point 5 m before it.
@@ -29,15 +29,15 @@ TEST(SelfCalibratingFeature, PredictsWorkedNumbers) {
   EXPECT_NEAR(z[0], 140.625, 1e-12);
   EXPECT_NEAR(z[1], -187.5, 1e-12);
   std::vector<double> l(4, kPoison);
-  ASSERT_EQ(Made<RadialLens>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+  ASSERT_EQ(Made<RadialLens>()->SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
   EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 0.5}));
 }
 
 TEST(SelfCalibratingFeature, MayHaveAnotherNoiseInUThanInV) {
-  const SensorModel sensor = InProcessSensor(
-      SelfCalibratingFeature<RadialLens>(std::array{0.5, 2.0}), "self_calibrating_feature");
+  const SharedSensor sensor = MakeSensor(SelfCalibratingFeature<RadialLens>(std::array{0.5, 2.0}),
+                                         "self_calibrating_feature");
   std::vector<double> z(2), l(4, kPoison);
-  ASSERT_EQ(sensor.SqrtNoise(Pointers(kRadial).data(), z.data(), l.data()), Status::kOk);
+  ASSERT_EQ(sensor->SqrtNoise(Pointers(kRadial).data(), z.data(), l.data()), Status::kOk);
   EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 2.0}));
 }
 
@@ -83,15 +83,15 @@ TEST(SelfCalibratingFeature, SeesNothingBehindIt) {
   std::vector<double> z(2, kPoison);
   for (const double depth : {0.0, -1.0, kNaN}) {
     roles[3][2] = depth;
-    EXPECT_EQ(Made<RadialLens>().Predict(Pointers(roles).data(), z.data()), Status::kOutOfDomain);
+    EXPECT_EQ(Made<RadialLens>()->Predict(Pointers(roles).data(), z.data()), Status::kOutOfDomain);
     EXPECT_EQ(z[0], kPoison);
   }
 }
 
 /// The equation of BAL on the other side of the camera, P_z > 0: the image is the point mirrored.
 TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
-  const SensorModel sensor =
-      InProcessSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
+  const SharedSensor sensor =
+      MakeSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
   // h = (-0.3, 0.4, -1) m, the mirror image of h in PredictsWorkedNumbers: the same ray, x = h / hz
   Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {0.7, 0.4, -1}};
   const std::vector<double> z = Predicted(sensor, roles);
@@ -101,7 +101,7 @@ TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
   std::vector<double> untouched(2, kPoison);
   for (const double depth : {0.0, kNaN}) {
     roles[3][2] = depth;
-    EXPECT_EQ(sensor.Predict(Pointers(roles).data(), untouched.data()), Status::kOutOfDomain);
+    EXPECT_EQ(sensor->Predict(Pointers(roles).data(), untouched.data()), Status::kOutOfDomain);
     EXPECT_EQ(untouched[0], kPoison);
   }
 }

@@ -12,8 +12,8 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
 template <class Representation>
-SensorModel MadeStereo() {
-  return InProcessSensor(StereoFeature<Representation>(Pinhole(), 0.1, 0.5), "stereo_feature");
+SharedSensor MadeStereo() {
+  return MakeSensor(StereoFeature<Representation>(Pinhole(), 0.1, 0.5), "stereo_feature");
 }
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
@@ -27,7 +27,7 @@ TEST(StereoFeature, PredictsWorkedNumbers) {
     const double expected[4] = {57.5, 345.0, 31.25, 345.0};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(z[i], expected[i], 1e-12);
     std::vector<double> l(16, kPoison);
-    ASSERT_EQ(MadeStereo<Representation>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()),
+    ASSERT_EQ(MadeStereo<Representation>()->SqrtNoise(Pointers(roles).data(), z.data(), l.data()),
               Status::kOk);
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? 0.5 : 0.0);
   });
@@ -36,11 +36,11 @@ TEST(StereoFeature, PredictsWorkedNumbers) {
 TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
-    const SensorModel sensor = InProcessSensor(
+    const SharedSensor sensor = MakeSensor(
         StereoFeature<Representation>(Pinhole(), 0.1, std::array{0.5, 2.0}), "stereo_feature");
     const Blocks roles = kPose + LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     std::vector<double> z(4), l(16, kPoison);
-    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+    ASSERT_EQ(sensor->SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
     const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // u, v, u_right, v_right
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? diagonal[i / 5] : 0.0);
   });
@@ -77,26 +77,26 @@ TEST(StereoFeature, SeesNoDisparityAtInfinity) {
 
 TEST(StereoFeature, InitialisesWithoutAPrior) {
   ForEachRepresentation([](auto representation) {
-    const SensorModel sensor = MadeStereo<decltype(representation)>();
-    EXPECT_EQ(sensor.inverse().prior_size, 0);
+    const SharedSensor sensor = MadeStereo<decltype(representation)>();
+    EXPECT_EQ(sensor->inverse().prior_size, 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
     // d = 0 px
     const std::vector<double> far{411, 87.5, 411, 87.5};
     const std::vector<double> position{0, 0, 0}, orientation{1, 0, 0, 0};
-    std::vector<const double*> roles(sensor.roles().size());
+    std::vector<const double*> roles(sensor->roles().size());
     roles[0] = position.data();
     roles[1] = orientation.data();
     double y[7] = {kPoison};
-    EXPECT_EQ(sensor.Initialise(roles.data(), far.data(), y, nullptr, nullptr),
+    EXPECT_EQ(sensor->Initialise(roles.data(), {far.data()}, nullptr, {.y = y}),
               Status::kOutOfDomain);
     EXPECT_EQ(y[0], kPoison);
   });
 }
 
 TEST(StereoFeature, IsValidWhereBothCamerasSeeIt) {
-  const SensorModel sensor = MadeStereo<Xyz>();
-  const auto valid = [&](const std::vector<double>& z) { return sensor.Valid(z.data()); };
+  const SharedSensor sensor = MadeStereo<Xyz>();
+  const auto valid = [&](const std::vector<double>& z) { return sensor->Valid({z.data()}); };
   EXPECT_EQ(valid({100, 50, 90, 50}), Status::kOk);
   EXPECT_EQ(valid({5, 50, -5, 50}), Status::kInvalid);
   EXPECT_EQ(valid({645, 50, 630, 50}), Status::kInvalid);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "alidade/bundle/bundle_file.h"
+#include "alidade/estimation/direct_models.h"
 #include "alidade/model/geometry.h"
-#include "alidade/plugin/in_process.h"
 #include "sensors/self_calibrating_feature.h"
 
 /// Bundles that tests make.

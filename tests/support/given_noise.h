@@ -5,31 +5,32 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/plugin/in_process.h"
+#include "alidade/model/plugin.h"
+#include "alidade/plugin/plugin_models.h"
 
 /// Models of this process whose noise is given in place of their own, for tests.
 namespace alidade::testing {
 
 /// `root`, m x m row-major: L of R = L L'.
 template <class Model>
-SensorModel SensorOfNoise(Model model, std::vector<double> root) {
+SharedSensor SensorOfNoise(Model model, std::vector<double> root) {
   AlidadeInstance instance{};
   instance.struct_size = sizeof(instance);
   detail::PublishSensor(std::make_unique<detail::Holder<Model>>(std::move(model)), &instance);
   const auto made = std::make_shared<ModelInstance>(instance, "of given noise", "in process");
   made->GiveNoise(std::move(root));
-  return SensorModel(made);
+  return std::make_shared<PluginSensor>(made);
 }
 
 /// `root`, n_w x n_w row-major: L of Qw = L L'.
 template <class Model>
-MotionModel MotionOfNoise(Model model, std::vector<double> root) {
+SharedMotion MotionOfNoise(Model model, std::vector<double> root) {
   AlidadeInstance instance{};
   instance.struct_size = sizeof(instance);
   detail::PublishMotion(std::make_unique<detail::Holder<Model>>(std::move(model)), &instance);
   const auto made = std::make_shared<ModelInstance>(instance, "of given noise", "in process");
   made->GiveNoise(std::move(root));
-  return MotionModel(made);
+  return std::make_shared<PluginMotion>(made);
 }
 
 }  // namespace alidade::testing

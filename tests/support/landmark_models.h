@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "alidade/base/random.h"
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
-#include "alidade/plugin/in_process.h"
 #include "support/landmark_sensors.h"
 
 /// Small systems with landmarks composed in C++, for tests.
@@ -17,19 +17,19 @@ namespace alidade::testing {
 template <class Model>
 System MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
   System system;
-  const MotionModel walk = InProcessMotion(Walk(0.1), "walk");
-  const BlockId id = system.layout.Declare("cam.position", "cam", walk.blocks()[0]);
+  const SharedMotion walk = MakeMotion(Walk(0.1), "walk");
+  const BlockId id = system.layout.Declare("cam.position", "cam", walk->blocks()[0]);
   system.motions.push_back({"cam", walk, {id}});
   Prior prior;
   prior.block = id;
   prior.mean = {0.0, 0.0, 0.0};
   prior.covariance = sigma_0 * sigma_0 * Eigen::Matrix3d::Identity();
   system.priors.push_back(prior);
-  SensorBinding binding{"tracks", "tracks", InProcessSensor(model, "tracks"), {}};
-  binding.roles.resize(binding.model.roles().size());
+  SensorBinding binding{"tracks", "tracks", MakeSensor(model, "tracks"), {}};
+  binding.roles.resize(binding.model->roles().size());
   binding.roles[0].block = id;
   if constexpr (Model::Measurement::kAmbient == 2) {
-    binding.xyz = InProcessSensor(XyzPixels(model.sigma), "xyz");
+    binding.xyz = MakeSensor(XyzPixels(model.sigma), "xyz");
   }
   system.sensors.push_back(binding);
   system.landmarks = options;
@@ -59,7 +59,7 @@ inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
 
 /// The filter of a system whose source has the stream `tracks` alone.
 inline Ekf EkfOf(const System& system, const EkfOptions& options = {}) {
-  return {system, options, {{"tracks", system.sensors[0].model.measurement().geometry.ambient}}};
+  return {system, options, {{"tracks", system.sensors[0].model->measurement().geometry.ambient}}};
 }
 
 /// What became of the measurement of a landmark; kFailed: there is none.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/model/camera.h"
 #include "alidade/model/landmark.h"
-#include "alidade/plugin/in_process.h"
 #include "support/model_checks.h"
 
 /// Landmarks of every representation before a camera, and what tests of sensors of landmarks ask of
@@ -70,40 +70,41 @@ inline Blocks operator+(Blocks a, const Blocks& b) {
   return a;
 }
 
-inline std::vector<double> Predicted(const SensorModel& sensor, const Blocks& roles) {
-  std::vector<double> z(static_cast<std::size_t>(sensor.measurement().geometry.ambient), kPoison);
-  EXPECT_EQ(sensor.Predict(Pointers(roles).data(), z.data()), Status::kOk);
+inline std::vector<double> Predicted(const SharedSensor& sensor, const Blocks& roles) {
+  std::vector<double> z(static_cast<std::size_t>(sensor->measurement().geometry.ambient), kPoison);
+  EXPECT_EQ(sensor->Predict(Pointers(roles).data(), z.data()), Status::kOk);
   return z;
 }
 
 /// Checks Jacobians of Predict against differences.
-inline void ExpectTrueJacobians(const SensorModel& sensor, const Blocks& roles) {
+inline void ExpectTrueJacobians(const SharedSensor& sensor, const Blocks& roles) {
   // h^4 times fifth derivatives of pixels, 1e4 of the Jacobians at most
   ExpectSame(Linearised(sensor, roles), NumericallyLinearised(sensor, roles), 10 * kNumeric);
 }
 
 /// Checks that Initialise inverts Predict, and its Jacobians against differences. `from`: position,
 /// orientation, z and, where the sensor needs one, the prior.
-inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
-  std::vector<Space> spaces{sensor.roles()[0], sensor.roles()[1], sensor.measurement()};
+inline void ExpectTrueInverse(const SharedSensor& sensor, const Blocks& from) {
+  std::vector<Space> spaces{sensor->roles()[0], sensor->roles()[1], sensor->measurement()};
   spaces.resize(from.size());
-  if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor.inverse().prior_size);
-  const std::vector<Space> representations(sensor.roles().begin() + 2, sensor.roles().end());
+  if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor->inverse().prior_size);
+  const std::vector<Space> representations(sensor->roles().begin() + 2, sensor->roles().end());
   const int n = TangentSize(representations), m = spaces[2].geometry.tangent;
   std::vector<double> jr(3 * n), jq(3 * n), jz(m * n), jp(n);
   const auto place = [&](const Blocks& x, bool jacobians) {
-    std::vector<const double*> roles(sensor.roles().size());
+    std::vector<const double*> roles(sensor->roles().size());
     std::vector<double*> jx(roles.size());
     roles[0] = x[0].data();
     roles[1] = x[1].data();
     jx[0] = jr.data();
     jx[1] = jq.data();
     std::vector<double> y(16, kPoison);
-    EXPECT_EQ(
-        sensor.Initialise(roles.data(), x[2].data(), x.size() > 3 ? x[3].data() : nullptr, y.data(),
-                          jacobians ? jx.data() : nullptr, jacobians ? jz.data() : nullptr,
-                          jacobians && x.size() > 3 ? jp.data() : nullptr),
-        Status::kOk);
+    EXPECT_EQ(sensor->Initialise(roles.data(), {x[2].data()}, x.size() > 3 ? x[3].data() : nullptr,
+                                 {.y = y.data(),
+                                  .jx = jacobians ? jx.data() : nullptr,
+                                  .jz = jacobians ? jz.data() : nullptr,
+                                  .jp = jacobians && x.size() > 3 ? jp.data() : nullptr}),
+              Status::kOk);
     Blocks blocks = Filled(representations, 0.0);
     const double* at = y.data();
     for (auto& block : blocks) {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "alidade/plugin/model_instance.h"
+#include "alidade/plugin/plugin_models.h"
 #include "support/numeric_jacobian.h"
 
 /// What the tests of models ask of them, through the plugin ABI.
@@ -20,28 +20,28 @@ inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kNumeric = 1e-9;
 
 /// Jacobians by all roles side by side, m x n.
-inline std::vector<double> Linearised(const SensorModel& sensor, const Blocks& roles) {
-  const int m = sensor.measurement().geometry.tangent, n = TangentSize(sensor.roles());
-  std::vector<double> z(sensor.measurement().geometry.ambient), j(m * n, kPoison);
+inline std::vector<double> Linearised(const SharedSensor& sensor, const Blocks& roles) {
+  const int m = sensor->measurement().geometry.tangent, n = TangentSize(sensor->roles());
+  std::vector<double> z(sensor->measurement().geometry.ambient), j(m * n, kPoison);
   std::vector<double*> blocks;
   int column = 0;
-  for (const Space& role : sensor.roles()) {
+  for (const Space& role : sensor->roles()) {
     blocks.push_back(j.data() + column);
     column += role.geometry.tangent;
   }
   const std::vector<int> strides(blocks.size(), n);
-  EXPECT_EQ(sensor.Linearise(Pointers(roles).data(), z.data(), blocks.data(), strides.data()),
+  EXPECT_EQ(sensor->Linearise(Pointers(roles).data(), z.data(), blocks.data(), strides.data()),
             Status::kOk);
   return j;
 }
 
-inline std::vector<double> NumericallyLinearised(const SensorModel& sensor, const Blocks& roles) {
+inline std::vector<double> NumericallyLinearised(const SharedSensor& sensor, const Blocks& roles) {
   const auto predict = [&](const Blocks& x) {
-    Blocks z = Filled({sensor.measurement()}, kPoison);
-    EXPECT_EQ(sensor.Predict(Pointers(x).data(), z[0].data()), Status::kOk);
+    Blocks z = Filled({sensor->measurement()}, kPoison);
+    EXPECT_EQ(sensor->Predict(Pointers(x).data(), z[0].data()), Status::kOk);
     return z;
   };
-  return NumericJacobian(sensor.roles(), roles, {sensor.measurement()}, predict);
+  return NumericJacobian(sensor->roles(), roles, {sensor->measurement()}, predict);
 }
 
 inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& b,
@@ -57,47 +57,47 @@ struct Stepped {
   std::vector<double> f, g;
 };
 
-inline Stepped Step(const MotionModel& motion, const Blocks& x, const double* u, const double* w,
+inline Stepped Step(const SharedMotion& motion, const Blocks& x, const double* u, const double* w,
                     double dt_s) {
-  const int n = motion.tangent_size();
-  Stepped out{Filled(motion.blocks(), kPoison), std::vector<double>(n * n, kPoison),
-              std::vector<double>(n * motion.noise_size(), kPoison)};
-  EXPECT_EQ(motion.Step(Pointers(x).data(), u, w, dt_s, Pointers(out.next).data(), out.f.data(),
-                        out.g.data()),
+  const int n = motion->tangent_size();
+  Stepped out{Filled(motion->blocks(), kPoison), std::vector<double>(n * n, kPoison),
+              std::vector<double>(n * motion->noise_size(), kPoison)};
+  EXPECT_EQ(motion->Step(Pointers(x).data(), u, w, dt_s,
+                         {Pointers(out.next).data(), out.f.data(), out.g.data()}),
             Status::kOk);
   return out;
 }
 
 /// Checks F and G of a step at noise w against numeric ones.
-inline void ExpectTrueJacobians(const MotionModel& motion, const Blocks& x, const double* u,
+inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                 const std::vector<double>& w, double dt_s) {
   const auto value = [&](const Blocks& blocks, const std::vector<double>& noise) {
-    Blocks next = Filled(motion.blocks(), kPoison);
-    EXPECT_EQ(motion.Step(Pointers(blocks).data(), u, noise.data(), dt_s, Pointers(next).data(),
-                          nullptr, nullptr),
+    Blocks next = Filled(motion->blocks(), kPoison);
+    EXPECT_EQ(motion->Step(Pointers(blocks).data(), u, noise.data(), dt_s,
+                           {Pointers(next).data(), nullptr, nullptr}),
               Status::kOk);
     return next;
   };
   const Stepped out = Step(motion, x, u, w.data(), dt_s);
   EXPECT_EQ(out.next, value(x, w)) << "the value is the same with and without Jacobians";
   ExpectSame(out.f,
-             NumericJacobian(motion.blocks(), x, motion.blocks(),
+             NumericJacobian(motion->blocks(), x, motion->blocks(),
                              [&](const Blocks& blocks) { return value(blocks, w); }),
              kNumeric);
   Space noise;
-  noise.geometry = Geometry::Vector(motion.noise_size());
+  noise.geometry = Geometry::Vector(motion->noise_size());
   ExpectSame(out.g,
-             NumericJacobian({noise}, {w}, motion.blocks(),
+             NumericJacobian({noise}, {w}, motion->blocks(),
                              [&](const Blocks& blocks) { return value(x, blocks[0]); }),
              kNumeric);
 }
 
 /// L L' of the process noise, n_w x n_w.
-inline std::vector<double> Covariance(const MotionModel& motion, const Blocks& x, double dt_s,
+inline std::vector<double> Covariance(const SharedMotion& motion, const Blocks& x, double dt_s,
                                       const double* u = nullptr) {
-  const int n = motion.noise_size();
+  const int n = motion->noise_size();
   std::vector<double> l(n * n, kPoison), q(n * n);
-  EXPECT_EQ(motion.SqrtQ(Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
+  EXPECT_EQ(motion->SqrtQ(Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
   for (int r = 0; r < n; ++r) {
     for (int c = 0; c < n; ++c) {
       for (int k = 0; k < n; ++k) q[r * n + c] += l[r * n + k] * l[c * n + k];
@@ -111,25 +111,25 @@ struct NoisyStep {
   Blocks next;
   Eigen::MatrixXd f, n;
 };
-inline NoisyStep StepWithNoise(const MotionModel& motion, const Blocks& x, const double* u,
+inline NoisyStep StepWithNoise(const SharedMotion& motion, const Blocks& x, const double* u,
                                double dt_s, const Blocks& noise_of, double noise_dt_s) {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const int n = motion.tangent_size(), n_w = motion.noise_size();
+  const int n = motion->tangent_size(), n_w = motion->noise_size();
   const Stepped step = Step(motion, x, u, nullptr, dt_s);
   Rows l = Rows::Zero(n_w, n_w);
-  EXPECT_EQ(motion.SqrtQ(Pointers(noise_of).data(), u, noise_dt_s, l.data()), Status::kOk);
+  EXPECT_EQ(motion->SqrtQ(Pointers(noise_of).data(), u, noise_dt_s, l.data()), Status::kOk);
   return {step.next, Eigen::Map<const Rows>(step.f.data(), n, n),
           Eigen::Map<const Rows>(step.g.data(), n, n_w) * l};
 }
 
 /// How far the noise of two steps is from that of one over both, of the kind that the model
 /// declares, relative to it.
-inline double DefectOfParts(const MotionModel& motion, const Blocks& x, const double* u,
+inline double DefectOfParts(const SharedMotion& motion, const Blocks& x, const double* u,
                             double first_s, double second_s) {
   const double both_s = first_s + second_s;
   const Eigen::MatrixXd n = StepWithNoise(motion, x, u, both_s, x, both_s).n;
   const NoisyStep first = StepWithNoise(motion, x, u, first_s, x, first_s);
-  if (motion.discrete_noise()) {
+  if (motion->discrete_noise()) {
     const NoisyStep second = StepWithNoise(motion, first.next, u, second_s, x, first_s);
     return (second.f * first.n + second.n - n).norm() / n.norm();
   }

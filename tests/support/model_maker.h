@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "alidade/model/plugin.h"
-#include "alidade/plugin/model_instance.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade::testing {
 
@@ -64,12 +64,12 @@ inline std::shared_ptr<const ModelInstance> MakeInstance(Maker make, const MapHo
 }
 
 template <class Model>
-SensorModel MakeSensor(const MapHost::Values& values = {}) {
-  return SensorModel(MakeInstance(&EmplaceSensor<Model>, MapHost(values)));
+std::shared_ptr<const PluginSensor> AbiSensor(const MapHost::Values& values = {}) {
+  return std::make_shared<PluginSensor>(MakeInstance(&EmplaceSensor<Model>, MapHost(values)));
 }
 template <class Model>
-MotionModel MakeMotion(const MapHost::Values& values = {}) {
-  return MotionModel(MakeInstance(&EmplaceMotion<Model>, MapHost(values)));
+std::shared_ptr<const PluginMotion> AbiMotion(const MapHost::Values& values = {}) {
+  return std::make_shared<PluginMotion>(MakeInstance(&EmplaceMotion<Model>, MapHost(values)));
 }
 
 }  // namespace alidade::testing

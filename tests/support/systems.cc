@@ -10,21 +10,22 @@
 
 namespace alidade::testing {
 
-SensorModel LinearSensor(double gain, double sigma) {
-  return InProcessSensor(Linear(gain, sigma), "linear");
+SharedSensor LinearSensor(double gain, double sigma) {
+  return MakeSensor(Linear(gain, sigma), "linear");
 }
-MotionModel ConstantMotion(int size, double random_walk) {
-  return InProcessMotion(Constant<>(size, random_walk), "constant");
+SharedMotion ConstantMotion(int size, double random_walk) {
+  return MakeMotion(Constant<>(size, random_walk), "constant");
 }
-MotionModel ConstantVelocityMotion(double acceleration) {
-  return InProcessMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity");
+SharedMotion ConstantVelocityMotion(double acceleration) {
+  return MakeMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity");
 }
 
-void AddMotion(System& system, const std::string& name, const MotionModel& model,
+void AddMotion(System& system, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors) {
   MotionBinding binding{name, model, {}};
   for (std::size_t i = 0; i < priors.size(); ++i) {
-    const BlockId id = system.layout.Declare(name + "." + priors[i].block, name, model.blocks()[i]);
+    const BlockId id =
+        system.layout.Declare(name + "." + priors[i].block, name, model->blocks()[i]);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;
@@ -35,7 +36,7 @@ void AddMotion(System& system, const std::string& name, const MotionModel& model
   system.motions.push_back(binding);
 }
 
-void AddSensor(System& system, const std::string& name, const SensorModel& model,
+void AddSensor(System& system, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks) {
   SensorBinding binding{name, name, model, {}};
   for (const std::string& block : blocks) {
@@ -46,13 +47,13 @@ void AddSensor(System& system, const std::string& name, const SensorModel& model
   system.sensors.push_back(binding);
 }
 
-static System PointOf(const MotionModel& model) {
+static System PointOf(const SharedMotion& model) {
   System system;
   AddMotion(system, "p", model, {{"x", 1.0, 2.0}, {"v", -0.5, 3.0}});
   return system;
 }
 System MovingPoint(double acceleration) {
-  return PointOf(InProcessMotion(Jolted(acceleration), "jolted"));
+  return PointOf(MakeMotion(Jolted(acceleration), "jolted"));
 }
 System HeldPoint(double acceleration) { return PointOf(ConstantVelocityMotion(acceleration)); }
 
@@ -61,10 +62,9 @@ System DepthFilter() {
   AddMotion(system, "target", ConstantVelocityMotion(1.0),
             {{"depth", 0.35, 0.1}, {"depth_rate", 0.0, 0.5}});
   AddMotion(system, "template", ConstantMotion(1), {{"inverse_distance", 3.3, 0.5}});
-  AddSensor(system, "disparity",
-            InProcessSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity"),
+  AddSensor(system, "disparity", MakeSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity"),
             {"target.depth"});
-  AddSensor(system, "inverse_scale", InProcessSensor(Scale2d::FromPixels(300.0, 1.0), "scale_2d"),
+  AddSensor(system, "inverse_scale", MakeSensor(Scale2d::FromPixels(300.0, 1.0), "scale_2d"),
             {"target.depth", "template.inverse_distance"});
   return system;
 }
@@ -81,19 +81,19 @@ System WithStatus(System system, const std::string& name, BlockStatus status) {
 
 System WalkingOrientation() {
   System system;
-  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
+  AddMotion(system, "q", MakeMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
             {{"x", 0.0, 0.1}});
   system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
   system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
-  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  AddSensor(system, "z", MakeSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
   return system;
 }
 
 std::vector<StreamInfo> StreamsOf(const System& system) {
   std::vector<StreamInfo> streams;
   for (const SensorBinding& sensor : system.sensors) {
-    streams.push_back({sensor.stream, sensor.model.measurement().geometry.ambient, 0.0,
-                       sensor.model.known_size()});
+    streams.push_back({sensor.stream, sensor.model->measurement().geometry.ambient, 0.0,
+                       sensor.model->known_size()});
   }
   return streams;
 }

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
-#include "alidade/plugin/in_process.h"
 #include "motion_models/constant_velocity.h"
 
 /// Small systems composed in C++, for tests.
@@ -36,10 +36,10 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
 };
 
 // The models that most tests are made of, compiled once.
-SensorModel LinearSensor(double gain, double sigma);
-MotionModel ConstantMotion(int size, double random_walk = 0.0);
+SharedSensor LinearSensor(double gain, double sigma);
+SharedMotion ConstantMotion(int size, double random_walk = 0.0);
 /// One axis, discrete noise.
-MotionModel ConstantVelocityMotion(double acceleration);
+SharedMotion ConstantVelocityMotion(double acceleration);
 
 struct GivenPrior {
   std::string block;
@@ -47,10 +47,10 @@ struct GivenPrior {
 };
 
 /// Adds a state entry whose scalar blocks start at the given priors.
-void AddMotion(System& system, const std::string& name, const MotionModel& model,
+void AddMotion(System& system, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors);
 /// Adds a sensor of the stream of its name.
-void AddSensor(System& system, const std::string& name, const SensorModel& model,
+void AddSensor(System& system, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks);
 
 /// Constant velocity but for an acceleration that each step has by itself, constant during it.

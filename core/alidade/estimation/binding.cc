@@ -42,14 +42,14 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool smal
     const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
     AddRole(place, block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
   }
-  if (small && !sensor.model.has_landmark()) MakeWhole(place, initial.covariance().size());
+  if (small && !sensor.model->has_landmark()) MakeWhole(place, initial.covariance().size());
   place.strides.assign(sensor.roles.size(), place.width);
   return place;
 }
 
 MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
   MotionPlace place;
-  place.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
+  place.holds = motion.model->discrete_noise() && motion.model->noise_size() > 0;
   int column = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = layout[id];
@@ -93,8 +93,8 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
   for (std::size_t i = 0; i < system.sensors.size(); ++i) {
     for (std::size_t s = 0; s < streams.size(); ++s) {
       if (streams[s].name != system.sensors[i].stream) continue;
-      ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model.measurement().geometry.ambient);
-      ALIDADE_EXPECTS(streams[s].known == system.sensors[i].model.known_size());
+      ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model->measurement().geometry.ambient);
+      ALIDADE_EXPECTS(streams[s].known == system.sensors[i].model->known_size());
       stream_of_sensor[i] = static_cast<int>(s);
     }
   }

@@ -41,9 +41,9 @@ std::string WhyNotCompressed(const System& system) {
     return "`negative_depth: delete` asks for the depth of every landmark in each frame";
   }
   for (const SensorBinding& sensor : system.sensors) {
-    for (const Space& role : sensor.model.roles()) {
+    for (const Space& role : sensor.model->roles()) {
       if (!role.landmark() || IsFlat(role.geometry)) continue;
-      const auto representation = RepresentationOf(sensor.model.roles());
+      const auto representation = RepresentationOf(sensor.model->roles());
       const std::string why = "the role '" + role.name + "', of geometry " +
                               ToString(role.geometry) +
                               ", where many small corrections are not one";

@@ -15,7 +15,7 @@ namespace alidade::internal {
 
 Consensus::Consensus(const System& system) {
   for (const SensorBinding& sensor : system.sensors) {
-    const int dof = sensor.model.measurement().geometry.tangent;
+    const int dof = sensor.model->measurement().geometry.tangent;
     const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
     support_.push_back(ChiSquareQuantile(ransac.inlier_probability, dof));
     rescue_.push_back(ChiSquareQuantile(ransac.rescue_probability, dof));

@@ -54,9 +54,8 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   for (int i = 0; i < k * k; ++i) f[i] = kNotWritten;
   for (int i = 0; i < k * w; ++i) g[i] = kNotWritten;
   for (int i = 0; i < w * w; ++i) l[i] = kNotWritten;
-  if (motion.model.Step<false>(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f,
-                               g) != Status::kOk ||
-      motion.model.SqrtQ<false>(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
+  if (motion.model->Step(motion.x.data(), step.u.data(), nullptr, dt_s,
+                         {motion.next.data(), f, g, l}) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];
@@ -109,9 +108,8 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   for (int i = 0; i < m * m; ++i) l[i] = kNotWritten;
   for (int i = 0; i < m * N; ++i) sensor.H.data()[i] = sensor.blank.data()[i];
   const double* const* const roles = sensor.roles.data();
-  if (sensor.model.Linearise<false>(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
-          Status::kOk ||
-      sensor.model.SqrtNoise<false>(roles, sensor.seen, l) != Status::kOk) {
+  if (sensor.model->Evaluate({z}, roles, {h, sensor.jacobians.data(), sensor.strides.data(), l}) !=
+      Status::kOk) {
     return false;
   }
   for (int i = 0; i < m; ++i) {
@@ -192,8 +190,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
       !measurement.known.empty() || Defect(z, m) != 0.0 || at + m > kRows) {
     return Taken::kUnusual;
   }
-  sensor.seen.z = z;
-  const Status valid = sensor.model.Valid<false>(sensor.seen);
+  const Status valid = sensor.model->Valid({z});
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
   MeasurementReport& entry = f_.report.Add();
   if (valid == Status::kInvalid) {
@@ -295,10 +292,10 @@ bool FastPath::AddMotions() {
     const MotionPlace& place = binding.motion_places[i];
     if (!step.active) continue;
     if (place.parts.size() != 1 || std::ranges::count(place.at, -1) > 0) return false;
-    const MotionModel& model = binding.system.motions[i].model;
+    const SharedMotion& model = binding.system.motions[i].model;
     const JacobianPart& part = place.parts[0];
     Motion& motion = motions_.emplace_back(
-        Motion{model, &step, {}, {}, part.offset, part.size, model.noise_size()});
+        Motion{model, &step, {}, {}, part.offset, part.size, model->noise_size()});
     for (const int value : place.values) {
       motion.x.push_back(f_.state.values().data() + value);
       motion.next.push_back(f_.motions.next().data() + value);
@@ -313,13 +310,13 @@ bool FastPath::AddSensors() {
   for (std::size_t k = 0; k < binding.sensor_places.size(); ++k) {
     const SensorPlace& place = binding.sensor_places[k];
     const SensorBinding& bound = binding.system.sensors[k];
-    const Geometry& geometry = bound.model.measurement().geometry;
+    const Geometry& geometry = bound.model->measurement().geometry;
     const bool elsewhere = std::ranges::any_of(bound.roles, [&](const RoleBinding& role) {
       return role.block >= 0 && (role.jacobian_at == JacobianAt::kMeasurement ||
                                  !f_.first_estimates[static_cast<std::size_t>(role.block)].empty());
     });
     if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !place.whole ||
-        elsewhere || bound.model.known_size() > 0 || bound.loss.kind != LossKind::kNone ||
+        elsewhere || bound.model->known_size() > 0 || bound.loss.kind != LossKind::kNone ||
         std::ranges::count(place.consider, true) > 0) {
       return false;
     }

@@ -34,7 +34,7 @@ class FastPath {
   static constexpr int kMostOfOne = 3;  ///< most rows of a measurement
 
   struct Motion {
-    MotionModel model;
+    SharedMotion model;
     Motions::Step* step;
     std::vector<const double*> x;
     std::vector<double*> next;
@@ -42,15 +42,14 @@ class FastPath {
     int size, noise;
   };
   struct Sensor {
-    explicit Sensor(const SensorModel& of) : model(of) {}
+    explicit Sensor(const SharedSensor& of) : model(of) {}
 
-    SensorModel model;
+    SharedSensor model;
     std::vector<const double*> roles;
     std::vector<double*> jacobians;  ///< into H
     std::vector<int> strides;
     std::array<double, kMostOfOne * kSmall> H{};      ///< its zeros included
     std::array<double, kMostOfOne * kSmall> blank{};  ///< H before the model writes it
-    AlidadeObservation seen = detail::Seen(nullptr);  ///< the measurement that is taken
     int index, stream, rows;
     double threshold;  ///< of its gate
   };

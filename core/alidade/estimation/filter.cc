@@ -34,7 +34,7 @@ int FindSensor(const System& system, std::string_view name, const std::vector<do
   const int index = system.FindSensor(name);
   if (index < 0) RefuseName("sensor", name, internal::NamesOf(system.sensors));
   CheckKnown("sensor '" + std::string(name) + '\'',
-             system.sensors[static_cast<std::size_t>(index)].model.known_size(), known);
+             system.sensors[static_cast<std::size_t>(index)].model->known_size(), known);
   return index;
 }
 
@@ -53,7 +53,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
   CheckKnown("stream '" + stream.name + '\'', stream.known, one.known);
   for (const SensorBinding& sensor : system.sensors) {
     if (sensor.stream != stream.name) continue;
-    const Geometry& geometry = sensor.model.measurement().geometry;
+    const Geometry& geometry = sensor.model->measurement().geometry;
     const double defect = DistanceFrom(geometry, one.values.data());
     if (defect > kUnitTolerance) {
       throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +

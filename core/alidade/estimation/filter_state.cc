@@ -63,7 +63,7 @@ void FilterState::Activate() {
 /// The values of stationary blocks that have none noted yet.
 void FilterState::KeepFirstEstimates() {
   for (const MotionBinding& motion : binding->system.motions) {
-    if (!motion.model.stationary()) continue;
+    if (!motion.model->stationary()) continue;
     for (const BlockId id : motion.blocks) {
       const Block& block = state.layout()[id];
       std::vector<double>& first = first_estimates[static_cast<std::size_t>(id)];

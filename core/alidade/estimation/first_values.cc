@@ -15,7 +15,7 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
 /// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
 bool IsAwaited(const FilterState& f, const Row& row) {
   const SensorBinding& sensor = *row.binding;
-  const int index = sensor.model.inverse().role;
+  const int index = sensor.model->inverse().role;
   if (row.report->outcome != Outcome::kAccepted || index < 0) return false;
   const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
   const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
@@ -31,7 +31,7 @@ bool IsAwaited(const FilterState& f, const Row& row) {
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
                  const Measurement& measurement, const double* prior,
                  std::vector<const double*>& roles, Inverse& inverse) {
-  const SensorModel& model = sensor.model;
+  const SensorModel& model = *sensor.model;
   const auto first = static_cast<std::size_t>(model.inverse().role);
   const auto count = static_cast<std::size_t>(model.inverse().count);
   const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
@@ -55,9 +55,12 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
   inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
   inverse.by_prior.setConstant(rows, model.inverse().prior_size, kNotWritten);
-  const Status status = model.Initialise(
-      roles.data(), measurement.values.data(), prior, inverse.y.data(), inverse.of_role.data(),
-      inverse.by_z.data(), inverse.by_prior.data(), measurement.known.data());
+  const Status status =
+      model.Initialise(roles.data(), {measurement.values.data(), measurement.known.data()}, prior,
+                       {.y = inverse.y.data(),
+                        .jx = inverse.of_role.data(),
+                        .jz = inverse.by_z.data(),
+                        .jp = inverse.by_prior.data()});
   if (status != Status::kOk) return OutcomeOf(status);
   inverse.by_x.resize(rows, columns);
   Eigen::Index column = 0;
@@ -126,7 +129,7 @@ void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
 
 void Initialise(FilterState& f, const Row& row, const Inverse& inverse) {
   const SensorBinding& sensor = *row.binding;
-  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.inverse().role)].block;
+  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model->inverse().role)].block;
   f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
   f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();

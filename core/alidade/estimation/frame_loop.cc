@@ -68,7 +68,7 @@ void FrameLoop::Run(const Frame& frame) {
   recovery_.RepairCovariance(f, all);
   if (f.health.ended) return;
   for (Row& row : all) {
-    if (landmarks && row.binding->model.has_landmark()) continue;  // its rejections do not count
+    if (landmarks && row.binding->model->has_landmark()) continue;  // its rejections do not count
     if (gate_.Count(f, *row.report)) recovery_.Recover(f, row);
   }
   Spent(FramePart::kUpdate);
@@ -194,7 +194,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
   one.landmark = landmark;
   one.known = known;
   const Geometry& geometry =
-      f.binding->system.sensors[static_cast<std::size_t>(sensor)].model.measurement().geometry;
+      f.binding->system.sensors[static_cast<std::size_t>(sensor)].model->measurement().geometry;
   one.values.resize(static_cast<std::size_t>(geometry.ambient));
   geometry.Identity(one.values.data());
   Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);

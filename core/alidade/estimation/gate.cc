@@ -31,7 +31,7 @@ Gate::Gate(const System& system, const EkfOptions& options)
   for (const SensorBinding& sensor : system.sensors) {
     thresholds_.push_back(
         options.gate < 1.0
-            ? ChiSquareQuantile(options.gate, sensor.model.measurement().geometry.tangent)
+            ? ChiSquareQuantile(options.gate, sensor.model->measurement().geometry.tangent)
             : std::numeric_limits<double>::infinity());
   }
 }

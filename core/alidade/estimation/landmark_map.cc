@@ -131,7 +131,7 @@ LandmarkMap::LandmarkMap(const Binding& binding)
     : options_(*binding.system.landmarks), xyz_(Xyz()) {
   for (const SensorBinding& sensor : binding.system.sensors) {
     Family& family = families_.emplace_back();
-    const std::vector<Space>& roles = sensor.model.roles();
+    const std::vector<Space>& roles = sensor.model->roles();
     family.representation = RepresentationOf(roles);
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (roles[i].name == "position") family.position = static_cast<int>(i);
@@ -140,10 +140,10 @@ LandmarkMap::LandmarkMap(const Binding& binding)
       if (family.first < 0) family.first = static_cast<int>(i);
       family.roles.push_back(roles[i]);
     }
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model.inverse().prior_size == 0 ||
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model->inverse().prior_size == 0 ||
                     (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
                      options_.prior->sigma >= 0.0));
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model.inverse().prior_size <= 1);
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model->inverse().prior_size <= 1);
     ALIDADE_EXPECTS(family.first < 0 || family.representation == XyzRepresentation() ||
                     sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
@@ -206,7 +206,7 @@ void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& l
   row.own = *row.place;
   row.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(), landmark.blocks);
   row.place = &row.own;
-  if (landmark.representation != family.representation) row.model = &*row.binding->xyz;
+  if (landmark.representation != family.representation) row.model = row.binding->xyz.get();
 }
 
 void LandmarkMap::Maintain(FilterState& f, std::span<Row> rows) {
@@ -359,7 +359,7 @@ void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
 void LandmarkMap::Convert(FilterState& f, std::span<Row> rows) {
   if (!(options_.max_linearity_index > 0.0)) return;
   for (const Row& row : rows) {
-    if (!row.on_landmark() || row.model != &row.binding->model || !IsUsed(row)) continue;
+    if (!row.on_landmark() || row.model != row.binding->model.get() || !IsUsed(row)) continue;
     const auto found = landmarks_.find(row.measurement->landmark);
     if (found == landmarks_.end() || !found->second.in_state()) continue;
     f.report.landmarks.converted += ConvertToXyz(f, found->first, found->second, row);
@@ -406,11 +406,11 @@ void LandmarkMap::InitialiseNew(FilterState& f, std::span<Row> rows) {
 /// The landmark that the row may initialise, or the end.
 LandmarkMap::ById::iterator LandmarkMap::FindWaiting(const FilterState& f, const Row& row) {
   if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
-      row.binding->model.inverse().role != FamilyOf(row).first) {
+      row.binding->model->inverse().role != FamilyOf(row).first) {
     return landmarks_.end();
   }
   const bool takes_prior =
-      row.binding->model.inverse().prior_size > 0 && prior_.min_observations > 0;
+      row.binding->model->inverse().prior_size > 0 && prior_.min_observations > 0;
   const int least = takes_prior ? prior_.min_observations : options_.min_observations;
   const auto found = landmarks_.find(row.measurement->landmark);
   const bool waits =

@@ -91,8 +91,9 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
-    const Status status = model.Initialise(row.roles.data(), entry.z.data(), implied_.data(),
-                                           nullptr, nullptr, row.measurement->known.data());
+    const Status status =
+        model.Initialise(row.roles.data(), {entry.z.data(), row.measurement->known.data()}, nullptr,
+                         {.y = implied_.data()});
     // What z cannot have come from tells nothing of where to linearise.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;

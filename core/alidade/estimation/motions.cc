@@ -26,7 +26,7 @@ std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const do
 
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
-  const MotionModel& model = motion.model;
+  const MotionModel& model = *motion.model;
   const Eigen::Index n = model.tangent_size();
   const Eigen::Index of_f = f == nullptr ? 0 : n * n,
                      of_g = g == nullptr ? 0 : n * model.noise_size();
@@ -37,7 +37,7 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
   }
   std::fill_n(f, of_f, kNotWritten);
   std::fill_n(g, of_g, kNotWritten);
-  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
+  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, {to.data(), f, g});
   if (status != Status::kOk) return OutcomeOf(status);
   bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
   for (std::size_t k = 0; k < place.values.size(); ++k) {
@@ -48,9 +48,9 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
 
 Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                 const double* u, double dt_s, double* l) {
-  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
+  const Eigen::Index size = Eigen::Index{motion.model->noise_size()} * motion.model->noise_size();
   std::fill_n(l, size, kNotWritten);
-  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
+  const Status status = motion.model->SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
   if (status != Status::kOk) return OutcomeOf(status);
   return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
 }
@@ -63,7 +63,7 @@ Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
   }
   const bool failed = outcome == Outcome::kFailed;
   return {failed ? "plugin_failed" : "diverged",
-          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
+          who + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
 }
 
 void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
@@ -83,7 +83,7 @@ Motions::Motions(const Binding& binding)
       steps_(binding.system.motions.size()),
       next_(binding.initial.values().size()) {
   for (std::size_t i = 0; i < steps_.size(); ++i) {
-    const MotionModel& model = binding.system.motions[i].model;
+    const MotionModel& model = *binding.system.motions[i].model;
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
     Step& step = steps_[i];
@@ -101,7 +101,7 @@ void Motions::Activate(const StateLayout& layout) {
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const MotionBinding& motion = binding_->system.motions[i];
     steps_[i].active =
-        !motion.model.stationary() &&
+        !motion.model->stationary() &&
         std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
     holds_ = holds_ || (steps_[i].active && binding_->motion_places[i].holds);
   }
@@ -130,10 +130,10 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
     outcome = SqrtQAt(motion, place, x, step.u.data(), dt_s, step.l.data());
   }
   if (outcome != Outcome::kAccepted || !derivatives) return TroubleOf(motion, outcome);
-  SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(), motion.model.noise_size(),
-              step.gl.data(), step.q.data());
+  SpreadNoise(step.g.data(), step.l.data(), motion.model->tangent_size(),
+              motion.model->noise_size(), step.gl.data(), step.q.data());
   if (goes_on) {
-    CarryHeld(motion.model, place, step);
+    CarryHeld(*motion.model, place, step);
   } else if (place.holds) {
     step.m = step.gl;
   }
@@ -219,7 +219,7 @@ void Motions::Propagate(Covariance& p) {
 int Motions::noise_size() const {
   int size = 0;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
-    if (steps_[i].active) size += binding_->system.motions[i].model.noise_size();
+    if (steps_[i].active) size += binding_->system.motions[i].model->noise_size();
   }
   return size;
 }
@@ -249,7 +249,7 @@ Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Worksp
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
     if (!step.active) continue;
-    const MotionModel& model = binding_->system.motions[i].model;
+    const MotionModel& model = *binding_->system.motions[i].model;
     const Eigen::Index width = model.noise_size();
     for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {
       if (place.at[row] < 0) continue;

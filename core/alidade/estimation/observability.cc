@@ -18,15 +18,15 @@ constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0
                                  {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
 /// The sensor's model for landmarks of the representation xyz; null where it has none.
-const SensorModel* XyzModel(const SensorBinding& sensor) {
-  if (RepresentationOf(sensor.model.roles()) == internal::XyzRepresentation()) return &sensor.model;
-  return sensor.xyz ? &*sensor.xyz : nullptr;
+const SharedSensor& XyzModel(const SensorBinding& sensor) {
+  const bool xyz = RepresentationOf(sensor.model->roles()) == internal::XyzRepresentation();
+  return xyz ? sensor.model : sensor.xyz;
 }
 
 /// The block in the role of that name; -1 where there is none.
 BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-    if (sensor.model.roles()[i].name == role) return sensor.roles[i].block;
+    if (sensor.model->roles()[i].name == role) return sensor.roles[i].block;
   }
   return -1;
 }
@@ -41,9 +41,9 @@ std::vector<double> StartOf(const System& system, BlockId block,
 
 /// The sensor as it sees the one landmark `block`.
 SensorBinding SeenAs(const SensorBinding& sensor, BlockId block) {
-  SensorBinding binding{sensor.name, sensor.stream, *XyzModel(sensor), {}};
+  SensorBinding binding{sensor.name, sensor.stream, XyzModel(sensor), {}};
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-    if (!sensor.model.roles()[i].landmark()) binding.roles.push_back(sensor.roles[i]);
+    if (!sensor.model->roles()[i].landmark()) binding.roles.push_back(sensor.roles[i]);
   }
   binding.roles.push_back({block});
   return binding;
@@ -113,7 +113,7 @@ std::vector<double> GenericInput(const MotionModel& model, Random* random) {
 bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
              Eigen::MatrixXd& phi) {
   for (const MotionBinding& motion : system.motions) {
-    const int n = motion.model.tangent_size();
+    const int n = motion.model->tangent_size();
     std::vector<const double*> x;
     std::vector<std::vector<double>> next;
     std::vector<double*> y;
@@ -123,9 +123,9 @@ bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
     }
     for (auto& value : next) y.push_back(value.data());
     RowMajor f = RowMajor::Constant(n, n, internal::kNotWritten);
-    RowMajor g(n, std::max(1, motion.model.noise_size()));
-    const std::vector<double> u = GenericInput(motion.model, random);
-    if (motion.model.Step(x.data(), u.data(), nullptr, dt_s, y.data(), f.data(), g.data()) !=
+    RowMajor g(n, std::max(1, motion.model->noise_size()));
+    const std::vector<double> u = GenericInput(*motion.model, random);
+    if (motion.model->Step(x.data(), u.data(), nullptr, dt_s, {y.data(), f.data(), g.data()}) !=
             Status::kOk ||
         !f.allFinite()) {
       return false;
@@ -177,7 +177,7 @@ class RowSpace {
 void ObserveBy(const SensorBinding& sensor, const double* known, const System& system,
                const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
-  const int m = sensor.model.measurement().geometry.tangent;
+  const int m = sensor.model->measurement().geometry.tangent;
   std::vector<const double*> roles;
   std::vector<RowMajor> j;
   for (const RoleBinding& role : sensor.roles) {
@@ -193,8 +193,8 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
     data.push_back(block.data());
     strides.push_back(static_cast<int>(block.cols()));
   }
-  std::vector<double> z(static_cast<std::size_t>(sensor.model.measurement().geometry.ambient));
-  if (sensor.model.Linearise(roles.data(), z.data(), data.data(), strides.data(), known) !=
+  std::vector<double> z(static_cast<std::size_t>(sensor.model->measurement().geometry.ambient));
+  if (sensor.model->Linearise(roles.data(), z.data(), data.data(), strides.data(), known) !=
       Status::kOk) {
     return;
   }
@@ -220,7 +220,7 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
     for (const double element : value) reach = std::max(reach, 2.0 * std::abs(element));
   }
   for (const SensorBinding& sensor : system.sensors) {
-    std::vector<double> known(static_cast<std::size_t>(sensor.model.known_size()));
+    std::vector<double> known(static_cast<std::size_t>(sensor.model->known_size()));
     for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
       for (double& number : known) number = reach * random.Normal();
       ObserveBy(sensor, known.data(), system, t, phi, rows);
@@ -284,7 +284,7 @@ void Reduce(Eigen::MatrixXd& basis) {
 }  // namespace
 
 std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const System& system) {
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   const auto blind = [&](const SensorBinding& s) { return sees(s) && XyzModel(s) == nullptr; };
   const auto first = std::ranges::find_if(system.sensors, sees);
   if (!system.landmarks || first == system.sensors.end() ||

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/base/error.h"
-#include "alidade/plugin/in_process.h"
+#include "alidade/estimation/direct_models.h"
 
 namespace alidade::internal {
 namespace {
@@ -98,21 +98,21 @@ const char* NameOf(OwnedDynamics dynamics) {
 
 }  // namespace
 
-MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
+SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
   const char* const name = NameOf(owned.dynamics);
   switch (geometry.kind) {
     case GeometryKind::kAngle:
-      return InProcessMotion(OwnedOn<Angle>(owned), name);
+      return MakeMotion(OwnedOn<Angle>(owned), name);
     case GeometryKind::kUnitQuaternion:
-      return InProcessMotion(OwnedOn<UnitQuaternion>(owned), name);
+      return MakeMotion(OwnedOn<UnitQuaternion>(owned), name);
     case GeometryKind::kUnitVector:
-      return InProcessMotion(OwnedOn<UnitVector>(owned), name);
+      return MakeMotion(OwnedOn<UnitVector>(owned), name);
     case GeometryKind::kVector:
     case GeometryKind::kProduct:  // of measurements alone
       break;
   }
   ALIDADE_EXPECTS(geometry.kind == GeometryKind::kVector);
-  return InProcessMotion(OwnedVector(owned, geometry.ambient), name);
+  return MakeMotion(OwnedVector(owned, geometry.ambient), name);
 }
 
 }  // namespace alidade::internal

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/plugin/model_instance.h"
+#include "alidade/estimation/models.h"
 
 namespace alidade::internal {
 
@@ -15,6 +15,6 @@ namespace alidade::internal {
 /// The model is named `constant`, `random_walk` or `gauss_markov`. L is the density of the driving
 /// white noise, tau the time constant. Noise is continuous; exact for vectors and angles.
 /// [BarShalom2001] ch. 4.
-MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned);
+SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned);
 
 }  // namespace alidade::internal

@@ -106,34 +106,34 @@ LandmarkOptions ReadOptions(const Node& node) {
 
 std::vector<Space> LandmarkRoles(const SensorBinding& sensor) {
   std::vector<Space> roles;
-  for (const Space& role : sensor.model.roles()) {
+  for (const Space& role : sensor.model->roles()) {
     if (role.landmark()) roles.push_back(role);
   }
   return roles;
 }
 
 std::string RepresentationText(const SensorBinding& sensor) {
-  const auto representation = RepresentationOf(sensor.model.roles());
+  const auto representation = RepresentationOf(sensor.model->roles());
   return representation ? ToString(*representation) : "a representation of its own";
 }
 
 /// Refuses a sensor that cannot share landmarks with `first`, or whose roles are not in order.
 void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first) {
   const auto is_landmark = [](const Space& role) { return role.landmark(); };
-  if (!std::ranges::is_partitioned(sensor.model.roles(), std::not_fn(is_landmark))) {
-    model.Fail("model '" + sensor.model.name() + "' has roles behind those of its landmark",
+  if (!std::ranges::is_partitioned(sensor.model->roles(), std::not_fn(is_landmark))) {
+    model.Fail("model '" + sensor.model->name() + "' has roles behind those of its landmark",
                "a model whose landmark comes last");
   }
-  if (sensor.model.inverse().prior_size > 1) {
-    model.Fail("model '" + sensor.model.name() + "' needs a prior of " +
-                   std::to_string(sensor.model.inverse().prior_size) + " numbers",
+  if (sensor.model->inverse().prior_size > 1) {
+    model.Fail("model '" + sensor.model->name() + "' needs a prior of " +
+                   std::to_string(sensor.model->inverse().prior_size) + " numbers",
                "a model that needs one, the inverse distance, or none");
   }
   const auto same = [](const Space& a, const Space& b) {
     return a.name == b.name && a.geometry == b.geometry;
   };
   if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), same)) {
-    model.Fail("model '" + sensor.model.name() + "' writes landmarks otherwise than sensor '" +
+    model.Fail("model '" + sensor.model->name() + "' writes landmarks otherwise than sensor '" +
                    first.name + "', as " + RepresentationText(sensor),
                "the same representation, " + RepresentationText(first));
   }
@@ -141,32 +141,32 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
 
 /// Refuses a sensor that does not say where it is seen from, which `key` needs to know.
 void CheckPosition(const Node& key, const SensorBinding& sensor) {
-  if (std::ranges::find(sensor.model.roles(), "position", &Space::name) !=
-      sensor.model.roles().end()) {
+  if (std::ranges::find(sensor.model->roles(), "position", &Space::name) !=
+      sensor.model->roles().end()) {
     return;
   }
-  key.Fail("model '" + sensor.model.name() + "' of sensor '" + sensor.name +
+  key.Fail("model '" + sensor.model->name() + "' of sensor '" + sensor.name +
                "' has no role 'position', the place that landmarks are seen from",
            "the key left out");
 }
 
 /// Refuses what one sensor cannot do that `options` ask for.
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
-  const auto representation = RepresentationOf(sensor.model.roles());
-  const std::string model = "model '" + sensor.model.name() + "' of sensor '" + sensor.name + "'";
-  if (sensor.model.inverse().prior_size > 0 && !options.prior) {
+  const auto representation = RepresentationOf(sensor.model->roles());
+  const std::string model = "model '" + sensor.model->name() + "' of sensor '" + sensor.name + "'";
+  if (sensor.model->inverse().prior_size > 0 && !options.prior) {
     node.Fail("no prior: " + model + " does not determine the distance of a landmark",
               "prior: {inverse_distance: ..., sigma: ...}");
   }
   if (options.prior) {
     const Node prior = node.At("prior");
-    if (representation == internal::XyzRepresentation() && sensor.model.inverse().prior_size > 0 &&
+    if (representation == internal::XyzRepresentation() && sensor.model->inverse().prior_size > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance").Fail("a landmark at infinity cannot be xyz", "above 0, 1/m");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
-  const bool has_xyz = representation == internal::XyzRepresentation() || sensor.xyz.has_value();
+  const bool has_xyz = representation == internal::XyzRepresentation() || sensor.xyz != nullptr;
   if (!options.known.empty() && !has_xyz) {
     node.At("known").Fail(model + " has no landmarks of representation xyz", "no known landmarks");
   }
@@ -190,16 +190,16 @@ void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, Senso
   if (const auto node = entry.Find("outlier_rejection")) {
     binding.outlier_rejection = ReadOnePointRansac(*node);
   }
-  const auto representation = RepresentationOf(binding.model.roles());
+  const auto representation = RepresentationOf(binding.model->roles());
   if (!representation || IsXyz(*representation)) return;
-  SensorModel xyz =
-      host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzRepresentation()));
-  if (RepresentationOf(xyz.roles()) == internal::XyzRepresentation()) binding.xyz = std::move(xyz);
+  SharedSensor xyz =
+      host.CreateSensor(binding.model->name(), entry, ToString(internal::XyzRepresentation()));
+  if (RepresentationOf(xyz->roles()) == internal::XyzRepresentation()) binding.xyz = std::move(xyz);
 }
 
 std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
                                                        const std::vector<SensorBinding>& sensors) {
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   const auto first = std::ranges::find_if(sensors, sees);
   if (first == sensors.end()) {
     if (const auto node = root.Find("landmarks")) {
@@ -215,9 +215,9 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
     const Node model = root.At("sensors").At(sensor.name).At("model");
     CheckRoles(model, sensor, *first);
     CheckOptions(node, options, sensor);
-    const int role = sensor.model.inverse().role;
-    can_begin =
-        can_begin || (role >= 0 && sensor.model.roles()[static_cast<std::size_t>(role)].landmark());
+    const int role = sensor.model->inverse().role;
+    can_begin = can_begin ||
+                (role >= 0 && sensor.model->roles()[static_cast<std::size_t>(role)].landmark());
   }
   if (!can_begin) {
     node.Fail("no sensor determines where a landmark is when it is first seen", "known landmarks");

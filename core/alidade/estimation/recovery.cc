@@ -88,7 +88,7 @@ void Recovery::Recover(FilterState& f, Row& row) {
   const SensorBinding& sensor = *row.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +
                           std::to_string(options_.rejection_recovery_after) + " times in a row: ";
-  const int role = sensor.model.inverse().role;
+  const int role = sensor.model->inverse().role;
   Inverse inverse;
   const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
   if (options_.rejection_recovery == RejectionRecovery::kReset && target != nullptr &&

@@ -51,9 +51,9 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
                UpdateReport& report) {
   const auto index = static_cast<std::size_t>(sensor);
   const SensorBinding& bound = binding.system.sensors[index];
-  const Geometry& geometry = bound.model.measurement().geometry;
+  const Geometry& geometry = bound.model->measurement().geometry;
   ALIDADE_EXPECTS(std::ssize(measurement.values) == geometry.ambient);
-  ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model.known_size());
+  ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model->known_size());
   ALIDADE_EXPECTS(measurement.covariance.empty() ||
                   std::ssize(measurement.covariance) == geometry.tangent * geometry.tangent);
   if (count_ == rows_.size()) rows_.emplace_back();
@@ -61,7 +61,7 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   row.measurement = &measurement;
   row.sensor = sensor;
   row.binding = &bound;
-  row.model = &bound.model;
+  row.model = bound.model.get();
   row.place = &binding.sensor_places[index];
   MeasurementReport& entry = report.Add();
   entry.Reset(sensor, measurement.landmark, geometry.tangent);
@@ -84,7 +84,7 @@ Outcome Rows::Check(const Row& row) {
       return Outcome::kInvalid;
     }
   }
-  return OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
+  return OutcomeOf(row.model->Valid({m.values.data(), m.known.data()}));
 }
 
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,

@@ -138,8 +138,8 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
                     System& system) {
   const std::string model_name = entry.At("model", "a state entry").Text();
   MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
-  binding.input = ReadInput(entry, binding.model);
-  const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
+  binding.input = ReadInput(entry, *binding.model);
+  const std::vector<std::string> names = ReadBlockNames(entry, *binding.model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto constant = ReadNames(entry, "constant", names);
   for (const std::string& both : constant) {
@@ -149,7 +149,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
               "a block in one of them: a constant is exact, a consider state uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
-  const std::vector<Space>& spaces = binding.model.blocks();
+  const std::vector<Space>& spaces = binding.model->blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
     const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
                        !Contains(considered, names[i]);
@@ -390,16 +390,16 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
                         {}};
   if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
-  OwnedReader owned(name, entry, roles, binding.model);
-  for (std::size_t i = 0; i < binding.model.roles().size(); ++i) {
-    const Space& role = binding.model.roles()[i];
+  OwnedReader owned(name, entry, roles, *binding.model);
+  for (std::size_t i = 0; i < binding.model->roles().size(); ++i) {
+    const Space& role = binding.model->roles()[i];
     if (role.landmark()) {
       binding.roles.push_back({});
       continue;
     }
     const auto node = roles.Find(role.name);
     if (!node && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
-      binding.roles.push_back({owned.Add(role, binding.model.instance().owned(i), system)});
+      binding.roles.push_back({owned.Add(role, binding.model->owned(i), system)});
       continue;
     }
     if (!node && role.optional()) {
@@ -407,7 +407,7 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
       continue;
     }
     const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
-    binding.roles.push_back(ReadRole(given, role, binding.model, system));
+    binding.roles.push_back(ReadRole(given, role, *binding.model, system));
     const BlockId block = binding.roles.back().block;
     const auto same = [block](const RoleBinding& r) { return r.block == block; };
     if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
@@ -415,7 +415,7 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
                  "a block of its own for each role");
     }
   }
-  if (binding.model.has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
+  if (binding.model->has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
   owned.AddTimeOffset(system, binding);
   roles.RejectUnread();
   owned.RejectUnread();
@@ -444,7 +444,7 @@ void CheckInitialisation(const Node& root, const System& system) {
                 Nearest(prior.from, NamesOf(system.sensors)));
     }
     const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
-    const int role = binding.model.inverse().role;
+    const int role = binding.model->inverse().role;
     if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
       place(prior.block)
           .Fail("sensor '" + prior.from + "' does not determine this block",
@@ -557,7 +557,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   if (const auto start = root.Find("initial_time_s"))
     system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
   if (!only.empty()) system = WithoutUntouched(std::move(system));
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
   CheckInitialisation(root, system);
   return system;
@@ -566,10 +566,10 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
 BlockId internal::PositionBlockOf(const System& system) {
   BlockId path = -1;
   for (const SensorBinding& binding : system.sensors) {
-    if (!binding.model.has_landmark()) continue;
+    if (!binding.model->has_landmark()) continue;
     for (std::size_t r = 0; r < binding.roles.size(); ++r) {
       const BlockId id = binding.roles[r].block;
-      const bool position = binding.model.roles()[r].name == "position" && id >= 0;
+      const bool position = binding.model->roles()[r].name == "position" && id >= 0;
       if (position && system.layout[id].geometry().ambient == 3) path = id;
     }
   }
@@ -580,7 +580,7 @@ std::string internal::UnitOf(const System& system, BlockId id) {
   if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
   for (const SensorBinding& sensor : system.sensors) {
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
-      if (sensor.roles[r].block == id) return sensor.model.roles()[r].unit;
+      if (sensor.roles[r].block == id) return sensor.model->roles()[r].unit;
     }
   }
   return {};

@@ -10,8 +10,8 @@
 
 #include "alidade/config/config.h"
 #include "alidade/estimation/landmarks.h"
+#include "alidade/estimation/models.h"
 #include "alidade/estimation/robust_loss.h"
-#include "alidade/plugin/model_instance.h"
 #include "alidade/plugin/plugin_host.h"
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/state.h"
@@ -37,12 +37,12 @@ struct RoleBinding {
 struct SensorBinding {
   std::string name;
   std::string stream;
-  SensorModel model;
+  SharedSensor model;
   std::vector<RoleBinding> roles;
   RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
   /// The same sensor of landmarks that are xyz, where `model` is of another representation and
   /// landmarks may become xyz or start as such. Its other roles are those of `model`.
-  std::optional<SensorModel> xyz = {};
+  SharedSensor xyz = {};
   /// How those of its matches are found that agree; none: each is gated on its own alone.
   std::optional<OnePointRansac> outlier_rejection = {};
 };
@@ -57,7 +57,7 @@ struct InputBinding {
 /// Motion model -> the blocks it moves, and what drives it.
 struct MotionBinding {
   std::string name;
-  MotionModel model;
+  SharedMotion model;
   std::vector<BlockId> blocks;
   InputBinding input = {};
 };

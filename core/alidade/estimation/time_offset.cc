@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <numeric>
 #include <utility>
 
 #include "alidade/base/all_finite.h"
@@ -16,50 +15,30 @@ namespace {
 /// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
 /// ones stay.
 struct Mover {
-  MotionModel model;
+  SharedMotion model;
   int first, count;
   std::vector<bool> stays;
 };
 
-/// The sensor at another time, behind the calls of the plugin ABI.
-class OffsetSensor {
+/// The sensor at another time.
+class OffsetSensor final : public SensorModel {
  public:
-  OffsetSensor(SensorModel sensor, std::vector<Mover> movers, std::vector<int> place_of_role,
+  OffsetSensor(SharedSensor sensor, std::vector<Mover> movers, std::vector<int> place_of_role,
                std::vector<Space> roles, int offset_role)
-      : sensor_(std::move(sensor)),
+      : SensorModel(Describe(*sensor, movers, place_of_role, std::move(roles))),
+        sensor_(std::move(sensor)),
         movers_(std::move(movers)),
         place_(std::move(place_of_role)),
-        roles_(std::move(roles)),
         offset_(offset_role) {
     for (const Mover& mover : movers_) {
-      for (const Space& block : mover.model.blocks()) {
+      for (const Space& block : mover.model->blocks()) {
         ambient_ += static_cast<std::size_t>(block.geometry.ambient);
       }
-      const auto n = static_cast<std::size_t>(mover.model.tangent_size());
+      const auto n = static_cast<std::size_t>(mover.model->tangent_size());
       tangent_ += n;
       square_ += n * n;
-      noise_ = std::max(noise_, n * static_cast<std::size_t>(mover.model.noise_size()));
+      noise_ = std::max(noise_, n * static_cast<std::size_t>(mover.model->noise_size()));
     }
-    Describe();
-  }
-  OffsetSensor(const OffsetSensor&) = delete;
-  OffsetSensor& operator=(const OffsetSensor&) = delete;
-
-  /// Takes over `self`.
-  static SensorModel Publish(std::unique_ptr<OffsetSensor> self) {
-    AlidadeInstance instance{};
-    instance.struct_size = sizeof(instance);
-    instance.kind = ALIDADE_KIND_SENSOR;
-    instance.destroy = [](void* of) { delete static_cast<OffsetSensor*>(of); };
-    instance.error_text = [](const void* of) { return Of(of).ErrorText(); };
-    instance.description = &self->description_;
-    instance.sensor = &self->calls_;
-    const std::string name = self->sensor_.name(), plugin = self->sensor_.instance().plugin();
-    const std::vector<double> noise = self->sensor_.instance().given_noise();
-    instance.self = self.release();
-    const auto model = std::make_shared<ModelInstance>(instance, name, plugin);
-    if (!noise.empty()) model->GiveNoise(noise);
-    return SensorModel(model);
   }
 
  private:
@@ -70,58 +49,29 @@ class OffsetSensor {
     std::vector<const double*> roles;
     std::vector<double*> jacobians;
     std::vector<int> strides;
-    std::string error;  ///< of a mover or the sensor, where it failed
   };
   static Memory& MemoryOfThread() {
     static thread_local Memory memory;
     return memory;
   }
-  static const OffsetSensor& Of(const void* self) {
-    return *static_cast<const OffsetSensor*>(self);
-  }
 
-  void Describe() {
-    const AlidadeDescription& inner = *sensor_.instance().c().description;
-    spaces_.resize(roles_.size());
-    for (std::size_t i = 0; i < roles_.size(); ++i) {
-      const Space& role = roles_[i];
-      texts_.push_back(Join(role.elements, ","));
-      AlidadeSpace& space = spaces_[i];
-      space.struct_size = sizeof(space);
-      space.geometry = static_cast<std::uint32_t>(role.geometry.kind);
-      space.ambient = role.geometry.ambient;
-      space.tangent = role.geometry.tangent;
-      space.flags = role.flags & (ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED);
-      space.name = role.name.c_str();
-      space.unit = role.unit.c_str();
-      space.doc = role.doc.c_str();
-    }
-    for (std::size_t i = 0; i < roles_.size(); ++i) spaces_[i].elements = texts_[i].c_str();
-    description_.struct_size = sizeof(description_);
-    description_.role_count = static_cast<std::uint32_t>(spaces_.size());
-    description_.role_stride = sizeof(AlidadeSpace);
-    description_.roles = spaces_.data();
-    description_.output = inner.output;
-    description_.known = inner.known;
-    description_.capabilities = inner.capabilities;
-    description_.prior_count = inner.prior_count;
-    calls_.struct_size = sizeof(calls_);
-    calls_.eval = Eval;
-    calls_.sqrt_noise = SqrtNoise;
-    if (sensor_.instance().c().sensor->valid != nullptr) calls_.valid = Valid;
-    const int role = sensor_.inverse().role;
-    if (role >= 0 && !IsMoved(place_[static_cast<std::size_t>(role)])) {
-      description_.initialise_role = place_[static_cast<std::size_t>(role)];
-      calls_.initialise = Initialise;
-    } else {
-      description_.capabilities &= ~std::uint32_t{ALIDADE_CAN_INITIALISE};
-    }
-  }
-
-  bool IsMoved(int place) const {
-    return std::ranges::any_of(movers_, [&](const Mover& mover) {
+  static bool IsMoved(const std::vector<Mover>& movers, int place) {
+    return std::ranges::any_of(movers, [&](const Mover& mover) {
       return place >= mover.first && place < mover.first + mover.count;
     });
+  }
+  bool IsMoved(int place) const { return IsMoved(movers_, place); }
+
+  static Description Describe(const SensorModel& sensor, const std::vector<Mover>& movers,
+                              const std::vector<int>& place_of_role, std::vector<Space> roles) {
+    Description description = sensor.description();
+    description.owned.clear();
+    description.roles = std::move(roles);
+    for (Space& role : description.roles) role.flags &= ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED;
+    int& inverse = description.inverse.role;
+    if (inverse >= 0) inverse = place_of_role[static_cast<std::size_t>(inverse)];
+    if (IsMoved(movers, inverse)) description.inverse = {};
+    return description;
   }
 
   /// x' of one mover after dt_s, its blocks one after the other; its F unless null.
@@ -129,17 +79,17 @@ class OffsetSensor {
                      Memory& memory, double* f) {
     std::array<double*, kMaxRoles> to;
     double* at = next;
-    for (std::size_t b = 0; b < mover.model.blocks().size(); ++b) {
+    for (std::size_t b = 0; b < mover.model->blocks().size(); ++b) {
       to[b] = at;
-      at = std::fill_n(at, mover.model.blocks()[b].geometry.ambient, kNotWritten);
+      at = std::fill_n(at, mover.model->blocks()[b].geometry.ambient, kNotWritten);
     }
-    const int n = mover.model.tangent_size();
+    const int n = mover.model->tangent_size();
     if (f != nullptr) std::fill_n(f, n * n, kNotWritten);
-    const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
-                                           f == nullptr ? nullptr : memory.g.data());
+    const Status status = mover.model->Step(
+        x, nullptr, nullptr, dt_s, {to.data(), f, f == nullptr ? nullptr : memory.g.data()});
     int row = 0;
-    for (std::size_t b = 0; status == Status::kOk && b < mover.model.blocks().size(); ++b) {
-      const Geometry& geometry = mover.model.blocks()[b].geometry;
+    for (std::size_t b = 0; status == Status::kOk && b < mover.model->blocks().size(); ++b) {
+      const Geometry& geometry = mover.model->blocks()[b].geometry;
       geometry.Normalise(to[b]);
       if (mover.stays[b]) std::copy_n(x[b], geometry.ambient, to[b]);
       for (int r = row; r < row + geometry.tangent && mover.stays[b] && f != nullptr; ++r) {
@@ -157,13 +107,13 @@ class OffsetSensor {
     constexpr double kStep = 1e-3;
     const std::array<std::pair<double, double>, 4> points{
         {{-2.0, 1.0 / 12.0}, {-1.0, -2.0 / 3.0}, {1.0, 2.0 / 3.0}, {2.0, -1.0 / 12.0}}};
-    std::fill_n(rate, mover.model.tangent_size(), 0.0);
+    std::fill_n(rate, mover.model->tangent_size(), 0.0);
     std::vector<double>& there = memory.shifted;
     for (const auto& [steps, weight] : points) {
       const Status status = Move(mover, x, dt_s + steps * kStep, there.data(), memory, nullptr);
       if (status != Status::kOk) return status;
       int a = 0, t = 0;
-      for (const Space& block : mover.model.blocks()) {
+      for (const Space& block : mover.model->blocks()) {
         std::array<double, 64> d;
         double* const apart = block.geometry.tangent <= 64 ? d.data() : memory.jacobian.data();
         block.geometry.Minus(there.data() + a, next + a, apart);
@@ -185,7 +135,6 @@ class OffsetSensor {
     memory.f.resize(square_);
     memory.g.resize(noise_);
     memory.jacobian.resize(std::max(memory.jacobian.size(), tangent_));
-    memory.error.clear();
     const double dt_s = roles[offset_][0];
     memory.roles.assign(place_.size(), nullptr);
     for (std::size_t i = 0; i < place_.size(); ++i) {
@@ -199,8 +148,8 @@ class OffsetSensor {
         status = Differentiate(mover, x, dt_s, next, memory, rate);
       }
       if (status == Status::kError) {
-        memory.error =
-            "motion model '" + mover.model.name() + "' of its roles: " + mover.model.error_text();
+        status = NoteModelError(this, "motion model '" + mover.model->name() +
+                                          "' of its roles: " + mover.model->error_text());
       }
       if (status != Status::kOk) return status;
       for (std::size_t i = 0; i < place_.size(); ++i) {
@@ -208,11 +157,11 @@ class OffsetSensor {
         if (block < 0 || block >= mover.count) continue;
         memory.roles[i] = next;
         for (int b = 0; b < block; ++b) {
-          memory.roles[i] += mover.model.blocks()[static_cast<std::size_t>(b)].geometry.ambient;
+          memory.roles[i] += mover.model->blocks()[static_cast<std::size_t>(b)].geometry.ambient;
         }
       }
-      for (const Space& block : mover.model.blocks()) next += block.geometry.ambient;
-      const int n = mover.model.tangent_size();
+      for (const Space& block : mover.model->blocks()) next += block.geometry.ambient;
+      const int n = mover.model->tangent_size();
       f += n * n;
       rate += n;
     }
@@ -223,14 +172,14 @@ class OffsetSensor {
   /// place, for others one in memory.
   void PlaceJacobians(int m, double* const* jacobians, const int* strides, Memory& memory) const {
     std::size_t size = 0;
-    for (const Space& role : sensor_.roles())
+    for (const Space& role : sensor_->roles())
       size += static_cast<std::size_t>(m * role.geometry.tangent);
     memory.jacobian.assign(std::max(memory.jacobian.size(), size), kNotWritten);
     memory.jacobians.assign(place_.size(), nullptr);
     memory.strides.assign(place_.size(), 0);
     double* next = memory.jacobian.data();
     for (std::size_t i = 0; i < place_.size(); ++i) {
-      const int n = sensor_.roles()[i].geometry.tangent;
+      const int n = sensor_->roles()[i].geometry.tangent;
       if (place_[i] < 0) continue;
       if (IsMoved(place_[i])) {
         memory.jacobians[i] = next;
@@ -253,25 +202,29 @@ class OffsetSensor {
     if (jacobians[offset_] != nullptr) to(offset_, 1).setZero();
     const double *f = memory.f.data(), *rate = memory.rate.data();
     for (const Mover& mover : movers_) {
-      const std::int32_t* const tangents = mover.model.instance().tangents().data();
-      const int n = mover.model.tangent_size();
+      const std::vector<Space>& blocks = mover.model->blocks();
+      const auto tangent = [&](int block) {
+        return blocks[static_cast<std::size_t>(block)].geometry.tangent;
+      };
+      const int n = mover.model->tangent_size();
       for (int c = 0; c < mover.count; ++c) {
-        if (jacobians[mover.first + c] != nullptr) to(mover.first + c, tangents[c]).setZero();
+        if (jacobians[mover.first + c] != nullptr) to(mover.first + c, tangent(c)).setZero();
       }
       for (std::size_t i = 0; i < place_.size(); ++i) {
         const int block = place_[i] - mover.first;
         if (block < 0 || block >= mover.count) continue;
-        const int row = std::accumulate(tangents, tangents + block, 0);
-        const Eigen::Map<const RowMajor> own(memory.jacobians[i], m, tangents[block]);
-        for (int k = 0; k < tangents[block]; ++k) {
+        int row = 0;
+        for (int b = 0; b < block; ++b) row += tangent(b);
+        const Eigen::Map<const RowMajor> own(memory.jacobians[i], m, tangent(block));
+        for (int k = 0; k < tangent(block); ++k) {
           if (jacobians[offset_] != nullptr) to(offset_, 1) += own.col(k) * rate[row + k];
           const double* from = f + (row + k) * n;
           for (int c = 0; c < mover.count; ++c) {
-            const Eigen::Map<const Eigen::RowVectorXd> of_c(from, tangents[c]);
+            const Eigen::Map<const Eigen::RowVectorXd> of_c(from, tangent(c));
             if (jacobians[mover.first + c] != nullptr) {
-              to(mover.first + c, tangents[c]).noalias() += own.col(k) * of_c;
+              to(mover.first + c, tangent(c)).noalias() += own.col(k) * of_c;
             }
-            from += tangents[c];
+            from += tangent(c);
           }
         }
       }
@@ -280,76 +233,56 @@ class OffsetSensor {
     }
   }
 
-  static std::int32_t Eval(const void* self, const AlidadeObservation* seen,
-                           const double* const* roles, double* z, double* const* jacobians,
-                           const std::int32_t* strides) {
-    const OffsetSensor& of = Of(self);
+  Status DoEvaluate(const Observation& seen, const double* const* roles,
+                    const Output& out) const override {
     Memory& memory = MemoryOfThread();
-    const Status status = of.Shift(roles, jacobians != nullptr, memory);
-    if (status != Status::kOk) return static_cast<std::int32_t>(status);
-    const int m = of.sensor_.measurement().geometry.tangent;
-    if (jacobians != nullptr) of.PlaceJacobians(m, jacobians, strides, memory);
-    const Status there = jacobians == nullptr
-                             ? of.sensor_.Predict(memory.roles.data(), z, seen->known)
-                             : of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
-                                                    memory.strides.data(), seen->known);
-    if (there == Status::kError) memory.error = of.sensor_.error_text();
-    if (there == Status::kOk && jacobians != nullptr) of.Chain(m, jacobians, strides, memory);
-    return static_cast<std::int32_t>(there);
+    const bool derivatives = out.jacobians != nullptr;
+    Status status = Shift(roles, derivatives, memory);
+    if (status != Status::kOk) return status;
+    const int m = measurement().geometry.tangent;
+    Output there{out.h, nullptr, nullptr, out.sqrt_noise};
+    if (derivatives) {
+      PlaceJacobians(m, out.jacobians, out.strides, memory);
+      there.jacobians = memory.jacobians.data();
+      there.strides = memory.strides.data();
+    }
+    status = sensor_->Evaluate(seen, memory.roles.data(), there);
+    if (status == Status::kError) status = NoteModelError(this, sensor_->error_text());
+    if (status == Status::kOk && derivatives) Chain(m, out.jacobians, out.strides, memory);
+    return status;
   }
-  static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
-                                const double* const* roles, double* l, std::int32_t stride) {
-    const OffsetSensor& of = Of(self);
+  Status DoValid(const Observation& seen) const override {
+    const Status status = sensor_->Valid(seen);
+    return status == Status::kError ? NoteModelError(this, sensor_->error_text()) : status;
+  }
+  Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
+                      const InverseOutput& out) const override {
     Memory& memory = MemoryOfThread();
-    const Status status = of.Shift(roles, false, memory);
-    if (status != Status::kOk) return static_cast<std::int32_t>(status);
-    const AlidadeInstance& c = of.sensor_.instance().c();
-    return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
-  }
-  static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
-    MemoryOfThread().error.clear();
-    const AlidadeInstance& c = Of(self).sensor_.instance().c();
-    return c.sensor->valid(c.self, seen);
-  }
-  static std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
-                                 const double* const* roles, const double* prior, double* y,
-                                 double* const* jx, const std::int32_t* jx_strides, double* jz,
-                                 std::int32_t jz_stride, double* jp, std::int32_t jp_stride) {
-    const OffsetSensor& of = Of(self);
-    Memory& memory = MemoryOfThread();
-    const bool derivatives = jx != nullptr;
-    const Status status = of.Shift(roles, derivatives, memory);
-    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    const bool derivatives = out.jx != nullptr;
+    Status status = Shift(roles, derivatives, memory);
+    if (status != Status::kOk) return status;
     int rows = 0;
-    const auto first = of.sensor_.roles().begin() + of.sensor_.inverse().role;
-    for (auto role = first; role != first + of.sensor_.inverse().count; ++role) {
+    const auto first = sensor_->roles().begin() + sensor_->inverse().role;
+    for (auto role = first; role != first + sensor_->inverse().count; ++role) {
       rows += role->geometry.tangent;
     }
-    if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
-    const AlidadeInstance& c = of.sensor_.instance().c();
-    const std::int32_t code =
-        c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
-                             derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),
-                             jz, jz_stride, jp, jp_stride);
-    if (code == ALIDADE_OK && derivatives) of.Chain(rows, jx, jx_strides, memory);
-    return code;
-  }
-  const char* ErrorText() const {
-    if (const std::string& text = MemoryOfThread().error; !text.empty()) return text.c_str();
-    const AlidadeInstance& c = sensor_.instance().c();
-    return c.error_text == nullptr ? "" : c.error_text(c.self);
+    InverseOutput there = out;
+    if (derivatives) {
+      PlaceJacobians(rows, out.jx, out.strides, memory);
+      there.jx = memory.jacobians.data();
+      there.strides = memory.strides.data();
+    }
+    status = sensor_->Initialise(memory.roles.data(), seen, prior, there);
+    if (status == Status::kError) status = NoteModelError(this, sensor_->error_text());
+    if (status == Status::kOk && derivatives) Chain(rows, out.jx, out.strides, memory);
+    return status;
   }
 
-  SensorModel sensor_;
+  SharedSensor sensor_;
   std::vector<Mover> movers_;
   std::vector<int> place_;  ///< by role of the sensor: which role of this; -1: unbound
-  std::vector<Space> roles_;
   int offset_;
   std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;  ///< of Memory
-  std::vector<AlidadeSpace> spaces_;
-  std::vector<std::string> texts_;
-  AlidadeDescription description_{};
-  AlidadeSensor calls_{};
 };
 
 /// How the roles of a sensor and the blocks of its motion models become the roles of an
@@ -381,7 +314,7 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
   };
   for (const MotionBinding& motion : system.motions) {
     const bool moves =
-        !motion.model.stationary() &&
+        !motion.model->stationary() &&
         std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     if (!moves) continue;
     all.movers.push_back({motion.model,
@@ -417,19 +350,18 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
   return all;
 }
 
-SensorModel Publish(const SensorModel& model, Arrangement all) {
-  return OffsetSensor::Publish(std::make_unique<OffsetSensor>(model, std::move(all.movers),
-                                                              std::move(all.place_of_role),
-                                                              std::move(all.roles), all.offset));
+SharedSensor Offset(const SharedSensor& model, Arrangement all) {
+  return std::make_shared<OffsetSensor>(model, std::move(all.movers), std::move(all.place_of_role),
+                                        std::move(all.roles), all.offset);
 }
 
 }  // namespace
 
 std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& sensor) {
-  Arrangement all = Arrange(system, offset, sensor, sensor.model);
+  Arrangement all = Arrange(system, offset, sensor, *sensor.model);
   for (const Mover& mover : all.movers) {
-    if (mover.model.has_input()) {
-      return "motion model '" + mover.model.name() + "' of its roles takes a control input";
+    if (mover.model->has_input()) {
+      return "motion model '" + mover.model->name() + "' of its roles takes a control input";
     }
   }
   const auto at_measurement = [](const RoleBinding& role) {
@@ -440,10 +372,10 @@ std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& se
   }
   if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
   if (sensor.xyz) {
-    sensor.xyz = Publish(*sensor.xyz, Arrange(system, offset, sensor, *sensor.xyz));
+    sensor.xyz = Offset(sensor.xyz, Arrange(system, offset, sensor, *sensor.xyz));
   }
   std::vector<RoleBinding> bindings = std::move(all.bindings);
-  sensor.model = Publish(sensor.model, std::move(all));
+  sensor.model = Offset(sensor.model, std::move(all));
   sensor.roles = std::move(bindings);
   return {};
 }

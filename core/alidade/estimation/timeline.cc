@@ -44,12 +44,12 @@ Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams,
   if (system.initial_time_s) start_ = TimestampFromSeconds(*system.initial_time_s);
   for (std::size_t i = 0; i < system.motions.size(); ++i) {
     const MotionBinding& motion = system.motions[i];
-    if (!motion.model.has_input()) continue;
+    if (!motion.model->has_input()) continue;
     Held& held = held_.emplace_back();
     held.motion = i;
     held.name = motion.name;
     held.binding = motion.input;
-    held.geometry = motion.model.input().geometry;
+    held.geometry = motion.model->input().geometry;
     held.timeout = TimeoutOf(motion.input.timeout_s);
     held.neutral.resize(static_cast<std::size_t>(held.geometry.ambient));
     held.geometry.Identity(held.neutral.data());

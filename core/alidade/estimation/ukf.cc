@@ -173,7 +173,7 @@ void Unscented::TakeHeld(FilterState& f, const Workspace::Matrix& deviations, do
   Eigen::Index column = 0;
   for (std::size_t i = 0; i < f.binding->motion_places.size(); ++i) {
     if (!f.motions.steps()[i].active) continue;
-    const Eigen::Index inputs = f.binding->system.motions[i].model.noise_size();
+    const Eigen::Index inputs = f.binding->system.motions[i].model->noise_size();
     if (!f.binding->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
     column += inputs;
   }
@@ -206,7 +206,7 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
     const Motions::Step& step = f.motions.steps()[i];
     if (!step.active) continue;
     const MotionBinding& motion = f.binding->system.motions[i];
-    const Eigen::Index inputs = motion.model.noise_size();
+    const Eigen::Index inputs = motion.model->noise_size();
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
@@ -287,7 +287,7 @@ Trouble Unscented::Step(FilterState& f, double dt_s) {
   }
   if (outcome == Outcome::kFailed) {
     return {"plugin_failed", "motion model of '" + failed_->name +
-                                 "' cannot step a sigma point: " + failed_->model.error_text()};
+                                 "' cannot step a sigma point: " + failed_->model->error_text()};
   }
   return {"diverged", "the sigma points cannot step, also with their spread divided by " +
                           std::to_string(1 << halvings)};

@@ -36,10 +36,10 @@ bool LostOne(const UpdateReport& report) {
 
 /// Why landmarks that `sensor` initialises cannot start at truth; "": they can.
 std::string WhyNotAtTruth(const SensorBinding& sensor) {
-  const auto representation = RepresentationOf(sensor.model.roles());
+  const auto representation = RepresentationOf(sensor.model->roles());
   const std::string name = '\'' + sensor.name + '\'';
   if (!representation) return name + " has landmarks of a representation of its own";
-  if (IsXyz(*representation) && sensor.model.inverse().prior_size > 0) {
+  if (IsXyz(*representation) && sensor.model->inverse().prior_size > 0) {
     return name + " places landmarks as xyz by a prior, by whose mean the Jacobians are";
   }
   return "";
@@ -53,7 +53,7 @@ std::string WhyNoMap(const System& system) {
       if (system.sensors[k].stream != sensor.stream) continue;
       return '\'' + system.sensors[k].name + "' and '" + sensor.name + "' share a stream";
     }
-    if (!sensor.model.has_landmark()) continue;
+    if (!sensor.model->has_landmark()) continue;
     if (std::string why = WhyNotAtTruth(sensor); !why.empty()) return why;
   }
   return "";
@@ -138,8 +138,8 @@ bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
     const int index = sensors_[static_cast<std::size_t>(one.stream)];
     if (index < 0) continue;
     const SensorBinding& sensor = f.binding->system.sensors[static_cast<std::size_t>(index)];
-    const SensorModel& model = sensor.model;
-    if (f.blocks.waiting || model.Valid(one.values.data(), one.known.data()) != Status::kOk)
+    const SensorModel& model = *sensor.model;
+    if (f.blocks.waiting || model.Valid({one.values.data(), one.known.data()}) != Status::kOk)
       continue;
     std::vector<const double*> roles;
     for (const RoleBinding& role : sensor.roles) {
@@ -162,7 +162,7 @@ bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
     }
     std::vector<double> h(one.values.size());
     const bool there = model.Predict(roles.data(), h.data(), one.known.data()) == Status::kOk &&
-                       model.Valid(h.data(), one.known.data()) == Status::kOk;
+                       model.Valid({h.data(), one.known.data()}) == Status::kOk;
     if (there) one.values = std::move(h);
     all = all && there;
   }

@@ -10,7 +10,7 @@ namespace alidade::internal {
 
 const SensorBinding* GuidingSensor(const System& system, std::string_view stream) {
   const auto found = std::ranges::find_if(system.sensors, [&](const SensorBinding& sensor) {
-    return sensor.stream == stream && sensor.model.known_size() == 0;
+    return sensor.stream == stream && sensor.model->known_size() == 0;
   });
   return found == system.sensors.end() ? nullptr : &*found;
 }

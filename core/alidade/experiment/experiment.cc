@@ -52,7 +52,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
       }
       const SensorBinding& binding = system.sensors[static_cast<std::size_t>(index)];
       const int stream =
-          internal::FindStream(root.At("sensors").At(binding.name), binding.model, streams);
+          internal::FindStream(root.At("sensors").At(binding.name), *binding.model, streams);
       segments.push_back({name, stream, with.has_value(), binding.model});
       entry.RejectUnread();
     }

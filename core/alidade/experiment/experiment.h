@@ -48,8 +48,8 @@ struct NamedEstimator {
 struct Segment {
   std::string name;
   int stream = -1;
-  bool with = true;    ///< timestamps with one, or timestamps without
-  SensorModel sensor;  ///< decides validity
+  bool with = true;     ///< timestamps with one, or timestamps without
+  SharedSensor sensor;  ///< decides validity
 };
 
 /// What is done with a frame whose timestamp is before that of a frame that came earlier.

@@ -26,10 +26,10 @@ void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<dou
 Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
   for (const NamedEstimator& named : experiment.estimators) {
     for (const SensorBinding& sensor : named.system.sensors) {
-      if (sensor.stream == stream.name) return sensor.model.measurement().geometry;
+      if (sensor.stream == stream.name) return sensor.model->measurement().geometry;
     }
     for (const MotionBinding& motion : named.system.motions) {
-      if (motion.input.stream == stream.name) return motion.model.input().geometry;
+      if (motion.input.stream == stream.name) return motion.model->input().geometry;
     }
   }
   return Geometry::Vector(stream.size);

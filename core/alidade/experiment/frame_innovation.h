@@ -31,7 +31,7 @@ inline FrameInnovation FrameInnovationOf(const UpdateReport& report, int sensor)
 
 /// Whether the rms of a frame is the reprojection error: of many landmarks, in one unit.
 inline bool HasReprojection(const SensorBinding& binding) {
-  return binding.model.has_landmark() && !binding.model.measurement().unit.empty();
+  return binding.model->has_landmark() && !binding.model->measurement().unit.empty();
 }
 
 }  // namespace alidade::internal

@@ -11,7 +11,7 @@ namespace {
 
 /// Whether the block is a scalar that the sensor tells from a measurement alone.
 bool IsInvertible(const System& system, const SensorBinding& binding) {
-  const int role = binding.model.inverse().role;
+  const int role = binding.model->inverse().role;
   const int roles = static_cast<int>(binding.roles.size());
   if (role < 0 || role >= roles) return false;
   for (int r = 0; r < roles; ++r) {
@@ -26,7 +26,8 @@ bool IsScalar(const SensorBinding& binding) {
   const auto scalar = [](const Space& space) {
     return space.geometry.kind == GeometryKind::kVector && space.geometry.ambient == 1;
   };
-  return scalar(binding.model.measurement()) && std::ranges::all_of(binding.model.roles(), scalar);
+  return scalar(binding.model->measurement()) &&
+         std::ranges::all_of(binding.model->roles(), scalar);
 }
 
 /// x of the first role with h(x) = z, all scalar and the others as they are, by Newton's method
@@ -75,9 +76,9 @@ std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<in
 
 std::optional<ImpliedState> ImpliedState::Of(const System& system, const SensorBinding& binding,
                                              const std::vector<StreamInfo>& truths) {
-  if (binding.model.known_size() > 0) return {};  // they would be needed, too
+  if (binding.model->known_size() > 0) return {};  // they would be needed, too
   if (IsInvertible(system, binding)) {
-    const auto role = static_cast<std::size_t>(binding.model.inverse().role);
+    const auto role = static_cast<std::size_t>(binding.model->inverse().role);
     return ImpliedState(binding.model, binding.roles[role].block);
   }
   std::vector<int> of_roles = TruthsOfRoles(system, binding, truths);
@@ -89,15 +90,15 @@ std::optional<ImpliedState> ImpliedState::Of(const System& system, const SensorB
 }
 
 std::optional<double> ImpliedState::From(const Truth& truth, const double* z) const {
-  if (model_.Valid(z) != Status::kOk) return {};
+  if (model_->Valid({z}) != Status::kOk) return {};
   if (rest_at_truth_) {
     const std::vector<const double*> roles = RolesAtTruth(truth, truths_);
     if (roles.empty()) return {};
-    return SolveForFirst(model_, roles, *z);
+    return SolveForFirst(*model_, roles, *z);
   }
   double value = 0.0;
-  const std::vector<const double*> roles(model_.roles().size(), nullptr);
-  if (model_.Initialise(roles.data(), z, &value, nullptr, nullptr) != Status::kOk) return {};
+  const std::vector<const double*> roles(model_->roles().size(), nullptr);
+  if (model_->Initialise(roles.data(), {z}, nullptr, {.y = &value}) != Status::kOk) return {};
   return value;
 }
 

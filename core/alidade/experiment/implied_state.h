@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "alidade/estimation/system.h"
@@ -27,9 +28,9 @@ class ImpliedState {
   std::optional<double> From(const Truth& truth, const double* z) const;
 
  private:
-  ImpliedState(const SensorModel& model, BlockId block) : model_(model), block_(block) {}
+  ImpliedState(SharedSensor model, BlockId block) : model_(std::move(model)), block_(block) {}
 
-  SensorModel model_;
+  SharedSensor model_;
   BlockId block_;
   bool rest_at_truth_ = false;
   std::vector<int> truths_;  ///< by role

@@ -450,7 +450,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
   impl_->far.resize(impl_->sensors.size());
   const bool filters = named.estimator == nullptr || !named.estimator->offline();
   for (const SensorBinding& sensor : named.system.sensors) {
-    const Geometry& measured = sensor.model.measurement().geometry;
+    const Geometry& measured = sensor.model->measurement().geometry;
     impl_->angle.push_back(measured.kind == GeometryKind::kAngle);
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
   }

@@ -72,11 +72,11 @@ std::vector<StreamInfo> StreamsOf(const System& system) {
     }
   };
   for (const SensorBinding& sensor : system.sensors) {
-    add(sensor.stream, sensor.model.measurement().geometry.ambient, sensor.model.known_size());
+    add(sensor.stream, sensor.model->measurement().geometry.ambient, sensor.model->known_size());
   }
   for (const MotionBinding& motion : system.motions) {
-    if (motion.model.has_input()) {
-      add(motion.input.stream, motion.model.input().geometry.ambient, 0);
+    if (motion.model->has_input()) {
+      add(motion.input.stream, motion.model->input().geometry.ambient, 0);
     }
   }
   return streams;
@@ -142,7 +142,7 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
   if (asked.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
-  const auto role = roles.Find(sensor.model.roles()[static_cast<std::size_t>(asked.role)].name);
+  const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(asked.role)].name);
   if (!role) return roles;  // one that a time offset adds
   // A mode that cannot be done comes before jacobian_at.
   return role->At(asked.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
@@ -242,7 +242,7 @@ void CheckInputs(const NamedEstimator& filter, const NamedEstimator& named, cons
     const std::string& stream = motion.input.stream;
     const auto& theirs = filter.system.sensors;
     const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
-    if (!motion.model.has_input() || sensor == theirs.end()) continue;
+    if (!motion.model->has_input() || sensor == theirs.end()) continue;
     by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
                 "' and goes to sensor '" + sensor->name + "' of '" + filter.name +
                 "': what that does not accept would be missing as an input",
@@ -391,13 +391,13 @@ int FindStream(const Node& sensor, const SensorModel& model,
 
 void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams) {
   for (const SensorBinding& sensor : system.sensors) {
-    FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
+    FindStream(root.At("sensors").At(sensor.name), *sensor.model, streams);
   }
   for (const MotionBinding& motion : system.motions) {
-    if (!motion.model.has_input()) continue;
-    const Space& input = motion.model.input();
+    if (!motion.model->has_input()) continue;
+    const Space& input = motion.model->input();
     FindStreamOf(root.At("state").At(motion.name).At("input"), input.geometry.ambient,
-                 "control input '" + input.name + "' of model '" + motion.model.name() + "'",
+                 "control input '" + input.name + "' of model '" + motion.model->name() + "'",
                  streams);
   }
 }

@@ -26,7 +26,7 @@ std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(f
 bool InSegment(const Segment& segment, const Frame& frame) {
   const auto seen = [&](const Measurement& m) {
     return m.stream == segment.stream &&
-           segment.sensor.Valid(m.values.data(), m.known.data()) == Status::kOk;
+           segment.sensor->Valid({m.values.data(), m.known.data()}) == Status::kOk;
   };
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }

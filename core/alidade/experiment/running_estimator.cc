@@ -35,8 +35,10 @@ std::string Running::TakeFailures(const UpdateReport& report) {
     if (m.outcome != Outcome::kFailed) continue;
     const SensorBinding& sensor = named.system.sensors[static_cast<std::size_t>(m.sensor)];
     if (named.on_plugin_failure == OnPluginFailure::kAbort) {
-      return "sensor '" + sensor.name + "', model '" + sensor.model.name() + "' of plugin " +
-             sensor.model.instance().plugin() + ", failed: " + sensor.model.error_text();
+      const std::string& plugin = sensor.model->description().origin;
+      return "sensor '" + sensor.name + "', model '" + sensor.model->name() + "'" +
+             (plugin.empty() ? "" : " of plugin " + plugin) +
+             ", failed: " + sensor.model->error_text();
     }
     failed_sensors.resize(named.system.sensors.size(), 0);
     char& failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
@@ -102,7 +104,7 @@ EstimatorResult Begin(const NamedEstimator& named) {
 void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result) {
   for (const int index : metrics.far_off()) {
     const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
-    const Space& measured = sensor.model.measurement();
+    const Space& measured = sensor.model->measurement();
     const bool angle = measured.geometry.kind == GeometryKind::kAngle;
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(

@@ -59,6 +59,20 @@ bool GoodStride(std::uint32_t stride) {
   return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
 }
 
+/// A measurement as a plugin is shown it: its values, null if a prediction alone is asked for, and
+/// the numbers that are known with it. Copied, which takes less than filling one with zeros.
+inline AlidadeObservation Shown(const double* z, const double* known) {
+  constexpr AlidadeObservation kUnseen = [] {
+    AlidadeObservation unseen{};
+    unseen.struct_size = sizeof(unseen);
+    return unseen;
+  }();
+  AlidadeObservation shown = kUnseen;
+  shown.z = z;
+  shown.known = known;
+  return shown;
+}
+
 /// The text of the exception that `call` throws; "" if it returns. No call of the plugin ABI may
 /// throw, but the code behind it may be C++.
 template <class Call>

@@ -12,6 +12,7 @@
 #include "alidade/plugin/param_reader.h"
 #include "alidade/plugin/plugin_file.h"
 #include "alidade/plugin/plugin_host.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade {
 namespace {
@@ -159,13 +160,14 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
   return model;
 }
 
-SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,
-                                     const std::string& representation) const {
-  return SensorModel(Create(Find(kSensorKind, name, entry), entry, representation));
+SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,
+                                      const std::string& representation) const {
+  return std::make_shared<PluginSensor>(
+      Create(Find(kSensorKind, name, entry), entry, representation));
 }
 
-MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
-  return MotionModel(Create(Find(kMotionKind, name, entry), entry));
+SharedMotion PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
+  return std::make_shared<PluginMotion>(Create(Find(kMotionKind, name, entry), entry));
 }
 
 void PluginHost::CallFactory(const PluginEntry& entry, const Node& node,

@@ -2,17 +2,14 @@
 #include "alidade/plugin/model_instance.h"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
-#include <new>
-#include <optional>
 #include <utility>
 #include <vector>
 
-#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/io/log.h"
 #include "alidade/plugin/abi_read.h"
+#include "alidade/state/element_names.h"
 
 namespace alidade {
 namespace {
@@ -65,28 +62,6 @@ bool KnownGeometry(const AlidadeSpace& space) {
   }
 }
 
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts{""};
-  for (const char c : text) {
-    if (c == ',') {
-      parts.emplace_back();
-    } else if (c != ' ') {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
-/// Names of the elements where the model gives none.
-std::vector<std::string> DefaultElements(const AlidadeSpace& space) {
-  if (space.ambient == 1) return {""};
-  if (space.geometry == ALIDADE_UNIT_QUATERNION) return {"w", "x", "y", "z"};
-  if (space.geometry == ALIDADE_UNIT_VECTOR) return {"x", "y", "z"};
-  std::vector<std::string> names;
-  for (int i = 0; i < space.ambient; ++i) names.push_back(std::to_string(i));
-  return names;
-}
-
 /// What is wrong with `space`, or "".
 std::string Defect(const AlidadeSpace& space);
 
@@ -135,7 +110,7 @@ std::string Defect(const AlidadeSpace& space) {
            ", which this version does not know";
   }
   const std::string elements = Text(space.elements);
-  if (!elements.empty() && std::ssize(SplitAtCommas(elements)) != space.ambient) {
+  if (!elements.empty() && std::ssize(internal::SplitNames(elements)) != space.ambient) {
     return "names its elements '" + elements + "', but has " + std::to_string(space.ambient);
   }
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
@@ -159,7 +134,7 @@ Space ToSpace(const AlidadeSpace& from) {
   space.geometry = GeometryOf(from);
   space.flags = from.flags;
   if (from.geometry != ALIDADE_PRODUCT) {
-    space.elements = elements.empty() ? DefaultElements(from) : SplitAtCommas(elements);
+    space.elements = internal::ElementsOf(elements, space.geometry);
     return space;
   }
   for (std::size_t i = 0; i < from.part_count; ++i) {
@@ -170,52 +145,7 @@ Space ToSpace(const AlidadeSpace& from) {
   return space;
 }
 
-/// A call that failed: what it threw, where it did.
-struct FailedCall {
-  const void* slot;
-  std::optional<std::string> thrown;
-};
-
-/// The last of this thread, each of another slot; the last one is the latest.
-thread_local std::vector<FailedCall> failed_calls;
-
-/// The author's name of the function in that slot; null if the slot is not of this instance.
-const char* NameOfCall(const AlidadeInstance& c, const void* slot) {
-  if (c.sensor != nullptr) {
-    if (slot == &c.sensor->eval) return "Predict";
-    if (slot == &c.sensor->sqrt_noise) return "SqrtNoise";
-    if (slot == &c.sensor->valid) return "Valid";
-    if (slot == &c.sensor->initialise) return "Initialise";
-  }
-  if (c.motion != nullptr) {
-    if (slot == &c.motion->step) return "Step";
-    if (slot == &c.motion->sqrt_q) return "SqrtQ";
-  }
-  return nullptr;
-}
-
-/// Without memory for it, it is one that says nothing.
-void NoteFailure(const void* slot, std::optional<std::string> thrown) noexcept {
-  constexpr std::size_t kMost = 64;
-  try {
-    std::erase_if(failed_calls, [&](const FailedCall& call) { return call.slot == slot; });
-    if (failed_calls.size() == kMost) failed_calls.erase(failed_calls.begin());
-    failed_calls.push_back({slot, std::move(thrown)});
-  } catch (const std::bad_alloc&) {
-  }
-}
-
 }  // namespace
-
-Status detail::Failed(const void* slot) noexcept {
-  NoteFailure(slot, std::nullopt);
-  return Status::kError;
-}
-
-Status detail::Thrown(const void* slot) noexcept {
-  NoteFailure(slot, internal::ThrownBy([] { throw; }));
-  return Status::kError;
-}
 
 void internal::DestroyInstance(const AlidadeInstance& instance, const std::string& name,
                                const std::string& plugin) noexcept {
@@ -355,35 +285,16 @@ void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std:
   if (owned.dynamics > ALIDADE_GAUSS_MARKOV) {
     Refuse(what + "are of kind " + std::to_string(owned.dynamics));
   }
-  const bool returns = owned.dynamics == ALIDADE_GAUSS_MARKOV;
   const auto n = static_cast<std::size_t>(role.geometry.tangent);
   const auto read = [](const double* from, std::size_t size) {
     return from == nullptr ? std::vector<double>() : std::vector<double>(from, from + size);
   };
-  OwnedRole known{read(owned.mean, static_cast<std::size_t>(role.geometry.ambient)),
-                  read(owned.sqrt_prior, n * n), static_cast<OwnedDynamics>(owned.dynamics),
-                  read(owned.sqrt_density, n * n), returns ? owned.time_constant_s : 0.0};
-  if (known.mean.empty()) known.mean = this->owned(index).mean;
-  const bool finite = internal::AllFinite(known.mean) && internal::AllFinite(known.sqrt_prior) &&
-                      internal::AllFinite(known.sqrt_density) &&
-                      std::isfinite(known.time_constant_s);
-  if (!finite) Refuse(what + "are not finite");
-  if (DistanceFrom(role.geometry, known.mean.data()) > kUnitTolerance) {
-    Refuse(what + "have a mean that is not of unit length");
-  }
-  role.geometry.Normalise(known.mean.data());
-  if (returns && !(known.time_constant_s > 0.0))
-    Refuse(what + "have a time constant of 0 s or less");
-  owned_[index] = std::move(known);
-}
-
-OwnedRole ModelInstance::owned(std::size_t role) const {
-  if (const auto found = owned_.find(role); found != owned_.end()) return found->second;
-  OwnedRole neutral;
-  const Geometry& geometry = spaces_[role].geometry;
-  neutral.mean.resize(static_cast<std::size_t>(geometry.ambient));
-  geometry.Identity(neutral.mean.data());
-  return neutral;
+  OwnedRole own{read(owned.mean, static_cast<std::size_t>(role.geometry.ambient)),
+                read(owned.sqrt_prior, n * n), static_cast<OwnedDynamics>(owned.dynamics),
+                read(owned.sqrt_density, n * n), owned.time_constant_s};
+  const std::string defect = internal::CheckOwned(role.geometry, own);
+  if (!defect.empty()) Refuse(what + defect);
+  owned_[index] = std::move(own);
 }
 
 void ModelInstance::GiveNoise(std::vector<double> root) {
@@ -400,14 +311,6 @@ Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& wha
 }
 
 std::string ModelInstance::error_text() const {
-  const auto of_this = [&](const FailedCall& call) {
-    return NameOfCall(instance_, call.slot) != nullptr;
-  };
-  const auto last = std::find_if(failed_calls.rbegin(), failed_calls.rend(), of_this);
-  if (last != failed_calls.rend() && last->thrown) {
-    return std::string(NameOfCall(instance_, last->slot)) + " of model '" + name_ + "' of plugin " +
-           plugin_ + " threw: " + *last->thrown;
-  }
   if (instance_.error_text == nullptr) return "";
   std::string text;
   const std::string failure =
@@ -415,55 +318,6 @@ std::string ModelInstance::error_text() const {
   return failure.empty()
              ? text
              : "error_text of model '" + name_ + "' of plugin " + plugin_ + " threw: " + failure;
-}
-
-SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
-    : instance_(std::move(instance)), sensor_(instance_->c().sensor), self_(instance_->c().self) {
-  ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_SENSOR);
-  if (!known().name.empty()) known_size_ = known().geometry.ambient;
-  if ((instance_->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
-    const AlidadeDescription& description = *instance_->c().description;
-    inverse_.role = description.initialise_role;
-    inverse_.prior_size = description.prior_count;
-    const auto is_landmark = [&](int i) {
-      return i < std::ssize(roles()) && roles()[static_cast<std::size_t>(i)].landmark();
-    };
-    inverse_.count = 1;
-    while (is_landmark(inverse_.role) && is_landmark(inverse_.role + inverse_.count))
-      ++inverse_.count;
-  }
-}
-
-bool SensorModel::has_landmark() const {
-  return std::any_of(roles().begin(), roles().end(), [](const Space& r) { return r.landmark(); });
-}
-
-Status SensorModel::LineariseKnowing(const double* const* roles, double* z,
-                                     double* const* jacobians, const int* strides,
-                                     const double* known) const {
-  ALIDADE_EXPECTS(known != nullptr);
-  const AlidadeObservation seen = detail::Seen(nullptr, known);
-  return detail::CallModel<true>(
-      &sensor_->eval, [&] { return sensor_->eval(self_, &seen, roles, z, jacobians, strides); });
-}
-
-Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
-                               double* y, double* const* jx, double* jz, double* jp,
-                               const double* known) const {
-  ALIDADE_EXPECTS(inverse_.role >= 0);
-  const AlidadeObservation seen = detail::Seen(z, known);
-  return detail::CallModel<true>(&sensor_->initialise, [&] {
-    return sensor_->initialise(self_, &seen, roles, prior, y, jx, instance_->tangents().data(), jz,
-                               measurement().geometry.tangent, jp, inverse_.prior_size);
-  });
-}
-
-MotionModel::MotionModel(std::shared_ptr<const ModelInstance> instance)
-    : instance_(std::move(instance)), motion_(instance_->c().motion), self_(instance_->c().self) {
-  ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_MOTION);
-  noise_size_ = instance_->c().description->noise_count;
-  for (const std::int32_t tangent : instance_->tangents()) tangent_size_ += tangent;
-  zero_noise_.assign(static_cast<std::size_t>(noise_size_) + 1, 0.0);
 }
 
 }  // namespace alidade

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/estimation/models.h"
 #include "alidade/model/params.h"
 #include "alidade/plugin/model_instance.h"
 
@@ -74,9 +75,9 @@ class PluginHost {
   /// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
   /// sensor that has this choice; "": as it is written. Errors: kPlugin with the places searched,
   /// kBadConfig.
-  SensorModel CreateSensor(const std::string& name, const Node& entry,
-                           const std::string& representation = {}) const;
-  MotionModel CreateMotion(const std::string& name, const Node& entry) const;
+  SharedSensor CreateSensor(const std::string& name, const Node& entry,
+                            const std::string& representation = {}) const;
+  SharedMotion CreateMotion(const std::string& name, const Node& entry) const;
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
                                               const std::string& representation = {}) const;

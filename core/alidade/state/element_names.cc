@@ -3,6 +3,28 @@
 
 namespace alidade::internal {
 
+std::vector<std::string> SplitNames(const std::string& names) {
+  std::vector<std::string> parts{""};
+  for (const char c : names) {
+    if (c == ',') {
+      parts.emplace_back();
+    } else if (c != ' ') {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+std::vector<std::string> ElementsOf(const std::string& names, const Geometry& geometry) {
+  if (!names.empty()) return SplitNames(names);
+  if (geometry.ambient == 1) return {""};
+  if (geometry.kind == GeometryKind::kUnitQuaternion) return {"w", "x", "y", "z"};
+  if (geometry.kind == GeometryKind::kUnitVector) return {"x", "y", "z"};
+  std::vector<std::string> numbers;
+  for (int i = 0; i < geometry.ambient; ++i) numbers.push_back(std::to_string(i));
+  return numbers;
+}
+
 std::vector<std::string> AmbientNames(const std::string& name, const Space& space) {
   const auto size = static_cast<std::size_t>(space.geometry.ambient);
   if (space.elements.size() == size) return ColumnNames(name, space);

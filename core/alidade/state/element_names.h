@@ -8,6 +8,12 @@
 
 namespace alidade::internal {
 
+/// "x,y,z" in parts; {""} for "".
+std::vector<std::string> SplitNames(const std::string& names);
+/// Names of the ambient elements: `names` in parts, or those of the geometry, which is no product:
+/// w, x, y, z of a quaternion, numbers of a vector.
+std::vector<std::string> ElementsOf(const std::string& names, const Geometry& geometry);
+
 /// ColumnNames, or numbers for names where the space names no elements.
 std::vector<std::string> AmbientNames(const std::string& name, const Space& space);
 /// `name`, or `name.0`, `name.1`, ... where there are several.

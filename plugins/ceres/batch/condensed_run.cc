@@ -69,7 +69,7 @@ VariableRows CondensedRun::FindVariables() const {
   const auto n = static_cast<std::size_t>(initial_.covariance().size());
   std::vector<bool> moves(n, false), read(n, false);
   for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
-    if (binding_.system.motions[i].model.stationary()) continue;
+    if (binding_.system.motions[i].model->stationary()) continue;
     for (const int row : binding_.motion_places[i].at) {
       if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
     }
@@ -123,8 +123,8 @@ void CondensedRun::PutPlaces() {
   xyz_places_.clear();
   for (std::size_t i = 0; i < binding_.sensor_places.size(); ++i) {
     const SensorBinding& sensor = binding_.system.sensors[i];
-    places_.push_back(PlaceBehind(i, sensor.model));
-    xyz_places_.push_back(PlaceBehind(i, sensor.xyz.value_or(sensor.model)));
+    places_.push_back(PlaceBehind(i, *sensor.model));
+    xyz_places_.push_back(PlaceBehind(i, sensor.xyz ? *sensor.xyz : *sensor.model));
   }
 }
 
@@ -210,7 +210,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
     for (Timestamp part = 0; part < piece.steps; ++part) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
         const MotionBinding& motion = binding_.system.motions[i];
-        if (motion.model.stationary() || !std::ranges::all_of(motion.blocks, present)) continue;
+        if (motion.model->stationary() || !std::ranges::all_of(motion.blocks, present)) continue;
         const std::span<const double> u = time_.Input(i, from, events);
         Step& step = epoch.steps.emplace_back();
         step.motion = i;
@@ -219,7 +219,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
         step.column = step.begins ? inputs_ : held_[i];
         step.columns = inputs_;
         step.u.assign(u.begin(), u.end());
-        if (step.begins) inputs_ += motion.model.noise_size();
+        if (step.begins) inputs_ += motion.model->noise_size();
         if (binding_.motion_places[i].holds) held_[i] = step.column;
       }
       if (inputs_ > most_inputs_) return FailTooMany();
@@ -259,7 +259,7 @@ void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Ep
 /// Puts the residuals of a factor behind those that there are.
 void CondensedRun::AddPart(Factor& factor) {
   const SensorBinding& sensor = SensorOf(factor);
-  const int size = sensor.model.measurement().geometry.tangent;
+  const int size = sensor.model->measurement().geometry.tangent;
   const bool plain = sensor.loss.kind == LossKind::kNone;
   factor.row = residuals_;
   residuals_ += size;
@@ -280,12 +280,12 @@ void CondensedRun::AddFirstValues(Epoch& epoch) {
       if (epoch.factors[i].outcome != Outcome::kInitialised || ObservesLandmarks(sensor)) {
         continue;
       }
-      const auto target = static_cast<std::size_t>(sensor.model.inverse().role);
+      const auto target = static_cast<std::size_t>(sensor.model->inverse().role);
       const BlockId block = sensor.roles[target].block;
       if (Present(block) || std::ranges::count_if(sensor.roles, missing) > 1) continue;
       present_[static_cast<std::size_t>(block)] = progress = true;
       epoch.first_values.push_back({i, block, inputs_});
-      inputs_ += sensor.model.measurement().geometry.tangent;
+      inputs_ += sensor.model->measurement().geometry.tangent;
     }
   }
 }

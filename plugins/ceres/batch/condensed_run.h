@@ -301,7 +301,7 @@ class CondensedRun {
   void PutPlaces();
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
   bool ObservesLandmarks(const SensorBinding& sensor) const {
-    return has_landmarks() && sensor.model.has_landmark();
+    return has_landmarks() && sensor.model->has_landmark();
   }
   /// A landmark with inputs that the first frame sees, and where these are in (e, l).
   struct Leaving {
@@ -345,7 +345,7 @@ class CondensedRun {
   }
   const SensorModel& ModelOf(int sensor, bool xyz) const {
     const SensorBinding& binding = binding_.system.sensors[static_cast<std::size_t>(sensor)];
-    return xyz ? *binding.xyz : binding.model;
+    return xyz ? *binding.xyz : *binding.model;
   }
   const SensorModel& ModelOf(const Factor& factor) const {
     return ModelOf(factor.sensor, factor.xyz);

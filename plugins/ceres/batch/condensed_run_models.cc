@@ -61,7 +61,7 @@ std::string TextOf(const SensorBinding& sensor, const Measurement& measurement) 
 bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = binding_.system.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
-  const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
+  const int n = motion.model->tangent_size(), n_w = motion.model->noise_size();
   Eigen::VectorXd w = Eigen::VectorXd::Zero(n_w);  // the mean, until L is taken
   if (step.l.size() > 0) w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
   const bool sensitivity = point.s.rows() > 0;
@@ -94,7 +94,7 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
 bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
                           const Point& point, const std::string& name, Inverse& inverse) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const Geometry& measured = sensor.model.measurement().geometry;
+  const Geometry& measured = sensor.model->measurement().geometry;
   const internal::SensorPlace& place =
       binding_.sensor_places[static_cast<std::size_t>(factor.sensor)];
   Measurement measurement = factor.measurement;
@@ -108,7 +108,7 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
   const Outcome outcome = internal::InvertAt(sensor, place, measurement, prior, roles, at);
   if (outcome != Outcome::kAccepted) {
     return Fail("sensor '" + sensor.name + "' gives " + name +
-                " no first value: " + Why(outcome, sensor.model));
+                " no first value: " + Why(outcome, *sensor.model));
   }
   inverse.y = std::move(at.y);
   inverse.by_d = at.by_z * j_plus;
@@ -128,7 +128,7 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
 bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, const double* e,
                               Point& point) const {
   const Block& block = initial_.layout()[first.block];
-  const int m = SensorOf(factor).model.measurement().geometry.tangent;
+  const int m = SensorOf(factor).model->measurement().geometry.tangent;
   Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
   if (factor.l.size() > 0) d = factor.l * Eigen::Map<const Eigen::VectorXd>(e + first.column, m);
   Inverse inverse;
@@ -212,7 +212,7 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
   }
   const MotionBinding& motion = binding_.system.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
-  RowMajor l(motion.model.noise_size(), motion.model.noise_size());
+  RowMajor l(motion.model->noise_size(), motion.model->noise_size());
   const Outcome outcome =
       internal::SqrtQAt(motion, place, point.x.data(), step.u.data(), step.dt_s, l.data());
   if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);

@@ -14,7 +14,7 @@ namespace {
 const double* CameraOf(const SensorBinding& sensor, const State& state) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     const BlockId block = sensor.roles[i].block;
-    if (sensor.model.roles()[i].name == "position" && block >= 0) return state.value(block);
+    if (sensor.model->roles()[i].name == "position" && block >= 0) return state.value(block);
   }
   return nullptr;
 }
@@ -79,7 +79,7 @@ void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& fil
     MapLandmark& landmark = landmarks_[static_cast<std::size_t>(factor.landmark)];
     ++landmark.observed;
     const bool known = !landmark.first && !landmark.in_state();
-    if (known) landmark.xyz = SensorOf(factor).xyz.has_value();  // known landmarks are points
+    if (known) landmark.xyz = SensorOf(factor).xyz != nullptr;  // known landmarks are points
     if (known) landmark.sensor = factor.sensor;
     factor.xyz = landmark.xyz;
     if (landmark.in_state()) {
@@ -103,12 +103,12 @@ void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimato
   landmark.sensor = factor.sensor;
   landmark.first = {epochs_.size(), index};
   if (before != current_.end()) landmark.generation = before->second.generation + 1;
-  if (sensor.model.inverse().prior_size > 0) {
+  if (sensor.model->inverse().prior_size > 0) {
     landmark.prior = PriorOf(id, sensor, *binding_.system.landmarks->prior, filter);
     landmark.sigma = binding_.system.landmarks->prior->sigma;
   }
-  landmark.from = Eigen::VectorXd::Zero(sensor.model.measurement().geometry.tangent +
-                                        sensor.model.inverse().prior_size);
+  landmark.from = Eigen::VectorXd::Zero(sensor.model->measurement().geometry.tangent +
+                                        sensor.model->inverse().prior_size);
   current_[id] = {static_cast<int>(landmarks_.size()), landmark.generation};
   landmarks_.push_back(std::move(landmark));
 }
@@ -127,7 +127,7 @@ bool CondensedRun::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
   }
   const auto [epoch, index] = *landmark.first;
   const Factor& factor = epochs_[epoch].factors[index];
-  const int m = SensorOf(factor).model.measurement().geometry.tangent;
+  const int m = SensorOf(factor).model->measurement().geometry.tangent;
   const bool has_noise = factor.l.size() > 0;
   Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
   if (has_noise) d = factor.l * l.head(m);

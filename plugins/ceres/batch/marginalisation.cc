@@ -222,7 +222,7 @@ void CondensedRun::AddBlocks(MapLandmark& landmark, State& state) const {
     const SensorBinding& sensor = binding_.system.sensors[i];
     if (!ObservesLandmarks(sensor)) continue;
     const std::vector<Space>& roles =
-        (landmark.xyz ? sensor.xyz.value_or(sensor.model) : sensor.model).roles();
+        (landmark.xyz && sensor.xyz ? *sensor.xyz : *sensor.model).roles();
     const auto own = std::ranges::count_if(roles, &Space::landmark);
     landmark.places[i].PutLandmark(roles.size() - static_cast<std::size_t>(own), state.layout(),
                                    landmark.blocks);

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "alidade/base/error.h"
+#include "alidade/estimation/models.h"
 #include "alidade/model/autodiff.h"
-#include "alidade/plugin/model_instance.h"
 
 namespace alidade::ceres_batch {
 

@@ -39,7 +39,7 @@ System WalkingDepthFilter() {
 
 TEST(ControlInput, TakesNoAllocation) {
   System system = testing::DepthFilter();
-  testing::AddMotion(system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+  testing::AddMotion(system, "car", MakeMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
   system.motions.back().input = {"odometry", 0.05};
   std::vector<StreamInfo> streams = testing::StreamsOf(system);
@@ -133,11 +133,11 @@ INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
 
 /// Adds `count` states that walk; with `considered` the first one is never corrected.
 void AddWalking(System& system, int count, bool considered) {
-  const MotionModel model = testing::ConstantMotion(1, 0.1);
+  const SharedMotion model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
     const std::string name = "other_" + std::to_string(i);
     const BlockId id = system.layout.Declare(
-        name + ".value", name, model.blocks()[0],
+        name + ".value", name, model->blocks()[0],
         considered && i == 0 ? BlockStatus::kConsider : BlockStatus::kEstimated);
     Prior prior;
     prior.block = id;

@@ -49,17 +49,17 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
 template <class A, class B>
 System Walking() {
   System system;
-  const auto add = [&](const char* name, const MotionModel& model, std::vector<double> mean) {
+  const auto add = [&](const char* name, const SharedMotion& model, std::vector<double> mean) {
     AddMotion(system, name, model, {{"x", 0.0, 0.1}});
     Prior& prior = system.priors.back();
-    const Geometry& geometry = model.blocks()[0].geometry;
+    const Geometry& geometry = model->blocks()[0].geometry;
     prior.mean = std::move(mean);
     prior.mean.resize(static_cast<std::size_t>(geometry.ambient));
     geometry.Normalise(prior.mean.data());
     prior.covariance = 0.01 * Eigen::MatrixXd::Identity(geometry.tangent, geometry.tangent);
   };
-  add("a", InProcessMotion(ManifoldWalk<A, 0.03>(), "walk"), {0.3, -0.2, 0.5, 0.4});
-  add("b", InProcessMotion(ManifoldWalk<B, 0.03>(), "walk"), {0.9, 0.1, -0.3, 0.2});
+  add("a", MakeMotion(ManifoldWalk<A, 0.03>(), "walk"), {0.3, -0.2, 0.5, 0.4});
+  add("b", MakeMotion(ManifoldWalk<B, 0.03>(), "walk"), {0.9, 0.1, -0.3, 0.2});
   return system;
 }
 
@@ -90,9 +90,9 @@ constexpr MakeEstimator kEstimators[] = {
 template <class A, class B>
 void ExpectBothAreTheTwo() {
   System apart = Walking<A, B>(), together = apart;
-  AddSensor(apart, "za", InProcessSensor(ManifoldSensor<A, 0.05>(), "a"), {"a.x"});
-  AddSensor(apart, "zb", InProcessSensor(ManifoldSensor<B, 0.05>(), "b"), {"b.x"});
-  AddSensor(together, "z", InProcessSensor(BothAtOnce<A, B>(), "both"), {"a.x", "b.x"});
+  AddSensor(apart, "za", MakeSensor(ManifoldSensor<A, 0.05>(), "a"), {"a.x"});
+  AddSensor(apart, "zb", MakeSensor(ManifoldSensor<B, 0.05>(), "b"), {"b.x"});
+  AddSensor(together, "z", MakeSensor(BothAtOnce<A, B>(), "both"), {"a.x", "b.x"});
   for (const MakeEstimator make : kEstimators) {
     const auto one = make(apart), other = make(together);
     for (int k = 0; k < 30; ++k) {
@@ -127,7 +127,7 @@ TEST(CompositeMeasurement, OfIndependentPartsIsTwoSensors) {
 // x' = x + P (P + R)^-1 (z - x), with a whole R that came with the measurement.
 TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   System system = Walking<Vec<2>, Vec<1>>();
-  AddSensor(system, "z", InProcessSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
+  AddSensor(system, "z", MakeSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
   Eigen::Matrix3d root;
   root << 0.1, 0, 0, 0.04, 0.08, 0, -0.03, 0.05, 0.06;
   const Eigen::Matrix3d r = root * root.transpose(), p = 0.01 * Eigen::Matrix3d::Identity();
@@ -149,7 +149,7 @@ TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
 TEST(CompositeMeasurement, WrapsTheAnglesAmongItsParts) {
   System system = Walking<Vec<1>, Angle>();
   system.priors[1].mean = {-3.1};
-  AddSensor(system, "z", InProcessSensor(BothAtOnce<Vec<1>, Angle>(), "both"), {"a.x", "b.x"});
+  AddSensor(system, "z", MakeSensor(BothAtOnce<Vec<1>, Angle>(), "both"), {"a.x", "b.x"});
   for (const MakeEstimator make : kEstimators) {
     const auto filter = make(system);
     const UpdateReport& report = filter->Process(Frame{0, {{0, 0, -1, {0.3, 3.1}, {}}}});

@@ -28,7 +28,7 @@ const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 /// `car.position`, 1 +- 0.5 m, driven by stream `odometry`; sensor `fix` measures it.
 System Car(double timeout_s = kInfinity) {
   System system;
-  AddMotion(system, "car", InProcessMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
+  AddMotion(system, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
   system.motions[0].input = {"odometry", timeout_s};
   AddSensor(system, "fix", LinearSensor(1.0, kSigma), {"car.position"});
   return system;
@@ -288,7 +288,7 @@ struct TurnedByInput : Motion<1, Vec<1>> {
 
 TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   System system;
-  AddMotion(system, "body", InProcessMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
+  AddMotion(system, "body", MakeMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
   system.motions[0].input = {"attitude", kInfinity};
   system.initial_time_s = -1.0;
   Ekf ekf(system, {}, {{"attitude", 4}});
@@ -307,9 +307,9 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
 
 TEST(ControlInputs, EachModelHasItsOwnAndTheyEndOneByOne) {
   System system = Car(0.5);
-  AddMotion(system, "other", InProcessMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
+  AddMotion(system, "other", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
   system.motions[1].input = {"odometry", 2.0};
-  AddMotion(system, "third", InProcessMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
+  AddMotion(system, "third", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
   system.motions[2].input = {"wheel", 1.0};
   AddMotion(system, "still", testing::ConstantMotion(1, 0.1), {{"value", 3.0, 1.0}});
   Ekf ekf(system, {}, {{"fix", 1}, {"odometry", 1}, {"wheel", 1}});
@@ -343,7 +343,7 @@ struct Heading : Motion<1, Vec<1>, Vec<1>> {
 
 TEST(ControlInputs, WhatCannotBeObservedIsJudgedInMotion) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Heading(), "heading"),
+  AddMotion(system, "p", MakeMotion(Heading(), "heading"),
             {{"x", 0.0, 1.0}, {"heading", 0.5, 1.0}});
   AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"p.x"});
   EXPECT_TRUE(UnobservableDirections(system).empty());

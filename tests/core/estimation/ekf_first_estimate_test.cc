@@ -117,13 +117,13 @@ struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
 // H d = R B(u) d: the tangent at the latest u, turned the short way to the first, R u = u0.
 TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
   System system;
-  MotionBinding binding{"s", InProcessMotion(StillDirection(), "still"), {}};
-  binding.blocks.push_back(system.layout.Declare("s.u", "s", binding.model.blocks()[0]));
+  MotionBinding binding{"s", MakeMotion(StillDirection(), "still"), {}};
+  binding.blocks.push_back(system.layout.Declare("s.u", "s", binding.model->blocks()[0]));
   const Eigen::Vector3d first = Eigen::Vector3d(0.8, 0.1, -0.5).normalized();
   const Eigen::Matrix2d prior{{0.9, 0.2}, {0.2, 0.1}};
   system.priors.push_back({0, {first[0], first[1], first[2]}, prior, ""});
   system.motions.push_back(binding);
-  AddSensor(system, "direction", InProcessSensor(DirectionFromVector(), "direction"), {"s.u"});
+  AddSensor(system, "direction", MakeSensor(DirectionFromVector(), "direction"), {"s.u"});
   EkfOptions options;
   options.jacobian = JacobianPolicy::kFirstEstimate;
   Ekf ekf(system, options, {{"direction", 3}});

@@ -185,8 +185,8 @@ TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
 
 TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
   System system = WithTwoSensors(MapSystem(Offset(0.1), {}, 0.3));
-  const MotionModel walk = InProcessMotion(Walk(0.1), "walk");
-  const BlockId waits = system.layout.Declare("other.position", "other", walk.blocks()[0]);
+  const SharedMotion walk = MakeMotion(Walk(0.1), "walk");
+  const BlockId waits = system.layout.Declare("other.position", "other", walk->blocks()[0]);
   system.motions.push_back({"other", walk, {waits}});
   Prior prior;
   prior.block = waits;
@@ -337,7 +337,7 @@ TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
     options.min_observations = 2;
     options.max_missed_frames = max_missed_frames;
     System system = MapSystem(Offset(0.1), options, 0.3);
-    system.motions[0].model = InProcessMotion(HeldWalk(0.1), "held_walk");
+    system.motions[0].model = MakeMotion(HeldWalk(0.1), "held_walk");
     Ekf ekf(system, {}, {{"tracks", 3}});
     for (int i = 0; i < 2; ++i) ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
     EXPECT_EQ(ekf.landmarks().size(), 1u);

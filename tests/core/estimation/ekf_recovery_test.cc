@@ -17,7 +17,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
-  AddSensor(system, "broken", InProcessSensor(Broken(), "broken"), {"p.x"});
+  AddSensor(system, "broken", MakeSensor(Broken(), "broken"), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
@@ -42,7 +42,7 @@ struct Exploding : Motion<1, Vec<1>> {
 // FAULTS 76
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddMotion(system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
   AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, 5.0}}));
@@ -70,8 +70,8 @@ struct Asked : Linear {
 
 TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  AddSensor(system, "asked", InProcessSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
+  AddMotion(system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(system, "asked", MakeSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Asked::times = 0;
   ekf.Process(FrameAt(0.0, {{0, 5.0}}));
@@ -85,7 +85,7 @@ TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
 
 TEST(Ekf, AFailedStepMovesNothing) {
   System system = MovingPoint();
-  AddMotion(system, "q", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddMotion(system, "q", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
   Ekf ekf(system, {}, {});
   ekf.Start(0);
   const std::vector<double> x = ekf.state().values();
@@ -169,7 +169,7 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "z", InProcessSensor(OfSum(), "of_sum"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(OfSum(), "of_sum"), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Frame frame = FrameAt(0.0, {});
   frame.measurements.push_back({0, 0, -1, {0.5, 0.5}, {}});
@@ -301,8 +301,8 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 // b = z - a: a, which moves with it, is put back to its prior first, and b is correlated with that.
 TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
-  AddSensor(system, "sum", InProcessSensor(Sum(), "sum"), {"p.a", "p.b"});
+  AddMotion(system, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
+  AddSensor(system, "sum", MakeSensor(Sum(), "sum"), {"p.a", "p.b"});
   AddSensor(system, "direct", LinearSensor(1.0, 0.01), {"p.a"});
   EkfOptions options;
   options.gate = 0.999;
@@ -334,8 +334,8 @@ struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
 // Each half of it is a covariance.
 TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
-  AddSensor(system, "both", InProcessSensor(Both(), "both"), {"p.a", "p.b"});
+  AddMotion(system, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
+  AddSensor(system, "both", MakeSensor(Both(), "both"), {"p.a", "p.b"});
   Ekf ekf(system, {}, StreamsOf(system));
   Frame frame = FrameAt(0.0, {{0, 1.0}});
   frame.measurements[0].values = {1.0, 2.0};
@@ -457,7 +457,7 @@ struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "s", InProcessSensor(WithOptional(), "with_optional"), {"p.x"});
+  AddSensor(system, "s", MakeSensor(WithOptional(), "with_optional"), {"p.x"});
   system.sensors[0].roles.push_back({});
   EkfOptions options;
   options.gate = 0.999;

@@ -22,7 +22,7 @@ struct Breaking : Motion<1, Vec<1>> {
 /// One block of known value 1 +- 1, measured directly with the given noise.
 Ekf OneBlock(double sigma) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
+  AddMotion(system, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
   AddSensor(system, "z", LinearSensor(1.0, sigma), {"p.x"});
   return {system, EkfOptions{}, {{"z", 1}}};
 }

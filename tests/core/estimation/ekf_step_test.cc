@@ -57,7 +57,7 @@ struct Stretching : Motion<1, Vec<1>> {
 TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
   // F P F' = 1e20 * 1e300; the point next to it steps without trouble.
   System system = MovingPoint();
-  AddMotion(system, "q", InProcessMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
+  AddMotion(system, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
   Ekf ekf(system, {}, {});
   ekf.Start(0);
   const std::vector<double> x = ekf.state().values();
@@ -73,8 +73,7 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
 TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
   // 1e20 * 1e287 is finite, though the bound that spares the copy is not.
   System system;
-  AddMotion(system, "q", InProcessMotion(Stretching(), "stretching"),
-            {{"x", 1.0, std::sqrt(1e287)}});
+  AddMotion(system, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
   Ekf ekf(system, {}, {});
   ekf.Start(0);
   ekf.Process(FrameAt(1.0, {}));
@@ -117,9 +116,9 @@ struct Opposite : Sensor<Angle, Angle> {
 
 System Turn() {
   System system;
-  MotionBinding binding{"t", InProcessMotion(TurningBlocks(), "turning"), {}};
+  MotionBinding binding{"t", MakeMotion(TurningBlocks(), "turning"), {}};
   for (std::size_t i = 0; i < 2; ++i) {
-    const Space& space = binding.model.blocks()[i];
+    const Space& space = binding.model->blocks()[i];
     const BlockId id = system.layout.Declare("t." + space.name, "t", space);
     binding.blocks.push_back(id);
     const int n = space.geometry.tangent;
@@ -148,7 +147,7 @@ TEST(EkfStep, BlocksStayOnTheirManifold) {
 
 TEST(EkfStep, ABlockThatStartsFromAMeasurementIsOnItsManifold) {
   System system = Turn();
-  AddSensor(system, "opposite", InProcessSensor(Opposite(), "opposite"), {"t.a"});
+  AddSensor(system, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
   system.priors[0] = {0, {}, {}, "opposite"};
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, -1.0}}));
@@ -167,7 +166,7 @@ struct Unwrapped : Opposite {
 // FAULTS 84
 TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   System system = Turn();
-  AddSensor(system, "unwrapped", InProcessSensor(Unwrapped(), "unwrapped"), {"t.a"});
+  AddSensor(system, "unwrapped", MakeSensor(Unwrapped(), "unwrapped"), {"t.a"});
   Ekf ekf(system, {}, StreamsOf(system));
   Ukf ukf(system, {}, StreamsOf(system));
   for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
@@ -181,7 +180,7 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
 // FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update takes the short way round.
 TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   System system = Turn();
-  AddSensor(system, "opposite", InProcessSensor(Opposite(), "opposite"), {"t.a"});
+  AddSensor(system, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
   system.priors[0].mean = {3.0 - kPi};  // z = 3
   for (const double turns : {0.0, 1.0, -2.0}) {
     Ekf ekf(system, {}, StreamsOf(system));

@@ -167,8 +167,8 @@ TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
     if (!by_role) system = WithStatus(system, "c.x", BlockStatus::kConsider);
     const Eigen::Vector3d gains(1.0, -0.5, 2.0), sigmas(0.3, 0.2, 0.5);
     for (int i = 0; i < 3; ++i) {
-      AddSensor(system, "z" + std::to_string(i),
-                InProcessSensor(Biased(gains[i], sigmas[i]), "biased"), {"x.x", "c.x"});
+      AddSensor(system, "z" + std::to_string(i), MakeSensor(Biased(gains[i], sigmas[i]), "biased"),
+                {"x.x", "c.x"});
     }
     if (by_role) system.sensors[1].roles[1].mode = RoleMode::kConsider;
     Ekf ekf(system, {}, StreamsOf(system));
@@ -222,7 +222,7 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
-  AddSensor(system, "z", InProcessSensor(Implies(), "implies"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(Implies(), "implies"), {"p.x"});
   system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   Ekf ekf(system, {}, StreamsOf(system));
   for (int k = 0; k < 25; ++k) {
@@ -354,9 +354,9 @@ TEST(Ekf, AGapIsSteppedInEqualParts) {
 
 TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   System system;
-  const MotionModel model = testing::ConstantVelocityMotion(1.0);
+  const SharedMotion model = testing::ConstantVelocityMotion(1.0);
   AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
+  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
   system.motions[0].blocks.push_back(v);
   system.priors.push_back({v, {2.0}, {}, ""});
   Ekf ekf(system, {}, {});
@@ -388,7 +388,7 @@ TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
   AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 5.0, 1.0}});
-  AddSensor(system, "square", InProcessSensor(Product(), "product"), {"p.x", "p.x"});
+  AddSensor(system, "square", MakeSensor(Product(), "product"), {"p.x", "p.x"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;
@@ -425,7 +425,7 @@ TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   System system;
   AddMotion(system, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
   AddMotion(system, "cam", testing::ConstantMotion(1), {{"r", 0.0, 1.0}});
-  AddSensor(system, "offset", InProcessSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
+  AddSensor(system, "offset", MakeSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;
@@ -447,7 +447,7 @@ TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
       AddMotion(system, "b" + std::to_string(i), testing::ConstantMotion(1),
                 {{"x", 1.0, std::sqrt(kP)}});
     }
-    AddSensor(system, "direct", InProcessSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
+    AddSensor(system, "direct", MakeSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
     Ekf ekf(system, {}, StreamsOf(system));
     ASSERT_EQ(internal::IsSmall(ekf.state().covariance()), n == 3);
     EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.1}})).measurements()[0].outcome, Outcome::kAccepted);

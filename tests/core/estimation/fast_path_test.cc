@@ -207,15 +207,15 @@ TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
 
 TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   System system;
-  const BlockId x = system.layout.Declare("a.x", "a", testing::ConstantMotion(2).blocks()[0]);
+  const BlockId x = system.layout.Declare("a.x", "a", testing::ConstantMotion(2)->blocks()[0]);
   system.motions.push_back({"a", testing::ConstantMotion(2, 0.4), {x}});
   Prior prior;
   prior.block = x;
   prior.mean = {1.5, 0.7};
   prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
   system.priors.push_back(prior);
-  AddSensor(system, "first", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
-  AddSensor(system, "second", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
+  AddSensor(system, "first", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
+  AddSensor(system, "second", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
   EkfOptions options;
   options.gate = 0.999;
   std::vector<Frame> frames;
@@ -241,17 +241,17 @@ struct LoudPair : CorrelatedPair {
 };
 
 TEST(SmallEkf, TakesAGivenNoiseInPlaceOfTheModels) {
-  const auto make = [](const SensorModel& sensor, const MotionModel& motion) {
+  const auto make = [](const SharedSensor& sensor, const SharedMotion& motion) {
     System system = HeldPoint(0.7);
     system.motions[0].model = motion;
-    const BlockId x = system.layout.Declare("a.x", "a", ConstantMotion(2).blocks()[0]);
+    const BlockId x = system.layout.Declare("a.x", "a", ConstantMotion(2)->blocks()[0]);
     system.motions.push_back({"a", ConstantMotion(2, 0.4), {x}});
     system.priors.push_back({x, {1.5, 0.7}, Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}}, {}});
     AddSensor(system, "pair", sensor, {"a.x"});
     AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
     return system;
   };
-  const System own = make(InProcessSensor(CorrelatedPair(), "pair"), ConstantVelocityMotion(0.7));
+  const System own = make(MakeSensor(CorrelatedPair(), "pair"), ConstantVelocityMotion(0.7));
   const System given = make(SensorOfNoise(LoudPair(), {0.3, 0.0, 0.1, 0.2}),
                             MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7}));
   Watched a(own, {}, StreamsOf(own)), b(given, {}, StreamsOf(given));
@@ -292,17 +292,17 @@ struct Spinning : Motion<0, Vec<2>> {
 };
 
 TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
-  for (const MotionModel& model :
-       {InProcessMotion(Shaken(), "shaken"), InProcessMotion(Spinning(), "turning")}) {
+  for (const SharedMotion& model :
+       {MakeMotion(Shaken(), "shaken"), MakeMotion(Spinning(), "turning")}) {
     System system;
-    const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
+    const BlockId x = system.layout.Declare("a.x", "a", model->blocks()[0]);
     system.motions.push_back({"a", model, {x}});
     Prior prior;
     prior.block = x;
     prior.mean = {1.5, 0.7};
     prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
     system.priors.push_back(prior);
-    AddSensor(system, "pair", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
+    AddSensor(system, "pair", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
     std::vector<Frame> frames;
     for (int k = 0; k < 20; ++k) {
       Frame frame = FrameAt(0.1 * k, {});
@@ -333,8 +333,8 @@ struct Repeated : Sensor<Vec<K>, Vec<1>> {
 TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
   System system = DepthFilter();
   system.priors[2] = {2, {}, {}, "inverse_scale"};
-  AddSensor(system, "three", InProcessSensor(Repeated<3>(), "three"), {"target.depth"});
-  AddSensor(system, "two", InProcessSensor(Repeated<2>(), "two"), {"target.depth"});
+  AddSensor(system, "three", MakeSensor(Repeated<3>(), "three"), {"target.depth"});
+  AddSensor(system, "two", MakeSensor(Repeated<2>(), "two"), {"target.depth"});
   std::vector<Frame> frames = {FrameAt(0.0, {{0, 74.0}, {2, 0.35}}), FrameAt(0.1, {{1, 1.0}}),
                                FrameAt(0.2, {{0, 74.0}, {3, 0.35}})};
   frames[0].measurements[1].values = {0.35, 0.34, 0.36};
@@ -379,8 +379,8 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
 
 /// Adds a block of three that walk, `t.x`, with correlated priors.
 void AddTriple(System& system) {
-  const MotionModel walk = testing::ConstantMotion(3, 0.2);
-  const BlockId id = system.layout.Declare("t.x", "t", walk.blocks()[0]);
+  const SharedMotion walk = testing::ConstantMotion(3, 0.2);
+  const BlockId id = system.layout.Declare("t.x", "t", walk->blocks()[0]);
   system.motions.push_back({"t", walk, {id}});
   const Eigen::Matrix3d p{{0.09, 0.02, 0.01}, {0.02, 0.04, -0.01}, {0.01, -0.01, 0.16}};
   system.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
@@ -405,9 +405,9 @@ System OfSize(int n) {
   }
   if (triple) AddTriple(system);
   AddSensor(system, "first", LinearSensor(2.0, 0.5), {scalars[0]});
-  if (triple) AddSensor(system, "mixed", InProcessSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
+  if (triple) AddSensor(system, "mixed", MakeSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
   for (std::size_t i = 1; i < scalars.size() && i < 3; ++i) {
-    AddSensor(system, "both" + std::to_string(i), InProcessSensor(Both(), "both"),
+    AddSensor(system, "both" + std::to_string(i), MakeSensor(Both(), "both"),
               {scalars[0], scalars[scalars.size() - i]});
   }
   return system;

@@ -72,7 +72,7 @@ struct Beacon : Sensor<Vec<1>, Vec<1>> {
 // x = 1 +- 2; z = x - 3 +- 0.3, so that S = 4.09 and x' = 1 + 4 / 4.09 (z + 2).
 TEST(LiveKnown, ComesWithAReadingAndIsNeededForAPrediction) {
   System system = MovingPoint();
-  AddSensor(system, "z", InProcessSensor(Beacon(), "beacon"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(Beacon(), "beacon"), {"p.x"});
   Ekf filter(system, {}, StreamsOf(system));
   EXPECT_THROW(filter.Push(0, {{0, {-1.5}}}), Error);
   EXPECT_THROW(static_cast<void>(filter.Expect("z", 0)), Error);
@@ -254,7 +254,7 @@ TEST(Live, ExpectsNothingThatIsNotFinite) {
   for (const double x : {1.0, 7.0}) {
     System system;
     AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
-    AddSensor(system, "z", InProcessSensor(Broken(), "broken"), {"p.x"});
+    AddSensor(system, "z", MakeSensor(Broken(), "broken"), {"p.x"});
     Ekf ekf(system, {}, StreamsOf(system));
     ekf.Start(0);
     EXPECT_EQ(ekf.Expect("z", 0).has_value(), x < 5.0);

@@ -169,7 +169,7 @@ TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
 
 TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
   System system = DepthFilter();
-  system.motions[0].model = InProcessMotion(ConstantVelocity<1, true>(1.0), "constant_velocity");
+  system.motions[0].model = MakeMotion(ConstantVelocity<1, true>(1.0), "constant_velocity");
   const auto whole = this->Run(system, DepthFrames());
   EXPECT_LT(MostApart(whole, this->Run(system, DepthFrames(), {0.002})), this->kTolerance);
   const std::vector<Frame> more = WithEmptyFrames(DepthFrames(), 4);
@@ -194,7 +194,7 @@ struct Pushed : Motion<1, Vec<1>, Vec<1>> {
 TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   const auto whole = this->Run(DepthFilter(), DepthFrames());
   System system = DepthFilter();
-  system.motions[0].model = InProcessMotion(Pushed(), "pushed");
+  system.motions[0].model = MakeMotion(Pushed(), "pushed");
   system.motions[0].input = {"push", 0.004};  // and ends after 4 ms
   std::vector<StreamInfo> streams = StreamsOf(system);
   streams.push_back({"push", 1});
@@ -215,8 +215,8 @@ TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
     System made;
     MotionBinding binding{"p", testing::ConstantVelocityMotion(2.0), {}};
     binding.blocks = {
-        made.layout.Declare("p.x", "p", binding.model.blocks()[0], position),
-        made.layout.Declare("p.v", "p", binding.model.blocks()[1], BlockStatus::kEstimated)};
+        made.layout.Declare("p.x", "p", binding.model->blocks()[0], position),
+        made.layout.Declare("p.v", "p", binding.model->blocks()[1], BlockStatus::kEstimated)};
     Prior x{binding.blocks[0], {1.0}, {}, {}}, v{binding.blocks[1], {0.5}, {}, {}};
     if (position != BlockStatus::kConstant) x.covariance = Eigen::MatrixXd::Constant(1, 1, 0.1);
     v.covariance = Eigen::MatrixXd::Constant(1, 1, 0.25);

@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 template <class Filter, class Options = EkfOptions>
 Filter Make(const System& system, const Options& options = {}) {
-  return {system, options, {{"tracks", system.sensors[0].model.measurement().geometry.ambient}}};
+  return {system, options, {{"tracks", system.sensors[0].model->measurement().geometry.ambient}}};
 }
 
 TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
@@ -42,7 +42,7 @@ TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
 /// c(dx) = dx' P^-1 dx + |z - h(x (+) dx)|^2 / sigma^2 of one landmark, written out.
 struct Cost {
   const State& prior;
-  SensorModel sensor;
+  SharedSensor sensor;
   std::vector<double> z;
   double sigma;
 
@@ -51,7 +51,7 @@ struct Cost {
     prior.Retract(dx.data(), x);
     std::vector<const double*> roles;
     for (const Block& block : prior.layout().blocks()) roles.push_back(&x[block.value_offset]);
-    EXPECT_EQ(sensor.Predict(roles.data(), h.data()), Status::kOk);
+    EXPECT_EQ(sensor->Predict(roles.data(), h.data()), Status::kOk);
     return dx.dot(prior.covariance().Dense().llt().solve(dx)) +
            (std::pow(z[0] - h[0], 2) + std::pow(z[1] - h[1], 2)) / (sigma * sigma);
   }
@@ -90,7 +90,7 @@ TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
     filter->Process(FrameOf(0.0, {{0, {0.3, 0.1}}}));
     filter->Process(filter == &prediction ? FrameOf(1.0, {}) : frame);
   }
-  const Cost cost{prediction.state(), InProcessSensor(pixels, "tracks"), later, kSigma};
+  const Cost cost{prediction.state(), MakeSensor(pixels, "tracks"), later, kSigma};
   ASSERT_EQ(prediction.state().layout().blocks().size(), 4u);
   const double before = cost.Gradient(VectorXd::Zero(cost.From(iekf.state()).size())).norm();
   EXPECT_LT(cost.Gradient(cost.From(iekf.state())).norm(), 1e-4 * before);

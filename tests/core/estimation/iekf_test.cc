@@ -133,7 +133,7 @@ struct Creased : Sensor<Vec<1>, Vec<1>> {
 System FarArcTangent() {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
-  AddSensor(system, "s", InProcessSensor(ArcTangent(), "arc_tangent"), {"p.x"});
+  AddSensor(system, "s", MakeSensor(ArcTangent(), "arc_tangent"), {"p.x"});
   return system;
 }
 
@@ -194,8 +194,7 @@ TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
     int linearisations = 0;
     System system;
     AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
-    AddSensor(system, "s", InProcessSensor(CountedArcTangent{{}, &linearisations}, "counted"),
-              {"p.x"});
+    AddSensor(system, "s", MakeSensor(CountedArcTangent{{}, &linearisations}, "counted"), {"p.x"});
     IekfOptions options;
     options.max_iterations = most;
     Iekf(system, options, StreamsOf(system)).Process(FrameAt(0.0, {{0, 0.0}}));
@@ -208,7 +207,7 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
   AddSensor(system, "plain", LinearSensor(1.0, 1.0), {"p.x"});
-  AddSensor(system, "creased", InProcessSensor(Creased{}, "creased"), {"p.x"});
+  AddSensor(system, "creased", MakeSensor(Creased{}, "creased"), {"p.x"});
   Iekf iekf(system, {}, StreamsOf(system));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 2.5}, {1, 0.0}}));
   for (const MeasurementReport& entry : report.measurements()) {
@@ -267,10 +266,10 @@ struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
 
 System TurnedVector() {
   System system;
-  MotionBinding binding{"s", InProcessMotion(Still(), "still"), {}};
+  MotionBinding binding{"s", MakeMotion(Still(), "still"), {}};
   const std::vector<double> means[2] = {{1.0, 0.0, 0.0, 0.0}, {0.6, 0.0, 0.8}};
   for (std::size_t i = 0; i < 2; ++i) {
-    const Space& space = binding.model.blocks()[i];
+    const Space& space = binding.model->blocks()[i];
     const BlockId id = system.layout.Declare("s." + space.name, "s", space);
     binding.blocks.push_back(id);
     Prior prior;
@@ -281,7 +280,7 @@ System TurnedVector() {
     system.priors.push_back(prior);
   }
   system.motions.push_back(binding);
-  AddSensor(system, "turned", InProcessSensor(Turned(), "turned"), {"s.q", "s.u"});
+  AddSensor(system, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
   return system;
 }
 
@@ -382,8 +381,8 @@ State AfterAHeldRole(int power) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
   AddMotion(system, "q", testing::ConstantMotion(1), {{"c", 1.0, std::sqrt(1.9)}});
-  AddSensor(system, "difference", InProcessSensor(Difference(), "difference"), {"p.x", "q.c"});
-  AddSensor(system, "power", InProcessSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
+  AddSensor(system, "difference", MakeSensor(Difference(), "difference"), {"p.x", "q.c"});
+  AddSensor(system, "power", MakeSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
   system.sensors[1].roles[1].mode = RoleMode::kKnown;
   IekfOptions options;
   options.max_iterations = 50;

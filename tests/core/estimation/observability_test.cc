@@ -66,8 +66,8 @@ TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
 TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   const auto state_of = [](int size) {
     System system;
-    const MotionModel model = testing::ConstantMotion(size);
-    const BlockId id = system.layout.Declare("c.value", "c", model.blocks()[0]);
+    const SharedMotion model = testing::ConstantMotion(size);
+    const BlockId id = system.layout.Declare("c.value", "c", model->blocks()[0]);
     system.motions.push_back({"c", model, {id}});
     Prior prior;
     prior.block = id;
@@ -121,12 +121,12 @@ BlockId AddBlock(System& system, const std::string& name, const Space& space,
 /// A body `b` driven by its accelerometer, and a sensor of its position or velocity.
 System Accelerated(const std::string& measured) {
   System system;
-  const MotionModel model = InProcessMotion(testing::Accelerated(), "accelerated");
-  const BlockId p = AddBlock(system, "b.position", model.blocks()[0], {0.0, 0.0, 0.0}, 1.0);
-  const BlockId v = AddBlock(system, "b.velocity", model.blocks()[1], {0.0, 0.0, 0.0}, 1.0);
-  const BlockId q = AddBlock(system, "b.orientation", model.blocks()[2], {1, 0, 0, 0}, 0.2);
+  const SharedMotion model = MakeMotion(testing::Accelerated(), "accelerated");
+  const BlockId p = AddBlock(system, "b.position", model->blocks()[0], {0.0, 0.0, 0.0}, 1.0);
+  const BlockId v = AddBlock(system, "b.velocity", model->blocks()[1], {0.0, 0.0, 0.0}, 1.0);
+  const BlockId q = AddBlock(system, "b.orientation", model->blocks()[2], {1, 0, 0, 0}, 0.2);
   system.motions.push_back({"b", model, {p, v, q}, {"accelerometer"}});
-  testing::AddSensor(system, "fix", InProcessSensor(testing::Position3(), "position"), {measured});
+  testing::AddSensor(system, "fix", MakeSensor(testing::Position3(), "position"), {measured});
   return system;
 }
 
@@ -151,12 +151,12 @@ TEST(UnobservableDirections, WhatNoInputExcitesIsReported) {
 /// A vehicle `car` driven by its odometry, and a receiver of satellites on a mast.
 System CarWithMast() {
   System system;
-  const MotionModel model = InProcessMotion(testing::Unicycle(), "unicycle");
-  const BlockId p = AddBlock(system, "car.position", model.blocks()[0], {0.0, 0.0}, 1.0);
-  const BlockId heading = AddBlock(system, "car.heading", model.blocks()[1], {0.3}, 0.2);
-  const BlockId mast = AddBlock(system, "car.mast", model.blocks()[2], {0.5, 0.1}, 0.5);
+  const SharedMotion model = MakeMotion(testing::Unicycle(), "unicycle");
+  const BlockId p = AddBlock(system, "car.position", model->blocks()[0], {0.0, 0.0}, 1.0);
+  const BlockId heading = AddBlock(system, "car.heading", model->blocks()[1], {0.3}, 0.2);
+  const BlockId mast = AddBlock(system, "car.mast", model->blocks()[2], {0.5, 0.1}, 0.5);
   system.motions.push_back({"car", model, {p, heading, mast}, {"odometry"}});
-  testing::AddSensor(system, "fix", InProcessSensor(testing::OnMast(), "on_mast"),
+  testing::AddSensor(system, "fix", MakeSensor(testing::OnMast(), "on_mast"),
                      {"car.position", "car.heading", "car.mast"});
   return system;
 }
@@ -184,7 +184,7 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
 // next to a position known to 1 m. It is small, but no rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   System system;
-  testing::AddMotion(system, "p", InProcessMotion(Chain(), "chain"),
+  testing::AddMotion(system, "p", MakeMotion(Chain(), "chain"),
                      {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}, {"a", 0.0, 1.0}, {"j", 0.0, 0.01}});
   testing::AddSensor(system, "fix", testing::LinearSensor(1.0, 1.0), {"p.x"});
   EXPECT_EQ(UnobservableDirections(system), std::vector<Names>{});

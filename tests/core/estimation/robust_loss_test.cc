@@ -142,13 +142,13 @@ struct Normal {
 // of the second after the first; a gate sees S before the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   System system;
-  const MotionModel still = testing::ConstantMotion(2);
-  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
+  const SharedMotion still = testing::ConstantMotion(2);
+  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
   system.motions.push_back({"p", still, {id}});
   const Eigen::Matrix2d p0 = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();
   system.priors.push_back({id, {0.0, 0.0}, p0, ""});
   for (const char* name : {"one", "two"}) {
-    AddSensor(system, name, InProcessSensor(PairOfElements{}, "pair"), {"p.x"});
+    AddSensor(system, name, MakeSensor(PairOfElements{}, "pair"), {"p.x"});
     system.sensors.back().loss = kCauchy;
   }
   const Eigen::Matrix2d r = (Eigen::Matrix2d() << 0.25, 0.15, 0.15, 0.16).finished();

@@ -115,8 +115,8 @@ struct SeamDistance {
 /// are `sigma` times the same numbers.
 SeamDistance Follow(double sigma) {
   System system;
-  MotionBinding binding{"d", InProcessMotion(Wander(sigma), "wander"), {}};
-  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model.blocks()[0]));
+  MotionBinding binding{"d", MakeMotion(Wander(sigma), "wander"), {}};
+  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   const double y0 = 10.0 * sigma, z0 = 0.5 * sigma;
@@ -124,7 +124,7 @@ SeamDistance Follow(double sigma) {
   prior.covariance = sigma * sigma * Eigen::Matrix2d{{2.5, 0.5}, {0.5, 1.0}};
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "seen", InProcessSensor(Direction(sigma), "direction"), {"d.n"});
+  AddSensor(system, "seen", MakeSensor(Direction(sigma), "direction"), {"d.n"});
   RtsSmoother rts(system, {}, StreamsOf(system));
   DirectionBatch batch{prior, sigma};
   Random random(3);

@@ -43,15 +43,15 @@ struct Fixture : Motion<0, UnitVector> {
 /// its tangent plane turns over.
 System DirectionNearTheSeam() {
   System system;
-  MotionBinding binding{"d", InProcessMotion(Fixture(), "still"), {}};
-  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model.blocks()[0]));
+  MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};
+  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {std::sqrt(0.5 - 0.00125), std::sqrt(0.5 - 0.00125), 0.05};
   prior.covariance = (Eigen::Matrix2d() << 0.04, 0.01, 0.01, 0.01).finished();
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "seen", InProcessSensor(MeasuredDirection{}, "direction"), {"d.n"});
+  AddSensor(system, "seen", MakeSensor(MeasuredDirection{}, "direction"), {"d.n"});
   return system;
 }
 

@@ -107,8 +107,8 @@ TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot)
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
   AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
-  AddSensor(system, "sum", InProcessSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
-  AddSensor(system, "nearly", InProcessSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
+  AddSensor(system, "sum", MakeSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
+  AddSensor(system, "nearly", MakeSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
   SquareRootEkf filter(system, {}, StreamsOf(system));
 
   const Eigen::RowVector2d sum(1.0, 1.0), nearly(1.0, 1.001);

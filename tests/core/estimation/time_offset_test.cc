@@ -33,9 +33,9 @@ BlockId AddOffset(System& system, double mean, double sigma) {
   return system.layout.Find("clock.offset");
 }
 
-std::vector<std::string> NamesOf(const SensorModel& sensor) {
+std::vector<std::string> NamesOf(const SharedSensor& sensor) {
   std::vector<std::string> names;
-  for (const Space& role : sensor.roles()) names.push_back(role.name);
+  for (const Space& role : sensor->roles()) names.push_back(role.name);
   return names;
 }
 
@@ -49,14 +49,14 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   EXPECT_EQ(NamesOf(sensor.model), (std::vector<std::string>{"x", "p.v", "time_offset"}));
   EXPECT_EQ(sensor.roles[1].block, system.layout.Find("p.v"));
   EXPECT_EQ(sensor.roles[2].block, offset);
-  EXPECT_EQ(sensor.model.inverse().role, -1) << "x is no longer where z says";
+  EXPECT_EQ(sensor.model->inverse().role, -1) << "x is no longer where z says";
   for (const double delta : {0.0, 0.25, -0.5}) {
     const Blocks roles{{3.0}, {-4.0}, {delta}};
     double z = kPoison, l = kPoison;
-    ASSERT_EQ(sensor.model.Predict(Pointers(roles).data(), &z), Status::kOk);
+    ASSERT_EQ(sensor.model->Predict(Pointers(roles).data(), &z), Status::kOk);
     EXPECT_DOUBLE_EQ(z, 2.0 * (3.0 - 4.0 * delta));
     ExpectSame(Linearised(sensor.model, roles), {2.0, 2.0 * delta, -8.0}, 1e-12);
-    ASSERT_EQ(sensor.model.SqrtNoise(Pointers(roles).data(), &z, &l), Status::kOk);
+    ASSERT_EQ(sensor.model->SqrtNoise(Pointers(roles).data(), &z, &l), Status::kOk);
     EXPECT_EQ(l, 0.1);
   }
 }
@@ -66,10 +66,10 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   const Camera camera(640, 480, 400, 400, 320, 240);
   for (const bool anchored : {false, true}) {
     System system;
-    const MotionModel pose =
-        InProcessMotion(QuaternionPose({0.3, 0.3, 0.3}, {0.2, 0.2, 0.2}), "quaternion_pose");
+    const SharedMotion pose =
+        MakeMotion(QuaternionPose({0.3, 0.3, 0.3}, {0.2, 0.2, 0.2}), "quaternion_pose");
     MotionBinding motion{"cam", pose, {}};
-    for (const Space& block : pose.blocks()) {
+    for (const Space& block : pose->blocks()) {
       motion.blocks.push_back(system.layout.Declare("cam." + block.name, "cam", block));
     }
     system.motions.push_back(motion);
@@ -77,23 +77,23 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     SensorBinding sensor{
         "pixels",
         "pixels",
-        anchored ? InProcessSensor(InverseDepthFeature<Anchored>(camera, 1.0), "feature")
-                 : InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature"),
+        anchored ? MakeSensor(InverseDepthFeature<Anchored>(camera, 1.0), "feature")
+                 : MakeSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature"),
         {{system.layout.Find("cam.position")}, {system.layout.Find("cam.orientation")}}};
-    sensor.roles.resize(sensor.model.roles().size());
-    const int inverse = sensor.model.inverse().role;
-    if (anchored) sensor.xyz = InProcessSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature");
+    sensor.roles.resize(sensor.model->roles().size());
+    const int inverse = sensor.model->inverse().role;
+    if (anchored) sensor.xyz = MakeSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature");
     ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
     const std::vector<std::string> names = NamesOf(sensor.model);
     EXPECT_EQ(names[4], "time_offset");
     EXPECT_EQ(names.size(), anchored ? 8u : 6u);
-    EXPECT_EQ(sensor.model.inverse().role, inverse + 3) << "of the landmark";
-    EXPECT_EQ(sensor.xyz.has_value(), anchored);
+    EXPECT_EQ(sensor.model->inverse().role, inverse + 3) << "of the landmark";
+    EXPECT_EQ(sensor.xyz != nullptr, anchored);
     if (anchored) {
       EXPECT_EQ(sensor.xyz->roles().size(), 6u);
     }
     Blocks roles;
-    for (const Space& role : sensor.model.roles()) {
+    for (const Space& role : sensor.model->roles()) {
       std::vector<double> value(static_cast<std::size_t>(role.geometry.ambient));
       role.geometry.Identity(value.data());
       roles.push_back(value);
@@ -101,7 +101,7 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     const auto set = [&](const std::string& name, std::vector<double> value) {
       for (std::size_t i = 0; i < names.size(); ++i) {
         if (names[i] != name) continue;
-        sensor.model.roles()[i].geometry.Normalise(value.data());
+        sensor.model->roles()[i].geometry.Normalise(value.data());
         roles[i] = value;
       }
     };
@@ -135,16 +135,15 @@ struct Refusing : ConstantVelocity<1, false> {
 // What fails is the motion model, and its words are those that are heard.
 TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Refusing(1.0), "refusing"),
-            {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
+  AddMotion(system, "p", MakeMotion(Refusing(1.0), "refusing"), {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
   AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
   const BlockId offset = AddOffset(system, 0.0, 0.1);
   SensorBinding& sensor = system.sensors[0];
   ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
   double z = 0.0;
   const Blocks fast{{0.0}, {4e8}, {0.1}};
-  EXPECT_EQ(sensor.model.Predict(Pointers(fast).data(), &z), Status::kError);
-  EXPECT_EQ(sensor.model.error_text(), "motion model 'refusing' of its roles: faster than light");
+  EXPECT_EQ(sensor.model->Predict(Pointers(fast).data(), &z), Status::kError);
+  EXPECT_EQ(sensor.model->error_text(), "motion model 'refusing' of its roles: faster than light");
 }
 
 TEST(TimeOffset, RefusesWhatItCannotDo) {

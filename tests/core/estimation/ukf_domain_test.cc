@@ -49,7 +49,7 @@ struct Stubborn : Motion<1, Vec<1>> {
 
 TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
+  AddMotion(system, "p", MakeMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
   Ukf ukf(system, {}, {});
   ukf.Start(0);
   const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
@@ -78,7 +78,7 @@ struct Near : Sensor<Vec<1>, Vec<1>> {
 System NearZero(double x) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
-  AddSensor(system, "near", InProcessSensor(Near{}, "near"), {"p.x"});
+  AddSensor(system, "near", MakeSensor(Near{}, "near"), {"p.x"});
   return system;
 }
 

@@ -36,20 +36,19 @@ struct Wandering : Motion<G::kTangent, G> {
 template <class G>
 System Wanderers(int n) {
   System system;
-  const MotionModel model = InProcessMotion(Wandering<G>(), "wandering");
+  const SharedMotion model = MakeMotion(Wandering<G>(), "wandering");
   for (int i = 0; i < n / G::kTangent; ++i) {
     const std::string name = "b" + std::to_string(i);
-    const BlockId id = system.layout.Declare(name + ".x", name, model.blocks()[0]);
+    const BlockId id = system.layout.Declare(name + ".x", name, model->blocks()[0]);
     system.motions.push_back({name, model, {id}});
     Prior prior;
     prior.block = id;
     prior.mean.resize(G::kAmbient);
-    model.blocks()[0].geometry.Identity(prior.mean.data());
+    model->blocks()[0].geometry.Identity(prior.mean.data());
     prior.covariance =
         kPriorSigma * kPriorSigma * Eigen::MatrixXd::Identity(G::kTangent, G::kTangent);
     system.priors.push_back(prior);
-    AddSensor(system, name, InProcessSensor(ManifoldSensor<G, kSensorSigma>(), "itself"),
-              {name + ".x"});
+    AddSensor(system, name, MakeSensor(ManifoldSensor<G, kSensorSigma>(), "itself"), {name + ".x"});
   }
   return system;
 }
@@ -160,8 +159,8 @@ struct Dragged : Motion<2, Vec<2>> {
 // N = 4, so c = 2: the points of v lie at 2 sigma and are slowed by 1 - 0.3 dt 2 sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   System system;
-  const MotionModel model = InProcessMotion(Dragged(), "dragged");
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[0]);
+  const SharedMotion model = MakeMotion(Dragged(), "dragged");
+  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[0]);
   system.motions.push_back({"p", model, {v}});
   system.priors.push_back({v, {0.0, 0.0}, 0.25 * Eigen::Matrix2d::Identity(), ""});
   Ekf ekf(system, {}, {});
@@ -198,7 +197,7 @@ struct Breaking : Motion<1, Vec<1>> {
 TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
   for (const bool in_noise : {false, true}) {
     System system;
-    AddMotion(system, "p", InProcessMotion(Breaking(in_noise), "breaking"), {{"v", 1.0, 0.5}});
+    AddMotion(system, "p", MakeMotion(Breaking(in_noise), "breaking"), {{"v", 1.0, 0.5}});
     Ekf ekf(system, {}, {});
     Ukf ukf(system, {}, {});
     for (Estimator* filter : std::initializer_list<Estimator*>{&ekf, &ukf}) {

@@ -74,7 +74,7 @@ struct Square : Sensor<Vec<1>, Vec<1>> {
 TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   System system;
   AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
-  AddSensor(system, "square", InProcessSensor(Square{}, "square"), {"p.x"});
+  AddSensor(system, "square", MakeSensor(Square{}, "square"), {"p.x"});
   UkfOptions options;
   options.alpha = 1.0;
   options.beta = 0.0;
@@ -122,8 +122,8 @@ struct Compass : Sensor<UnitQuaternion, UnitQuaternion> {
 /// Orientation that starts at (1, 0, 0, 0) +- 0.05 rad.
 System Orientation() {
   System system;
-  MotionBinding binding{"body", InProcessMotion(TurningOrientation(0.01), "turning"), {}};
-  const BlockId id = system.layout.Declare("body.q", "body", binding.model.blocks()[0]);
+  MotionBinding binding{"body", MakeMotion(TurningOrientation(0.01), "turning"), {}};
+  const BlockId id = system.layout.Declare("body.q", "body", binding.model->blocks()[0]);
   binding.blocks.push_back(id);
   Prior prior;
   prior.block = id;
@@ -131,7 +131,7 @@ System Orientation() {
   prior.covariance = 0.0025 * Eigen::Matrix3d::Identity();
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "compass", InProcessSensor(Compass{}, "compass"), {"body.q"});
+  AddSensor(system, "compass", MakeSensor(Compass{}, "compass"), {"body.q"});
   return system;
 }
 
@@ -178,7 +178,7 @@ TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   System system = DepthFilter();
   system.priors[0].covariance(0) = 1.0;
   system.sensors.pop_back();
-  AddSensor(system, "square", InProcessSensor(Square{}, "square"), {"target.depth"});
+  AddSensor(system, "square", MakeSensor(Square{}, "square"), {"target.depth"});
   UkfOptions options;
   options.alpha = 1.0;
   Ukf joint(system, options, StreamsOf(system));
@@ -214,14 +214,14 @@ struct First : Sensor<Vec<1>, Vec<2>> {
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   System system;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
-  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model.blocks()[0]));
+  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {1.0, 2.0};
   prior.covariance = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished();  // eigenvalue -0.1
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "first", InProcessSensor(First{}, "first"), {"p.x"});
+  AddSensor(system, "first", MakeSensor(First{}, "first"), {"p.x"});
   Ukf ukf(system, {}, StreamsOf(system));
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 1.5}}));
   EXPECT_TRUE(HasEvent(report, "repaired"));
@@ -252,9 +252,9 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
 // x' = x + v dt, but x is known.
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   System system;
-  const MotionModel model = testing::ConstantVelocityMotion(0.7);
-  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0], BlockStatus::kConstant);
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1]);
+  const SharedMotion model = testing::ConstantVelocityMotion(0.7);
+  const BlockId x = system.layout.Declare("p.x", "p", model->blocks()[0], BlockStatus::kConstant);
+  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1]);
   system.motions.push_back({"p", model, {x, v}});
   system.priors.push_back({x, {1.0}, {}, ""});
   system.priors.push_back({v, {-0.5}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
@@ -268,9 +268,9 @@ TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
 // A linear problem, so all three filters agree; v is known, and neither moved nor corrected.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   System system;
-  const MotionModel model = testing::ConstantVelocityMotion(0.7);
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
-  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0]);
+  const SharedMotion model = testing::ConstantVelocityMotion(0.7);
+  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
+  const BlockId x = system.layout.Declare("p.x", "p", model->blocks()[0]);
   system.motions.push_back({"p", model, {x, v}});
   system.priors.push_back({v, {-0.5}, {}, ""});
   system.priors.push_back({x, {1.0}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});

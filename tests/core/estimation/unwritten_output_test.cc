@@ -6,6 +6,7 @@
 
 #include "alidade/estimation/time_offset.h"
 #include "alidade/estimation/ukf.h"
+#include "alidade/plugin/plugin_models.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -97,16 +98,17 @@ struct HandWritten {
 /// `a.x`, measured by `direct`; `aside`: with a fixed block, which keeps it from the fast path.
 System Direct(HandWritten& hand, bool aside) {
   System system;
-  const MotionModel model(hand.Make(ALIDADE_KIND_MOTION));
-  const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
+  const auto model = std::make_shared<PluginMotion>(hand.Make(ALIDADE_KIND_MOTION));
+  const BlockId x = system.layout.Declare("a.x", "a", model->blocks()[0]);
   system.motions.push_back({"a", model, {x}});
   system.priors.push_back({x, {1.0, 2.0}, Eigen::Matrix2d::Identity(), ""});
   if (aside) {
     const BlockId id =
-        system.layout.Declare("aside.x", "aside", model.blocks()[0], BlockStatus::kConstant);
+        system.layout.Declare("aside.x", "aside", model->blocks()[0], BlockStatus::kConstant);
     system.priors.push_back({id, {0.0, 0.0}, Eigen::Matrix2d::Zero(), ""});
   }
-  AddSensor(system, "direct", SensorModel(hand.Make(ALIDADE_KIND_SENSOR)), {"a.x"});
+  AddSensor(system, "direct", std::make_shared<PluginSensor>(hand.Make(ALIDADE_KIND_SENSOR)),
+            {"a.x"});
   return system;
 }
 

@@ -129,7 +129,7 @@ Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
 // Nobody measures the odometry: all of it is passed on, where a fix is gated too.
 TEST(AcceptedBy, PassesOnTheControlInputs) {
   System system;
-  AddMotion(system, "car", InProcessMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
+  AddMotion(system, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
   system.motions[0].input.stream = "odometry";
   AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"car.position"});
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.5}, {1, 2.0}}),

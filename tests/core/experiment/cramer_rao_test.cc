@@ -7,9 +7,9 @@
 #include <Eigen/LU>
 #include <functional>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/model/model.h"
-#include "alidade/plugin/in_process.h"
 #include "support/landmark_models.h"
 #include "support/systems.h"
 
@@ -73,7 +73,7 @@ struct DoubleWell : Motion<1, Vec<1>> {
 
 TEST(CramerRaoBound, TakesTheMotionAtTruth) {
   System system;
-  testing::AddMotion(system, "p", InProcessMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
+  testing::AddMotion(system, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
   testing::AddSensor(system, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
   system.initial_time_s = -0.1;  // a step before the first frame, from about where that one is
   CramerRaoBound bound(system, testing::StreamsOf(system), {{"x"}});
@@ -318,8 +318,8 @@ struct TurnedPixels : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitVector,
 
 System TurningSystem() {
   System system;
-  MotionBinding binding{"cam", InProcessMotion(TurningWalk(), "turning_walk"), {}};
-  for (const Space& space : binding.model.blocks()) {
+  MotionBinding binding{"cam", MakeMotion(TurningWalk(), "turning_walk"), {}};
+  for (const Space& space : binding.model->blocks()) {
     const BlockId id = system.layout.Declare("cam." + space.name, "cam", space);
     binding.blocks.push_back(id);
     Prior prior;
@@ -329,8 +329,8 @@ System TurningSystem() {
     prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
     system.priors.push_back(prior);
   }
-  SensorBinding sensor{"tracks", "tracks", InProcessSensor(TurnedPixels(), "tracks"), {}};
-  sensor.roles.resize(sensor.model.roles().size());
+  SensorBinding sensor{"tracks", "tracks", MakeSensor(TurnedPixels(), "tracks"), {}};
+  sensor.roles.resize(sensor.model->roles().size());
   for (std::size_t i = 0; i < 2; ++i) sensor.roles[i].block = binding.blocks[i];
   system.motions.push_back(std::move(binding));
   system.sensors.push_back(std::move(sensor));
@@ -437,10 +437,10 @@ TEST(CramerRaoBound, TellsWhyLandmarksCannotStartAtTruth) {
   const std::vector<StreamInfo> truths{{"position", 3}};
   System system = testing::MapSystem(testing::Offset(0.1), LandmarkOptions());
   EXPECT_EQ(CramerRaoBound::WhyNone(system, truths), "");
-  system.sensors[0].model = InProcessSensor(OnGround(), "ground");
+  system.sensors[0].model = MakeSensor(OnGround(), "ground");
   EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
             "'tracks' has landmarks of a representation of its own");
-  system.sensors[0].model = InProcessSensor(XyzByPrior(), "xyz");
+  system.sensors[0].model = MakeSensor(XyzByPrior(), "xyz");
   EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
             "'tracks' places landmarks as xyz by a prior, by whose mean the Jacobians are");
 }

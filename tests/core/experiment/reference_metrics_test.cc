@@ -166,8 +166,8 @@ TEST(Reference, KeepsNoCovariances) {
     named.name = name;
     named.system = DepthFilter();
     named.system.sensors.pop_back();
-    const MotionModel model = testing::ConstantMotion(299);
-    const BlockId id = named.system.layout.Declare("wide.x", "wide", model.blocks()[0]);
+    const SharedMotion model = testing::ConstantMotion(299);
+    const BlockId id = named.system.layout.Declare("wide.x", "wide", model->blocks()[0]);
     named.system.motions.push_back({"wide", model, {id}});
     named.system.priors.push_back(
         {id, std::vector<double>(299, 0.0), Eigen::MatrixXd::Identity(299, 299), ""});

@@ -30,8 +30,7 @@ struct Exploding : Motion<1, Vec<1>> {
 NamedEstimator ExplodingEstimator(const std::vector<StreamInfo>& streams) {
   NamedEstimator named;
   named.name = "exploding";
-  testing::AddMotion(named.system, "p", InProcessMotion(Exploding(), "exploding"),
-                     {{"x", 1.0, 1.0}});
+  testing::AddMotion(named.system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 1.0, 1.0}});
   testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
   named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, streams);
   return named;
@@ -352,12 +351,11 @@ std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
   experiment.source = std::make_unique<Turning>(source);
   NamedEstimator& named = experiment.estimators.emplace_back();
   named.name = "ekf";
-  const MotionModel model = InProcessMotion(Turn(), "turn");
-  const BlockId id = named.system.layout.Declare("car.heading", "car", model.blocks()[0]);
+  const SharedMotion model = MakeMotion(Turn(), "turn");
+  const BlockId id = named.system.layout.Declare("car.heading", "car", model->blocks()[0]);
   named.system.motions.push_back({"car", model, {id}});
   named.system.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
-  testing::AddSensor(named.system, "disparity", InProcessSensor(Compass(), "compass"),
-                     {"car.heading"});
+  testing::AddSensor(named.system, "disparity", MakeSensor(Compass(), "compass"), {"car.heading"});
   EkfOptions options;
   options.gate = gate;
   named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
@@ -418,7 +416,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
 
   experiment = MakeExperiment();
   NamedEstimator& ekf = experiment.estimators[0];
-  const SensorModel linear = testing::LinearSensor(1.0, 1.0);
+  const SharedSensor linear = testing::LinearSensor(1.0, 1.0);
   testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
   for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
   EkfOptions options;
@@ -468,7 +466,7 @@ TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   experiment.source = std::make_unique<EachSecond>(100);
   NamedEstimator& named = experiment.estimators.emplace_back();
   named.name = "ekf";
-  testing::AddMotion(named.system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+  testing::AddMotion(named.system, "car", MakeMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
   named.system.motions[0].input = {"inverse_scale", 0.5};
   testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"car.position"});
@@ -597,7 +595,7 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
             "2 values of 'depth', not 1"},
            {[](SourceFrame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
     Experiment experiment = MakeExperiment();
-    const SensorModel stereo = experiment.estimators[0].system.sensors[1].model;
+    const SharedSensor stereo = experiment.estimators[0].system.sensors[1].model;
     experiment.segments.push_back({"near", 1, true, stereo});
     experiment.source = std::make_unique<Spoiling>(one.spoil);
     const RunResult result = alidade::Run(experiment, {});

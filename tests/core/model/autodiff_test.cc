@@ -14,6 +14,8 @@
 namespace alidade {
 namespace {
 
+using testing::AbiMotion;
+using testing::AbiSensor;
 using testing::Blocks;
 using testing::ExpectSame;
 using testing::ExpectTrueJacobians;
@@ -21,8 +23,6 @@ using testing::Filled;
 using testing::kNumeric;
 using testing::kPoison;
 using testing::Linearised;
-using testing::MakeMotion;
-using testing::MakeSensor;
 using testing::NumericallyLinearised;
 using testing::Pointers;
 using testing::Step;
@@ -48,55 +48,56 @@ struct Turn : Motion<3, UnitQuaternion> {
 };
 
 TEST(AutodiffMotion, TakesControlInputAndTurnsQuaternions) {
-  const MotionModel turn = MakeMotion<Turn>();
-  EXPECT_TRUE(turn.has_input());
-  EXPECT_EQ(turn.instance().space().name, "rate");
+  const auto turn = AbiMotion<Turn>();
+  EXPECT_TRUE(turn->has_input());
+  EXPECT_EQ(turn->instance().space().name, "rate");
   const Blocks x{{0.5, -0.5, 0.5, 0.5}};
   const double rate[3] = {0.3, -1.0, 2.0};
   ExpectTrueJacobians(turn, x, rate, {0.05, 0.02, -0.1}, 0.1);
 }
 
 TEST(AutodiffMotion, GivesFOrGAlone) {
-  const MotionModel turn = MakeMotion<Turn>();
+  const auto turn = AbiMotion<Turn>();
   const Blocks x{{0.5, -0.5, 0.5, 0.5}};
   const double rate[3] = {0.3, -1.0, 2.0};
   const Stepped both = Step(turn, x, rate, nullptr, 0.1);
-  Blocks next = Filled(turn.blocks(), kPoison);
+  Blocks next = Filled(turn->blocks(), kPoison);
   std::vector<double> f(9, kPoison), g(9, kPoison);
   const auto blocks = Pointers(x);
   auto out = Pointers(next);
-  ASSERT_EQ(turn.Step(blocks.data(), rate, nullptr, 0.1, out.data(), f.data(), nullptr),
+  ASSERT_EQ(turn->Step(blocks.data(), rate, nullptr, 0.1, {out.data(), f.data(), nullptr}),
             Status::kOk);
-  ASSERT_EQ(turn.Step(blocks.data(), rate, nullptr, 0.1, out.data(), nullptr, g.data()),
+  ASSERT_EQ(turn->Step(blocks.data(), rate, nullptr, 0.1, {out.data(), nullptr, g.data()}),
             Status::kOk);
   EXPECT_EQ(f, both.f);
   EXPECT_EQ(g, both.g);
 }
 
 TEST(AutodiffMotion, OutOfDomainWritesNothing) {
-  const MotionModel turn = MakeMotion<Turn>();
+  const auto turn = AbiMotion<Turn>();
   const Blocks x{{3.0, 0, 0, 0}};
   const double rate[3] = {0, 0, 0};
-  Blocks next = Filled(turn.blocks(), kPoison);
+  Blocks next = Filled(turn->blocks(), kPoison);
   std::vector<double> f(9, kPoison), g(9, kPoison);
   for (double* jacobian : {f.data(), static_cast<double*>(nullptr)}) {
-    EXPECT_EQ(turn.Step(Pointers(x).data(), rate, nullptr, 0.1, Pointers(next).data(), jacobian,
-                        jacobian == nullptr ? nullptr : g.data()),
-              Status::kOutOfDomain);
+    EXPECT_EQ(
+        turn->Step(Pointers(x).data(), rate, nullptr, 0.1,
+                   {Pointers(next).data(), jacobian, jacobian == nullptr ? nullptr : g.data()}),
+        Status::kOutOfDomain);
   }
-  EXPECT_EQ(next, Filled(turn.blocks(), kPoison));
+  EXPECT_EQ(next, Filled(turn->blocks(), kPoison));
   EXPECT_EQ(f, std::vector<double>(9, kPoison));
   EXPECT_EQ(g, std::vector<double>(9, kPoison));
 }
 
 TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
   // The host passes zeros; another host may pass null, as the ABI allows.
-  const MotionModel turn = MakeMotion<Turn>();
-  const AlidadeInstance& c = turn.instance().c();
+  const auto turn = AbiMotion<Turn>();
+  const AlidadeInstance& c = turn->instance().c();
   const Blocks x{{1, 0, 0, 0}};
   const double rate[3] = {0, 0, 1};
   const double* const inputs[] = {rate};
-  Blocks next = Filled(turn.blocks(), kPoison);
+  Blocks next = Filled(turn->blocks(), kPoison);
   std::vector<double> f(9, kPoison), g(9, kPoison);
   EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), inputs, nullptr, 0.1, Pointers(next).data(),
                            f.data(), 3, g.data(), 3, nullptr, 0),
@@ -105,13 +106,13 @@ TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
 }
 
 TEST(AutodiffMotion, TheJacobianByTheControlInputIsThatOfDifferences) {
-  const MotionModel turn = MakeMotion<Turn>();
-  const AlidadeInstance& c = turn.instance().c();
+  const auto turn = AbiMotion<Turn>();
+  const AlidadeInstance& c = turn->instance().c();
   const Blocks x{{0.8, 0.0, 0.6, 0.0}};
   const double rate[3] = {0.3, -0.2, 1.0}, h = 1e-6;
   const auto step = [&](const double* u, double* b) {
     const double* const inputs[] = {u};
-    Blocks next = Filled(turn.blocks(), kPoison);
+    Blocks next = Filled(turn->blocks(), kPoison);
     EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), inputs, nullptr, 0.1,
                              Pointers(next).data(), nullptr, 0, nullptr, 0, b, 4),
               ALIDADE_OK);
@@ -153,14 +154,15 @@ struct Faulty : Motion<1, Vec<1>> {
 };
 
 TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
-  const MotionModel faulty = MakeMotion<Faulty>();
+  const auto faulty = AbiMotion<Faulty>();
   const Blocks x{{1.0}};
-  Blocks next = Filled(faulty.blocks(), kPoison);
+  Blocks next = Filled(faulty->blocks(), kPoison);
   double f = kPoison, g = kPoison, l = kPoison;
-  EXPECT_EQ(faulty.Step(Pointers(x).data(), nullptr, nullptr, 0.1, Pointers(next).data(), &f, &g),
-            Status::kError);
-  EXPECT_EQ(faulty.SqrtQ(Pointers(x).data(), nullptr, 0.1, &l), Status::kError);
-  EXPECT_EQ(next, Filled(faulty.blocks(), kPoison));
+  EXPECT_EQ(
+      faulty->Step(Pointers(x).data(), nullptr, nullptr, 0.1, {Pointers(next).data(), &f, &g}),
+      Status::kError);
+  EXPECT_EQ(faulty->SqrtQ(Pointers(x).data(), nullptr, 0.1, &l), Status::kError);
+  EXPECT_EQ(next, Filled(faulty->blocks(), kPoison));
   EXPECT_EQ(f, kPoison);
   EXPECT_EQ(g, kPoison);
   EXPECT_EQ(l, kPoison);
@@ -188,7 +190,7 @@ struct Bearing : Sensor<Angle, Vec<2>, Vec<1>> {
 };
 
 TEST(AutodiffSensor, JacobianOfAnAngleIsTrueAcrossTheWrap) {
-  const SensorModel bearing = MakeSensor<Bearing>();
+  const auto bearing = AbiSensor<Bearing>();
   for (const double y : {0.5, 1e-4, -1e-4}) {
     const Blocks roles{{-2.0, y}, {0.1}};
     ExpectSame(Linearised(bearing, roles), NumericallyLinearised(bearing, roles), kNumeric);
@@ -196,28 +198,28 @@ TEST(AutodiffSensor, JacobianOfAnAngleIsTrueAcrossTheWrap) {
 }
 
 TEST(AutodiffSensor, AnUnboundOptionalRoleIsSkipped) {
-  const SensorModel bearing = MakeSensor<Bearing>();
+  const auto bearing = AbiSensor<Bearing>();
   const double point[2] = {3.0, 4.0};
   const double* roles[] = {point, nullptr};
   double z = kPoison, j[2] = {kPoison, kPoison};
   double* jacobians[] = {j, nullptr};
   const int strides[] = {2, 0};
-  ASSERT_EQ(bearing.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  ASSERT_EQ(bearing->Linearise(roles, &z, jacobians, strides), Status::kOk);
   EXPECT_NEAR(j[0], -4.0 / 25.0, 1e-16);
   EXPECT_NEAR(j[1], 3.0 / 25.0, 1e-16);
-  EXPECT_TRUE(bearing.roles()[1].optional());
+  EXPECT_TRUE(bearing->roles()[1].optional());
 }
 
 TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
-  const SensorModel bearing = MakeSensor<Bearing>();
+  const auto bearing = AbiSensor<Bearing>();
   double z = kPoison;
   const double unlucky[2] = {13.0, 0}, unluckier[2] = {14.0, 0}, bias = 0.0;
   const double* roles[] = {unlucky, &bias};
-  EXPECT_EQ(bearing.Predict(roles, &z), Status::kError);
-  EXPECT_EQ(bearing.error_text(), "unlucky");
+  EXPECT_EQ(bearing->Predict(roles, &z), Status::kError);
+  EXPECT_EQ(bearing->error_text(), "unlucky");
   roles[0] = unluckier;
-  EXPECT_EQ(bearing.Predict(roles, &z), Status::kError);
-  EXPECT_EQ(bearing.error_text(), "an exception of unknown type");
+  EXPECT_EQ(bearing->Predict(roles, &z), Status::kError);
+  EXPECT_EQ(bearing->error_text(), "an exception of unknown type");
   EXPECT_EQ(z, kPoison);
 }
 
@@ -242,18 +244,18 @@ struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 };
 
 TEST(AutodiffSensor, AnAnalyticJacobianThatThrowsWritesNothing) {
-  const SensorModel faulty = MakeSensor<FaultySensor>();
+  const auto faulty = AbiSensor<FaultySensor>();
   const int strides[] = {1, 1};
   double x = -1.0, y = 0.0, z = kPoison, by_x = kPoison, by_y = kPoison;
   const double* roles[] = {&x, &y};
   double* jacobians[] = {&by_x, &by_y};
-  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kError);
+  EXPECT_EQ(faulty->Linearise(roles, &z, jacobians, strides), Status::kError);
   EXPECT_EQ(z, kPoison);
   EXPECT_EQ(by_x, kPoison);
   EXPECT_EQ(by_y, kPoison);
   x = 2.0;
   jacobians[0] = nullptr;
-  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  EXPECT_EQ(faulty->Linearise(roles, &z, jacobians, strides), Status::kOk);
   EXPECT_EQ(z, 2.0);
   EXPECT_EQ(by_y, 0.0);
 }
@@ -312,12 +314,14 @@ TEST(AutodiffSensor, AWideAnalyticJacobianKeepsTheStride) {
 }
 
 TEST(AutodiffSensor, InitialisesWithDenseJacobians) {
-  const SensorModel sensor = MakeSensor<Displacement>();
+  const auto sensor = AbiSensor<Displacement>();
   const double camera[3] = {1, 2, 4}, z[2] = {0.5, 0.25};
   const double* roles[] = {nullptr, camera};
   std::vector<double> point(2, kPoison), by_camera(6, kPoison), by_z(4, kPoison);
   double* jx[] = {nullptr, by_camera.data()};
-  ASSERT_EQ(sensor.Initialise(roles, z, point.data(), jx, by_z.data()), Status::kOk);
+  ASSERT_EQ(
+      sensor->Initialise(roles, {z}, nullptr, {.y = point.data(), .jx = jx, .jz = by_z.data()}),
+      Status::kOk);
   EXPECT_EQ(point, (std::vector<double>{3, 3}));
   EXPECT_EQ(by_camera, (std::vector<double>{1, 0, 0.5, 0, 1, 0.25}));
   EXPECT_EQ(by_z, (std::vector<double>{4, 0, 0, 4}));

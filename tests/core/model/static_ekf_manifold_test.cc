@@ -65,10 +65,10 @@ struct Direction : Sensor<UnitVector, UnitVector> {
 
 System WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
   System system;
-  MotionBinding binding{"s", InProcessMotion(Wander(), "wander"), {}};
+  MotionBinding binding{"s", MakeMotion(Wander(), "wander"), {}};
   const std::vector<double> means[2] = {{1.0, 0.0, 0.0, 0.0}, {0.6, 0.0, 0.8}};
   for (std::size_t i = 0; i < 2; ++i) {
-    const Space& space = binding.model.blocks()[i];
+    const Space& space = binding.model->blocks()[i];
     Prior prior;
     prior.block = system.layout.Declare("s." + space.name, "s", space);
     prior.mean = means[i];
@@ -77,8 +77,8 @@ System WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
     system.priors.push_back(prior);
   }
   system.motions.push_back(binding);
-  AddSensor(system, "turned", InProcessSensor(Turned(), "turned"), {"s.q", "s.u"});
-  AddSensor(system, "direction", InProcessSensor(Direction(), "direction"), {"s.u"});
+  AddSensor(system, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
+  AddSensor(system, "direction", MakeSensor(Direction(), "direction"), {"s.u"});
   return system;
 }
 

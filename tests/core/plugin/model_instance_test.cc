@@ -10,6 +10,7 @@
 #include <string>
 
 #include "alidade/base/error.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade {
 namespace {
@@ -69,7 +70,7 @@ struct HandWritten {
 TEST(ModelInstance, AcceptsAHandWrittenSensorAndDestroysItOnce) {
   HandWritten hand;
   {
-    const SensorModel sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
+    const PluginSensor sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
     EXPECT_EQ(hand.destroyed, 0);
     double z = 0.0;
     EXPECT_EQ(sensor.Predict(nullptr, &z), Status::kError) << "77 is no code of the ABI";
@@ -102,10 +103,10 @@ TEST(ModelInstance, ReadsNoFurtherThanAStructSays) {
   hand.role.unit = reinterpret_cast<const char*>(8);
   hand.sensor.struct_size = offsetof(AlidadeSensor, valid);
   hand.sensor.valid = reinterpret_cast<decltype(hand.sensor.valid)>(8);
-  const SensorModel sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
+  const PluginSensor sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
   EXPECT_EQ(sensor.roles()[0].unit, "");
   const double z = 0.0;
-  EXPECT_EQ(sensor.Valid(&z), Status::kOk);
+  EXPECT_EQ(sensor.Valid({&z}), Status::kOk);
 }
 
 TEST(ModelInstance, ReadsTheMeasurementsPartsWhatComesWithItAndWhatItsSensorOwns) {
@@ -125,12 +126,12 @@ TEST(ModelInstance, ReadsTheMeasurementsPartsWhatComesWithItAndWhatItsSensorOwns
   owned.sqrt_density = &density;
   owned.time_constant_s = 10.0;
   const auto instance = std::make_shared<const ModelInstance>(hand.instance, "m", "p.so");
-  const SensorModel sensor(instance);
+  const PluginSensor sensor(instance);
   EXPECT_EQ(sensor.measurement().geometry,
             Geometry::Product({Geometry::Vector(1), Geometry::UnitVector()}));
   EXPECT_EQ(sensor.measurement().elements, (std::vector<std::string>{"a", "b.x", "b.y", "b.z"}));
   EXPECT_EQ(sensor.known_size(), 1);
-  const OwnedRole own = instance->owned(0);
+  const OwnedRole own = instance->owned().at(0);
   EXPECT_EQ(own.mean, std::vector<double>{2.0});
   EXPECT_EQ(own.sqrt_prior, std::vector<double>{3.0});
   EXPECT_EQ(own.sqrt_density, std::vector<double>{0.5});
@@ -141,8 +142,8 @@ TEST(ModelInstance, ReadsTheMeasurementsPartsWhatComesWithItAndWhatItsSensorOwns
 TEST(ModelInstance, WhatASensorOwnsIsConstantAtTheNeutralElementUnlessItSaysElse) {
   HandWritten hand;
   hand.role.flags = ALIDADE_ROLE_OWNED;
-  const ModelInstance instance(hand.instance, "m", "p.so");
-  const OwnedRole own = instance.owned(0);
+  const PluginSensor sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
+  const OwnedRole own = sensor.owned(0);
   EXPECT_EQ(own.mean, std::vector<double>{0.0});
   EXPECT_TRUE(own.sqrt_prior.empty());
   EXPECT_EQ(own.dynamics, OwnedDynamics::kConstant);
@@ -172,9 +173,9 @@ TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
   hand.instance.motion = &motion;
   hand.description.output = nullptr;
   hand.description.noise_count = 2;
-  const MotionModel model(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
+  const PluginMotion model(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
   EXPECT_FALSE(model.has_input());
-  EXPECT_EQ(model.Step(nullptr, nullptr, nullptr, 0.1, nullptr, nullptr, nullptr), Status::kOk);
+  EXPECT_EQ(model.Step(nullptr, nullptr, nullptr, 0.1, {nullptr, nullptr, nullptr}), Status::kOk);
 }
 
 struct Spoiled {

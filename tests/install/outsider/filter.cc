@@ -2,9 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/evaluate/trajectory.h"
-#include "alidade/plugin/in_process.h"
 
 namespace {
 
@@ -37,15 +37,15 @@ struct Seen : alidade::Sensor<alidade::Vec<3>, alidade::Vec<3>> {
 
 alidade::System WalkSystem() {
   alidade::System system;
-  alidade::MotionBinding motion{"p", alidade::InProcessMotion(Walk(), "walk"), {}};
+  alidade::MotionBinding motion{"p", alidade::MakeMotion(Walk(), "walk"), {}};
   alidade::Prior prior;
-  prior.block = system.layout.Declare("p.position", "p", motion.model.blocks()[0]);
+  prior.block = system.layout.Declare("p.position", "p", motion.model->blocks()[0]);
   prior.mean = {0.0, 0.0, 0.0};
   prior.covariance = Eigen::MatrixXd::Identity(3, 3);
   motion.blocks.push_back(prior.block);
   system.priors.push_back(prior);
   system.motions.push_back(motion);
-  alidade::SensorBinding sensor{"seen", "seen", alidade::InProcessSensor(Seen(), "seen"), {}};
+  alidade::SensorBinding sensor{"seen", "seen", alidade::MakeSensor(Seen(), "seen"), {}};
   alidade::RoleBinding role;
   role.block = prior.block;
   sensor.roles.push_back(role);

@@ -164,7 +164,7 @@ struct Exponential : Sensor<Vec<1>, Vec<3>> {
 // the camera was first. At the optimum it is 1 m before that, and the dense solver finds the same.
 TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
   System system = testing::MapSystem(OffsetBeyond(), {});
-  testing::AddSensor(system, "e", InProcessSensor(Exponential(), "exponential"), {"cam.position"});
+  testing::AddSensor(system, "e", MakeSensor(Exponential(), "exponential"), {"cam.position"});
   std::vector<Frame> frames;
   for (int k = 0; k < kViews; ++k) {
     const double z = k == 0 ? 1.0 : 4.0;

@@ -106,7 +106,7 @@ void ExpectSaid(const System& system, int budget, bool so_far) {
 TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   constexpr int kMany = 1'000'000;
   System system;
-  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
   AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   for (const bool so_far : {false, true}) {
     Failing::budget = kMany;
@@ -125,7 +125,7 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
 // waits for its first value never gets it, and the events say why, once.
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   System system;
-  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
   testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
@@ -191,7 +191,7 @@ TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
 // What it could have predicted of landmarks, too, is left out.
 TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   System system = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
-  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
   for (const bool ends : {false, true}) {
     const auto batch = MakeBatch(system);
     Failing::budget = ends ? 0 : 1000;
@@ -211,7 +211,7 @@ TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
 // It ends at its last good state, and says so once.
 TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   System system;
-  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
   AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   Ekf ekf(system, {}, testing::StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, 0.2}}));
@@ -267,7 +267,7 @@ struct WrongSign : Sensor<Vec<1>, Vec<1>> {
 TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
   for (const double sign : {1.0, -1.0}) {
     System system = testing::MovingPoint(0.7);
-    AddSensor(system, "z", InProcessSensor(WrongSign(sign), "square"), {"p.x"});
+    AddSensor(system, "z", MakeSensor(WrongSign(sign), "square"), {"p.x"});
     const auto batch = MakeBatch(system, "max_iterations: 500\n");
     for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
     std::string said;
@@ -287,7 +287,7 @@ TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
 TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   const auto last_of = [](const RobustLoss& loss) {
     System system = testing::MovingPoint(0.7);
-    AddSensor(system, "z", InProcessSensor(WrongSign(-1.0), "square"), {"p.x"});
+    AddSensor(system, "z", MakeSensor(WrongSign(-1.0), "square"), {"p.x"});
     system.sensors[0].loss = loss;
     const auto batch = MakeBatch(system, "max_iterations: 500\n");
     for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
@@ -338,13 +338,13 @@ struct Seen : Sensor<UnitVector, UnitVector> {
 // about the filter: at z = 0.6 too the two differ by 5e-6 sigma, and by up to 8e-4 in P.
 TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
   System system;
-  const MotionModel wander = InProcessMotion(Wander(), "wander");
-  const BlockId id = system.layout.Declare("d.n", "d", wander.blocks()[0]);
+  const SharedMotion wander = MakeMotion(Wander(), "wander");
+  const BlockId id = system.layout.Declare("d.n", "d", wander->blocks()[0]);
   system.motions.push_back({"d", wander, {id}});
   const std::vector<double> mean = {std::sqrt(1.0 - 0.0005), 0.02, 0.01};
   const Eigen::Matrix2d p = (Eigen::Matrix2d() << 1e-5, 2e-6, 2e-6, 4e-6).finished();
   system.priors.push_back({id, mean, p, ""});
-  AddSensor(system, "z", InProcessSensor(Seen(), "seen"), {"d.n"});
+  AddSensor(system, "z", MakeSensor(Seen(), "seen"), {"d.n"});
   const auto batch = MakeBatch(system), so_far = MakeBatch(system, "mode: filtering\n");
   RtsSmoother rts(system, {}, testing::StreamsOf(system));
   Random random(3);

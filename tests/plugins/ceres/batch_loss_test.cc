@@ -231,11 +231,11 @@ struct DirectPair : Sensor<Vec<2>, Vec<2>> {
 TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   const RobustLoss loss{LossKind::kHuber, 1.5};
   System system;
-  const MotionModel still = InProcessMotion(StillPair(), "still");
-  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
+  const SharedMotion still = MakeMotion(StillPair(), "still");
+  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
   system.motions.push_back({"p", still, {id}});
   system.priors.push_back({id, {0.0, 0.0}, 4.0 * Eigen::Matrix2d::Identity(), ""});
-  AddSensor(system, "z", InProcessSensor(DirectPair(), "pair"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(DirectPair(), "pair"), {"p.x"});
   system.sensors[0].loss = loss;
   const std::vector<Eigen::Vector2d> z = {{1.0, 2.0}, {1.4, 1.8}, {0.8, 2.3}, {4.0, 3.5}};
   std::vector<Frame> frames;

@@ -18,8 +18,8 @@ constexpr double kScale = 2.0, kNoise = 0.3;
 /// A constant p.x, seen by a linear sensor.
 System ConstantSystem(BlockStatus status) {
   System system;
-  const MotionModel still = InProcessMotion(Constant<>(1), "constant");
-  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0], status);
+  const SharedMotion still = MakeMotion(Constant<>(1), "constant");
+  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0], status);
   system.motions.push_back({"p", still, {id}});
   system.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
   testing::AddSensor(system, "z", testing::LinearSensor(kScale, kNoise), {"p.x"});
@@ -128,8 +128,8 @@ TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
 TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   System system = testing::MapSystem(testing::Offset(kNoise), {});
   system.layout = {};
-  system.motions[0].model = InProcessMotion(Constant<>(3), "constant");
-  const Space place = system.motions[0].model.blocks()[0];
+  system.motions[0].model = MakeMotion(Constant<>(3), "constant");
+  const Space place = system.motions[0].model->blocks()[0];
   system.layout.Declare("cam.position", "cam", place, BlockStatus::kConstant);
   std::vector<Frame> frames;
   for (int k = 0; k < 4; ++k) {

@@ -218,22 +218,21 @@ struct InertialRun {
   Eigen::Vector3d position = Eigen::Vector3d::Zero(), bias{0.1, -0.05, 0.08};
 
   explicit InertialRun(int count) {
-    const MotionModel model = InProcessMotion(testing::Inertial(), "inertial");
+    const SharedMotion model = MakeMotion(testing::Inertial(), "inertial");
     MotionBinding binding{"b", model, {}, {"readings"}};
     const double sigmas[] = {0.1, 0.1, 0.02, 0.1, 0.01};
     for (std::size_t i = 0; i < 5; ++i) {
       binding.blocks.push_back(
-          system.layout.Declare("b." + model.blocks()[i].name, "b", model.blocks()[i]));
+          system.layout.Declare("b." + model->blocks()[i].name, "b", model->blocks()[i]));
       Prior prior;
       prior.block = binding.blocks.back();
-      prior.mean.assign(static_cast<std::size_t>(model.blocks()[i].geometry.ambient), 0.0);
+      prior.mean.assign(static_cast<std::size_t>(model->blocks()[i].geometry.ambient), 0.0);
       if (i == 2) prior.mean[0] = 1.0;
       prior.covariance = sigmas[i] * sigmas[i] * Eigen::Matrix3d::Identity();
       system.priors.push_back(prior);
     }
     system.motions.push_back(binding);
-    testing::AddSensor(system, "fix", InProcessSensor(testing::Position3(), "position"),
-                       {"b.position"});
+    testing::AddSensor(system, "fix", MakeSensor(testing::Position3(), "position"), {"b.position"});
     Random random(9);
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
     Eigen::Quaterniond q = Eigen::Quaterniond::Identity();

@@ -268,18 +268,18 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
 TEST(CeresBatch, WhatIsKnownStays) {
   System zero = LinearSystem();
   zero.priors[1].covariance.setZero();
-  zero.motions[0].model = InProcessMotion(ConstantVelocity<1, false>(0.0), "constant_velocity");
+  zero.motions[0].model = MakeMotion(ConstantVelocity<1, false>(0.0), "constant_velocity");
   const std::vector<Frame> frames = LinearFrames(30);
   const Smoothed known = SmoothOver(*MakeBatch(zero), frames);
   EXPECT_DOUBLE_EQ(known.x.back()(1), -0.5);
   EXPECT_DOUBLE_EQ(known.p.back()(1, 1), 0.0);
 
   const System moving = LinearSystem();
-  const MotionModel& model = moving.motions[0].model;
+  const SharedMotion& model = moving.motions[0].model;
   System fixed;
   MotionBinding binding{"p", model, {}};
-  binding.blocks = {fixed.layout.Declare("p.x", "p", model.blocks()[0]),
-                    fixed.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant)};
+  binding.blocks = {fixed.layout.Declare("p.x", "p", model->blocks()[0]),
+                    fixed.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant)};
   fixed.motions = {binding};
   fixed.priors = moving.priors;
   AddSensor(fixed, "z", moving.sensors[0].model, {"p.x"});
@@ -312,12 +312,12 @@ void ExpectStationary(const Geometry& geometry) {
   std::vector<double> mean(G::kAmbient), x(G::kAmbient);
   geometry.Identity(mean.data());
   System system;
-  const MotionModel still = InProcessMotion(Still<G>(), "still");
-  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
+  const SharedMotion still = MakeMotion(Still<G>(), "still");
+  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
   system.motions.push_back({"p", still, {id}});
   const int t = geometry.tangent;
   system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", InProcessSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   std::vector<Frame> frames;
   for (int k = 0; k < 3; ++k) {  // far from the mean and from one another
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};

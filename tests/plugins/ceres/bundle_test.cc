@@ -20,9 +20,9 @@ using testing::TrueBundle;
 using testing::Wave;
 
 BundleResult Adjusted(BundleProblem& problem, const BundleOptions& options = {}) {
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  LeaveOutUndefined(sensor, problem);
-  return AdjustBundle(sensor, problem, options);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  LeaveOutUndefined(*sensor, problem);
+  return AdjustBundle(*sensor, problem, options);
 }
 
 double Distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
@@ -35,11 +35,11 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   const BundleProblem truth = TrueBundle().problem;
   BundleProblem problem = truth;
   Disturb(problem);
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  EXPECT_GT(BundleRms(sensor, problem), 1.0) << "disturbed";
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "disturbed";
   const BundleResult result = Adjusted(problem);
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
-  EXPECT_LT(BundleRms(sensor, problem), 1e-8);
+  EXPECT_LT(BundleRms(*sensor, problem), 1e-8);
   EXPECT_EQ(problem.cameras[0].position, truth.cameras[0].position)
       << "the first camera is constant";
   EXPECT_EQ(problem.cameras[0].orientation, truth.cameras[0].orientation);
@@ -64,7 +64,7 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   // 6 cameras of 9, the first of 3, and 40 points
   EXPECT_EQ(result.unknowns, 5 * 9 + 3 + 120);
   EXPECT_EQ(result.rank, result.unknowns - 1);
-  const std::vector<std::string> words = Undetermined(problem, sensor, result);
+  const std::vector<std::string> words = Undetermined(problem, *sensor, result);
   ASSERT_EQ(words.size(), 3u);
   EXPECT_EQ(words[0], "gauge: the pose of the first camera and the scale are constant");
   EXPECT_EQ(words[1].find("extent: "), 0u) << words[1];
@@ -96,11 +96,11 @@ TEST(CeresBundle, LeavesFixedIntrinsicsAsTheyAre) {
 TEST(CeresBundle, SharesIntrinsicsBetweenCameras) {
   BundleFile truth = TrueBundle(5, 40);
   BundleProblem& problem = truth.problem;
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
   problem.intrinsics = {{510.0, -0.1, 0.02}};
   for (BundleCamera& camera : problem.cameras) camera.intrinsics = 0;
   for (BundleObservation& seen : problem.observations) {
-    ASSERT_EQ(sensor.Predict(RoleValues(RolesOf(sensor), problem, seen).data(), seen.z.data()),
+    ASSERT_EQ(sensor->Predict(RoleValues(RolesOf(*sensor), problem, seen).data(), seen.z.data()),
               Status::kOk);
   }
   Disturb(problem);
@@ -136,15 +136,15 @@ TEST(CeresBundle, ALossShrugsOffOutliers) {
 TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
   BundleProblem problem = TrueBundle().problem;
   Disturb(problem);
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  const double before = BundleRms(sensor, problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  const double before = BundleRms(*sensor, problem);
   BundleOptions options;
   int calls = 0;
   options.stop = [&] { return ++calls > 2; };
   const BundleResult result = Adjusted(problem, options);
   EXPECT_EQ(result.end, BundleEnd::kStopped);
   EXPECT_EQ(result.iterations, 2);
-  EXPECT_LT(BundleRms(sensor, problem), 0.5 * before) << "what is reached is kept";
+  EXPECT_LT(BundleRms(*sensor, problem), 0.5 * before) << "what is reached is kept";
 }
 
 // All unknowns together are then so large that any step is small compared with them.
@@ -178,8 +178,8 @@ TEST(CeresBundle, HoldsTheScaleThatPixelsDoNotTell) {
   EXPECT_NEAR(extent() / before, 1.0, 1e-14);
   EXPECT_NEAR(result.extent_before / before, 1.0, 1e-14);
   EXPECT_NEAR(result.extent_after / before, 1.0, 1e-14);
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  const double rms = BundleRms(sensor, problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  const double rms = BundleRms(*sensor, problem);
   EXPECT_NEAR(0.5 * rms * rms * static_cast<double>(problem.observations.size()), result.cost_after,
               1e-9 * result.cost_after)
       << "no pixel has changed";
@@ -202,8 +202,8 @@ TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   BundleFile file = testing::BundleOnBothSides();
   BundleProblem& problem = file.problem;
   Disturb(problem);
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  EXPECT_EQ(LeaveOutUndefined(sensor, problem), 0);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 0);
   const auto formula = [&] {
     std::istringstream text(BundleText(file));
     return testing::BalFormula(text);
@@ -211,13 +211,13 @@ TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   const testing::FormulaCost before = formula();
   EXPECT_EQ(before.observations, std::ssize(problem.observations));
   EXPECT_GT(before.behind, before.observations / 5);
-  EXPECT_NEAR(BundleRms(sensor, problem), before.Rms(), 1e-9 * before.Rms());
-  const BundleResult result = AdjustBundle(sensor, problem, {});
+  EXPECT_NEAR(BundleRms(*sensor, problem), before.Rms(), 1e-9 * before.Rms());
+  const BundleResult result = AdjustBundle(*sensor, problem, {});
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_EQ(result.residuals, 2 * before.observations);
   EXPECT_NEAR(result.cost_before, 0.5 * before.squares, 1e-9 * before.squares);
   const testing::FormulaCost after = formula();
-  EXPECT_NEAR(BundleRms(sensor, problem), after.Rms(), 1e-9 * after.Rms());
+  EXPECT_NEAR(BundleRms(*sensor, problem), after.Rms(), 1e-9 * after.Rms());
   EXPECT_NEAR(result.cost_after, 0.5 * after.squares, 1e-9 * after.squares);
   // Each coordinate of the noise has a mean square of 1/4.
   EXPECT_LT(after.Rms(), std::sqrt(0.5)) << "below the noise: unknowns take a part of it";
@@ -277,12 +277,12 @@ TEST(CeresBundle, LeavesOutWhatIsBehindItsCamera) {
   const auto seen_before = problem.observations.size();
   problem.points.push_back({0.0, 0.0, -50.0});
   problem.observations.push_back({0, static_cast<int>(problem.points.size()) - 1, {3, 4}, true});
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  EXPECT_EQ(LeaveOutUndefined(sensor, problem), 1);
-  const BundleResult result = AdjustBundle(sensor, problem, {});
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 1);
+  const BundleResult result = AdjustBundle(*sensor, problem, {});
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_EQ(result.residuals, static_cast<int>(2 * seen_before));
-  const std::vector<std::string> words = Undetermined(problem, sensor, result);
+  const std::vector<std::string> words = Undetermined(problem, *sensor, result);
   EXPECT_EQ(words[2], "1 point is seen by no camera, and left as read");
 }
 
@@ -292,10 +292,10 @@ TEST(CeresBundle, SaysWhatIsNotDetermined) {
   std::erase_if(problem.observations, [](const BundleObservation& seen) {
     return (seen.camera < 2) != (seen.point < 10) || (seen.camera == 1 && seen.point == 3);
   });
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
   const BundleResult result = Adjusted(problem);
   std::string all;
-  for (const std::string& line : Undetermined(problem, sensor, result)) all += line + '\n';
+  for (const std::string& line : Undetermined(problem, *sensor, result)) all += line + '\n';
   EXPECT_NE(all.find("2 parts share no observation"), std::string::npos) << all;
   EXPECT_NE(all.find("seen once: no depth"), std::string::npos) << all;
   EXPECT_NE(all.find("directions besides the scale are determined by no observation"),
@@ -322,25 +322,25 @@ TEST(CeresBundle, SolvesALargeProblem) {
     return (3 * seen.camera + seen.point) % 8 != 0;
   });
   Disturb(problem);
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
-  EXPECT_GT(BundleRms(sensor, problem), 1.0) << "disturbed";
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
+  EXPECT_GT(BundleRms(*sensor, problem), 1.0) << "disturbed";
   const BundleResult result = Adjusted(problem);
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_EQ(result.unknowns, 119 * 9 + 3 + 1200);
-  EXPECT_LT(BundleRms(sensor, problem), 1e-6);
+  EXPECT_LT(BundleRms(*sensor, problem), 1e-6);
   EXPECT_EQ(result.rank, -1);
-  EXPECT_EQ(Undetermined(problem, sensor, result).back(),
+  EXPECT_EQ(Undetermined(problem, *sensor, result).back(),
             "rank: not computed of more than 600 unknowns");
 }
 
 TEST(CeresBundle, CountsDirectionsThatNothingTells) {
   const BundleProblem problem = TrueBundle(2, 5).problem;
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
   BundleResult result;
   result.unknowns = 10;
   const auto last = [&](int rank) {
     result.rank = rank;
-    return Undetermined(problem, sensor, result).back();
+    return Undetermined(problem, *sensor, result).back();
   };
   EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale is determined");
   EXPECT_EQ(
@@ -355,9 +355,9 @@ TEST(CeresBundle, CountsDirectionsThatNothingTells) {
 TEST(CeresBundle, RefusesAProblemWithoutObservations) {
   BundleProblem problem = TrueBundle(2, 5).problem;
   for (BundleObservation& seen : problem.observations) seen.used = false;
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
   try {
-    AdjustBundle(sensor, problem, {});
+    AdjustBundle(*sensor, problem, {});
     FAIL();
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kBadData);
@@ -366,9 +366,9 @@ TEST(CeresBundle, RefusesAProblemWithoutObservations) {
 
 TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
   BundleProblem problem = TrueBundle(2, 5).problem;
-  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const SharedSensor sensor = BundleSensor(Shipped(), problem);
   try {
-    AdjustBundle(sensor, problem, {}, "/nonexistent");
+    AdjustBundle(*sensor, problem, {}, "/nonexistent");
     FAIL();
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kPlugin);
@@ -393,13 +393,13 @@ class CeresBundleData : public ::testing::Test {
   std::pair<double, double> Rms(const std::string& name, const BundleOptions& options = {}) {
     BundleFile file = ReadBundle(folder_ / name);
     BundleProblem& problem = file.problem;
-    const SensorModel sensor = BundleSensor(Shipped(), problem);
-    EXPECT_EQ(LeaveOutUndefined(sensor, problem), 0);
-    const double before = BundleRms(sensor, problem);
-    result_ = AdjustBundle(sensor, problem, options);
+    const SharedSensor sensor = BundleSensor(Shipped(), problem);
+    EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 0);
+    const double before = BundleRms(*sensor, problem);
+    result_ = AdjustBundle(*sensor, problem, options);
     EXPECT_EQ(result_.end, BundleEnd::kConverged) << name << ": " << result_.message;
     EXPECT_NEAR(result_.extent_after / result_.extent_before, 1.0, 1e-14);
-    const double after = BundleRms(sensor, problem);
+    const double after = BundleRms(*sensor, problem);
     if (file.format != BundleFormat::kLibmv) {
       std::ifstream read(folder_ / name);
       std::istringstream written(BundleText(file));

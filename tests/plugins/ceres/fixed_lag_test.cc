@@ -140,7 +140,7 @@ TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
 TEST(FixedLag, WhatIsKnownStays) {
   System system = LinearSystem();
   system.priors[1].covariance.setZero();
-  system.motions[0].model = InProcessMotion(ConstantVelocity<1, false>(0.0), "still");
+  system.motions[0].model = MakeMotion(ConstantVelocity<1, false>(0.0), "still");
   const auto lag = MakeFixedLag(system, kThreeFrames);
   for (const Frame& frame : LinearFrames(40)) lag->Process(frame);
   EXPECT_DOUBLE_EQ(testing::ValueOf(lag->state(), "p.v"), -0.5);
@@ -217,14 +217,14 @@ TEST(FixedLag, FramesThatLeaveTakeNothingWithThem) {
 template <class G>
 System OnManifold(const Geometry& geometry) {
   System system;
-  const MotionModel model = InProcessMotion(testing::ManifoldWalk<G, 0.1>(), "wander");
-  const BlockId id = system.layout.Declare("p.x", "p", model.blocks()[0]);
+  const SharedMotion model = MakeMotion(testing::ManifoldWalk<G, 0.1>(), "wander");
+  const BlockId id = system.layout.Declare("p.x", "p", model->blocks()[0]);
   system.motions.push_back({"p", model, {id}});
   const int t = geometry.tangent;
   std::vector<double> mean(G::kAmbient);
   geometry.Identity(mean.data());
   system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", InProcessSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
+  AddSensor(system, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   return system;
 }
 

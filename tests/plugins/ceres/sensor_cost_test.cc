@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "alidade/plugin/in_process.h"
+#include "alidade/estimation/direct_models.h"
 #include "plugins/ceres/bundle/geometry_manifold.h"
 #include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_disparity.h"
@@ -99,11 +99,11 @@ GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geomet
 // d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = -1.5, dr/dZ = -10 / 2 / 2 = -2.5 per m
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
-  const SensorModel by_abi = InProcessSensor(model, "stereo_disparity");
+  const SharedSensor by_abi = MakeSensor(model, "stereo_disparity");
   double z = 13.0;
   const std::vector<double> w{0.5};
   const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1}, w);
-  const CostKind<SensorModel> behind(by_abi, {{0, 0}}, {1}, w);
+  const CostKind<SensorModel> behind(*by_abi, {{0, 0}}, {1}, w);
   const SensorCost<StereoDisparity> a(direct, &z);
   const SensorCost<SensorModel> b(behind, &z);
   z = 77.0;  // they have their own
@@ -121,13 +121,14 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
 /// Pose and intrinsics in one block, in another order than the roles; correlated noise.
 TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SelfCalibratingFeature<RadialLens> model(1.0);
-  const SensorModel by_abi = InProcessSensor(model, "self_calibrating_feature");
+  const SharedSensor by_abi = MakeSensor(model, "self_calibrating_feature");
   const std::vector<RolePlace> places{{1, 3}, {1, 6}, {1, 0}, {0, 0}};
   const std::vector<int> sizes{3, 10};
   const double z[2] = {3.0, -4.0};
   const std::vector<double> w{2.0, 0.0, 0.7, 0.5}, half{0.5, 0.0, 0.0, 0.5};
   const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes, w);
-  const CostKind<SensorModel> behind(by_abi, places, sizes, w), equal(by_abi, places, sizes, half);
+  const CostKind<SensorModel> behind(*by_abi, places, sizes, w),
+      equal(*by_abi, places, sizes, half);
   const SensorCost a(direct, z);
   const SensorCost b(behind, z), c(equal, z);
   const Values values{{-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2, 0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}};
@@ -142,16 +143,16 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   EXPECT_EQ(At(a, values).j, At(b, values).j);
   double h[2];
   const double* const roles[] = {&values[1][3], &values[1][6], &values[1][0], &values[0][0]};
-  ASSERT_EQ(by_abi.Predict(roles, h), Status::kOk);
+  ASSERT_EQ(by_abi->Predict(roles, h), Status::kOk);
   const std::vector<double> r = ResidualAt(a, values);
   EXPECT_NEAR(r[0], 2.0 * (h[0] - z[0]), 1e-12);
   EXPECT_NEAR(r[1], 0.7 * (h[0] - z[0]) + 0.5 * (h[1] - z[1]), 1e-12);
 }
 
 TEST(SensorCost, LeavesOutWhatIsConstant) {
-  const SensorModel sensor =
-      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
-  const CostKind<SensorModel> kind(sensor, {{0, 0}, {0, 3}, {2, 0}, {1, 0}}, {7, 3, 3},
+  const SharedSensor sensor =
+      MakeSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  const CostKind<SensorModel> kind(*sensor, {{0, 0}, {0, 3}, {2, 0}, {1, 0}}, {7, 3, 3},
                                    {1.0, 0.0, 0.0, 1.0});
   const double z[2] = {3.0, -4.0};
   const SensorCost cost(kind, z);
@@ -169,25 +170,25 @@ TEST(SensorCost, LeavesOutWhatIsConstant) {
 TEST(SensorCost, TakesMeasurementsOnManifolds) {
   const std::vector<double> w3{2, 0, 0, 0.3, 1, 0, -0.2, 0.4, 0.5}, w2{2, 0, 0.3, 1};
   const double q[4] = {0.8, 0.2, -0.4, 0.4}, m[3] = {0.6, 0.0, 0.8}, angle = 3.0;
-  const SensorModel turn = InProcessSensor(Seen<UnitQuaternion>(), "seen");
-  const CostKind<SensorModel> turns(turn, {{0, 0}}, {4}, w3);
+  const SharedSensor turn = MakeSensor(Seen<UnitQuaternion>(), "seen");
+  const CostKind<SensorModel> turns(*turn, {{0, 0}}, {4}, w3);
   ExpectTrueJacobians(SensorCost(turns, q), {{0.6, 0.0, 0.8, 0.0}},
                       {Of(Geometry::UnitQuaternion())}, 1e-7);
   const Seen<UnitVector> ray;
   const CostKind<Seen<UnitVector>> rays(ray, {{0, 0}}, {3}, w2);
   ExpectTrueJacobians(SensorCost(rays, m), {{0.0, 0.28, 0.96}}, {Of(Geometry::UnitVector())}, 1e-7);
-  const SensorModel heading = InProcessSensor(Seen<Angle>(), "seen");
-  const CostKind<SensorModel> headings(heading, {{0, 0}}, {1}, {2.0});
+  const SharedSensor heading = MakeSensor(Seen<Angle>(), "seen");
+  const CostKind<SensorModel> headings(*heading, {{0, 0}}, {1}, {2.0});
   const SensorCost wraps(headings, &angle);
   EXPECT_NEAR(ResidualAt(wraps, {{-3.0}})[0], 2.0 * (2.0 * M_PI - 6.0), 1e-12);
   ExpectTrueJacobians(wraps, {{-3.0}}, {Of(Geometry::Angle())}, 1e-7);
 }
 
 TEST(SensorCost, MayLackAnOptionalRole) {
-  const SensorModel sensor = InProcessSensor(Biased(), "biased");
+  const SharedSensor sensor = MakeSensor(Biased(), "biased");
   const double z = 5.0;
-  const CostKind<SensorModel> with(sensor, {{0, 0}, {1, 0}}, {1, 1}, {1.0}),
-      without(sensor, {{0, 0}, {}}, {1}, {1.0});
+  const CostKind<SensorModel> with(*sensor, {{0, 0}, {1, 0}}, {1, 1}, {1.0}),
+      without(*sensor, {{0, 0}, {}}, {1}, {1.0});
   EXPECT_EQ(ResidualAt(SensorCost(with, &z), {{1.0}, {0.5}})[0], -3.5);
   EXPECT_EQ(ResidualAt(SensorCost(without, &z), {{1.0}})[0], -4.0);
   EXPECT_EQ(At(SensorCost(without, &z), {{1.0}}).j[0][0], 1.0);
@@ -204,11 +205,11 @@ TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
 
 // Two roles on one number would leave the other column of the block as it was.
 TEST(SensorCost, RefusesRolesThatShareAPlace) {
-  const SensorModel sensor = InProcessSensor(Biased(), "biased");
+  const SharedSensor sensor = MakeSensor(Biased(), "biased");
   using Kind = CostKind<SensorModel>;
-  EXPECT_THROW(Kind(sensor, {{0, 0}, {0, 0}}, {2}, {1.0}), ContractViolation);
+  EXPECT_THROW(Kind(*sensor, {{0, 0}, {0, 0}}, {2}, {1.0}), ContractViolation);
   const double z = 5.0;
-  const Kind apart(sensor, {{0, 2}, {0, 0}}, {4}, {1.0});
+  const Kind apart(*sensor, {{0, 2}, {0, 0}}, {4}, {1.0});
   EXPECT_EQ(At(SensorCost(apart, &z), {{0.5, 7.0, 1.0, 7.0}}).j[0],
             (std::vector<double>{1.0, 0.0, 1.0, 0.0}));
   const SelfCalibratingFeature<RadialLens> model(1.0);

@@ -28,12 +28,12 @@ using Means = std::vector<std::vector<double>>;
 
 /// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05. A
 /// control input comes on the stream `NAME.input`.
-inline void AddMotion(System& system, const std::string& name, const MotionModel& model,
+inline void AddMotion(System& system, const std::string& name, const SharedMotion& model,
                       const Means& means) {
   MotionBinding binding{name, model, {}};
-  if (model.has_input()) binding.input = {name + ".input"};
+  if (model->has_input()) binding.input = {name + ".input"};
   for (std::size_t i = 0; i < means.size(); ++i) {
-    const Space& space = model.blocks()[i];
+    const Space& space = model->blocks()[i];
     Prior prior;
     prior.block = system.layout.Declare(name + "." + space.name, name, space);
     prior.mean = means[i];
@@ -48,7 +48,7 @@ inline void AddMotion(System& system, const std::string& name, const MotionModel
 template <class G>
 void AddSeen(System& system) {
   const std::string number = std::to_string(system.sensors.size());
-  AddSensor(system, "seen" + number, InProcessSensor(Seen<G>(), "seen"),
+  AddSensor(system, "seen" + number, MakeSensor(Seen<G>(), "seen"),
             {system.layout.blocks()[system.sensors.size()].name});
 }
 template <class... G>
@@ -60,8 +60,8 @@ void AddAllSeen(System& system, std::tuple<G...>*) {
 inline std::vector<StreamInfo> AllStreams(const System& system) {
   std::vector<StreamInfo> streams = StreamsOf(system);
   for (const MotionBinding& motion : system.motions) {
-    if (!motion.model.has_input()) continue;
-    streams.push_back({motion.input.stream, motion.model.input().geometry.ambient});
+    if (!motion.model->has_input()) continue;
+    streams.push_back({motion.input.stream, motion.model->input().geometry.ambient});
   }
   return streams;
 }
@@ -86,15 +86,15 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
       for (const RoleBinding& role : sensor.roles) {
         roles.push_back(system.priors[static_cast<std::size_t>(role.block)].mean.data());
       }
-      const Geometry& geometry = sensor.model.measurement().geometry;
+      const Geometry& geometry = sensor.model->measurement().geometry;
       const int m = geometry.tangent;
       std::vector<double> z(static_cast<std::size_t>(geometry.ambient)), l(m * m), d(m);
       std::vector<double> known;
-      for (int i = 0; i < sensor.model.known_size(); ++i) {
+      for (int i = 0; i < sensor.model->known_size(); ++i) {
         known.push_back(8.0 * std::sin(0.9 * k + 2.0 * i));
       }
-      EXPECT_EQ(sensor.model.Predict(roles.data(), z.data(), known.data()), Status::kOk);
-      EXPECT_EQ(sensor.model.SqrtNoise(roles.data(), z.data(), l.data(), known.data()),
+      EXPECT_EQ(sensor.model->Predict(roles.data(), z.data(), known.data()), Status::kOk);
+      EXPECT_EQ(sensor.model->SqrtNoise(roles.data(), z.data(), l.data(), known.data()),
                 Status::kOk);
       for (int r = 0; r < m; ++r) {
         for (int c = 0; c <= r; ++c)
@@ -190,11 +190,11 @@ StaticEkf<Wander<G>...> FilterOf(std::tuple<G...>*) {
 template <class... G>
 void AddWanders(System& system, const Means& means, std::tuple<G...>*) {
   std::size_t i = 0;
-  const auto add = [&](const MotionModel& model) {
+  const auto add = [&](const SharedMotion& model) {
     AddMotion(system, "w" + std::to_string(i), model, {means[i]});
     ++i;
   };
-  (add(InProcessMotion(Wander<G>(), "wander")), ...);
+  (add(MakeMotion(Wander<G>(), "wander")), ...);
 }
 template <class Filter, class Model, std::size_t... I>
 StaticOutcome UpdateAll(Filter& filter, const Model& model, const double* z,

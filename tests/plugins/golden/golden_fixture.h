@@ -34,10 +34,10 @@ class GoldenTest : public HostTest, public ::testing::WithParamInterface<const c
     if (host_ == nullptr) host_ = std::make_unique<PluginHost>(std::vector{Lent()});
     return *host_;
   }
-  SensorModel Sensor(const std::string& name, const std::string& parameters) {
+  SharedSensor Sensor(const std::string& name, const std::string& parameters) {
     return Host().CreateSensor(name, Parse(parameters).root());
   }
-  MotionModel Cart() {
+  SharedMotion Cart() {
     return Host().CreateMotion("golden_cart", Parse("noise: {speed: 0.25, turn_rate: 0.5}").root());
   }
 

@@ -20,13 +20,13 @@ TEST_F(LaterPlugin, WithLargerStructsAndUnknownHintsWorks) {
   const AlidadeBuildTag tag = ReadBuildTag(Built("later"));
   EXPECT_GT(tag.struct_size, sizeof(AlidadeBuildTag));
   EXPECT_EQ(tag.abi_minor, 3);
-  const SensorModel sensor = host.CreateSensor("later_sensor", Parse("gain: 1.5").root());
+  const SharedSensor sensor = host.CreateSensor("later_sensor", Parse("gain: 1.5").root());
   const double x = 3.0, b = 0.5;
   const double* roles[] = {&x, &b};
   double z = 0.0;
-  ASSERT_EQ(sensor.Predict(roles, &z), Status::kOk);
+  ASSERT_EQ(sensor->Predict(roles, &z), Status::kOk);
   EXPECT_EQ(z, 6.5);
-  EXPECT_EQ(sensor.roles()[1].name, "b");
+  EXPECT_EQ(sensor->roles()[1].name, "b");
   const auto entries = FindModels(host, Built("later"), "later_sensor");
   const auto findings = CheckModel(host, entries.front(), Parse("{}").root(), {});
   EXPECT_FALSE(AnyFailure(findings)) << CheckText(entries.front(), findings);
@@ -63,11 +63,11 @@ TEST_F(LaterPlugin, WhatHasToBeUnderstoodIsRefusedByName) {
                 [&] { host.CreateSensor(name, Parse("{}").root()); });
   }
   // A code that this version does not know is a failure of the call.
-  const SensorModel sensor = host.CreateSensor("later_code", Parse("{}").root());
+  const SharedSensor sensor = host.CreateSensor("later_code", Parse("{}").root());
   const double x = 3.0, b = 0.5;
   const double* roles[] = {&x, &b};
   double z = 0.0;
-  EXPECT_EQ(sensor.Predict(roles, &z), Status::kError);
+  EXPECT_EQ(sensor->Predict(roles, &z), Status::kError);
 }
 
 }  // namespace

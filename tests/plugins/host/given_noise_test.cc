@@ -19,18 +19,18 @@ const PluginHost& ShippedModels() {
   return host;
 }
 
-Numbers RootOfR(const SensorModel& sensor) {
-  const int m = sensor.measurement().geometry.tangent;
+Numbers RootOfR(const SharedSensor& sensor) {
+  const int m = sensor->measurement().geometry.tangent;
   Numbers l(static_cast<std::size_t>(m) * static_cast<std::size_t>(m), std::nan(""));
   // A given noise needs neither states nor a measurement.
-  EXPECT_EQ(sensor.SqrtNoise(nullptr, nullptr, l.data()), Status::kOk);
+  EXPECT_EQ(sensor->SqrtNoise(nullptr, nullptr, l.data()), Status::kOk);
   return l;
 }
 
-Numbers RootOfQ(const MotionModel& motion, double dt_s) {
-  const int n = motion.noise_size();
+Numbers RootOfQ(const SharedMotion& motion, double dt_s) {
+  const int n = motion->noise_size();
   Numbers l(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), std::nan(""));
-  EXPECT_EQ(motion.SqrtQ(nullptr, nullptr, dt_s, l.data()), Status::kOk);
+  EXPECT_EQ(motion->SqrtQ(nullptr, nullptr, dt_s, l.data()), Status::kOk);
   return l;
 }
 
@@ -64,14 +64,14 @@ TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
   const Numbers expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
   const System system = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
   EXPECT_EQ(RootOfR(system.sensors[0].model), expected);
-  ASSERT_TRUE(system.sensors[0].xyz.has_value());
-  EXPECT_EQ(RootOfR(*system.sensors[0].xyz), expected);
+  ASSERT_TRUE(system.sensors[0].xyz != nullptr);
+  EXPECT_EQ(RootOfR(system.sensors[0].xyz), expected);
   // At another time, too: the sensor is then one of more roles.
   const System late =
       PixelsWith("covariance: [[1, 0.6], [0.6, 4]]\n    time_offset_s: {mean: 0, sigma: 0.01}");
   EXPECT_GT(late.sensors[0].roles.size(), system.sensors[0].roles.size());
   EXPECT_EQ(RootOfR(late.sensors[0].model), expected);
-  EXPECT_EQ(RootOfR(*late.sensors[0].xyz), expected);
+  EXPECT_EQ(RootOfR(late.sensors[0].xyz), expected);
 }
 
 TEST_F(GivenNoise, IsRefusedWhereItIsNoCovarianceOfTheMeasurement) {
@@ -94,7 +94,7 @@ TEST_F(GivenNoise, TakesNothingButTheNoiseFromAModel) {
   // The kind is asked for; template_px, which is no sigma, is needed though R does without it.
   const auto scale = [](const std::string& keys) {
     const Config config = Parse("{covariance: [[0.25]], " + keys + "}");
-    const SensorModel model = ShippedModels().CreateSensor("scale_2d", config.root());
+    const SharedSensor model = ShippedModels().CreateSensor("scale_2d", config.root());
     config.root().RejectUnread();
     return RootOfR(model);
   };
@@ -104,8 +104,8 @@ TEST_F(GivenNoise, TakesNothingButTheNoiseFromAModel) {
               [&] { scale("noise_model: propagated"); });
 }
 
-MotionModel Motion(const Config& config, const std::string& name) {
-  MotionModel model = ShippedModels().CreateMotion(name, config.root());
+SharedMotion Motion(const Config& config, const std::string& name) {
+  SharedMotion model = ShippedModels().CreateMotion(name, config.root());
   config.root().RejectUnread();
   return model;
 }
@@ -113,7 +113,7 @@ MotionModel Motion(const Config& config, const std::string& name) {
 TEST_F(GivenNoise, OfAMotionModelIsThatOfItsInputs) {
   const Config config =
       Parse("{dimensions: 2, noise: {kind: discrete, covariance: [[4, -1], [-1, 1]]}}");
-  const MotionModel model = Motion(config, "constant_velocity");
+  const SharedMotion model = Motion(config, "constant_velocity");
   // m/s^2, held: whatever dt is
   for (const double dt_s : {0.1, 3.0}) {
     EXPECT_EQ(RootOfQ(model, dt_s), (Numbers{2.0, 0.0, -0.5, std::sqrt(0.75)}));

@@ -12,10 +12,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-double Predicted(const SensorModel& sensor, double x) {
+double Predicted(const SharedSensor& sensor, double x) {
   const double* roles[] = {&x};
   double z = 0.0;
-  EXPECT_EQ(sensor.Predict(roles, &z), Status::kOk);
+  EXPECT_EQ(sensor->Predict(roles, &z), Status::kOk);
   return z;
 }
 
@@ -43,14 +43,14 @@ TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
   const PluginHost host({Built("range_rate")});
   const Config config = Parse("sensors:\n  radar: {model: range_rate, sigma_m_s: 0.5}");
   const Node entry = config.root().At("sensors").At("radar");
-  const SensorModel radar = host.CreateSensor("range_rate", entry);
+  const SharedSensor radar = host.CreateSensor("range_rate", entry);
   const double p[2] = {3.0, 4.0}, v[2] = {10.0, 0.0};
   const double* roles[] = {p, v};
   double z = 0.0, l = 0.0, by_p[2], by_v[2];
   double* jacobians[] = {by_p, by_v};
   const int strides[] = {2, 2};
-  ASSERT_EQ(radar.Linearise(roles, &z, jacobians, strides), Status::kOk);
-  ASSERT_EQ(radar.SqrtNoise(roles, &z, &l), Status::kOk);
+  ASSERT_EQ(radar->Linearise(roles, &z, jacobians, strides), Status::kOk);
+  ASSERT_EQ(radar->SqrtNoise(roles, &z, &l), Status::kOk);
   EXPECT_DOUBLE_EQ(z, 6.0);  // 3 10 / 5
   EXPECT_DOUBLE_EQ(by_v[0], 0.6);
   EXPECT_DOUBLE_EQ(by_v[1], 0.8);
@@ -385,7 +385,7 @@ TEST_F(HostTest, ADottedKeyWalksNestedMaps) {
   const PluginHost host;
   const Config good =
       Parse("{model: constant_velocity, noise: {acceleration: 2, kind: continuous}}");
-  EXPECT_EQ(host.CreateMotion("constant_velocity", good.root()).noise_size(), 2);
+  EXPECT_EQ(host.CreateMotion("constant_velocity", good.root())->noise_size(), 2);
   EXPECT_NO_THROW(good.root().At("noise").RejectUnread());
   const Config none = Parse("state: {cam: {model: constant_velocity}}");
   ExpectError(ExitCode::kBadConfig, {"state.cam.noise.acceleration: missing", "(m/s^1.5, >= 0"},

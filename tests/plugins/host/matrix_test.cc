@@ -19,14 +19,14 @@ std::vector<std::string> Variants() {
   return names;
 }
 
-void EvaluateSensor(const SensorModel& sensor, const std::vector<double>& x,
+void EvaluateSensor(const SharedSensor& sensor, const std::vector<double>& x,
                     std::vector<double>& out) {
   const double* roles[] = {&x[0], &x[4], &x[7]};
   double z[2], by_q[6], by_point[6], by_bias[2], l[4];
   double* jacobians[] = {by_q, by_point, by_bias};
   const int strides[] = {3, 3, 1};
-  ASSERT_EQ(sensor.Linearise(roles, z, jacobians, strides), Status::kOk);
-  ASSERT_EQ(sensor.SqrtNoise(roles, z, l), Status::kOk);
+  ASSERT_EQ(sensor->Linearise(roles, z, jacobians, strides), Status::kOk);
+  ASSERT_EQ(sensor->SqrtNoise(roles, z, l), Status::kOk);
   out.insert(out.end(), z, z + 2);
   out.insert(out.end(), by_q, by_q + 6);
   out.insert(out.end(), by_point, by_point + 6);
@@ -34,13 +34,13 @@ void EvaluateSensor(const SensorModel& sensor, const std::vector<double>& x,
   out.insert(out.end(), l, l + 4);
 }
 
-void EvaluateMotion(const MotionModel& motion, const std::vector<double>& x,
+void EvaluateMotion(const SharedMotion& motion, const std::vector<double>& x,
                     std::vector<double>& out) {
   const double* blocks[] = {&x[0], &x[4]};
   double q[4], rate[3], f[36], g[18], l[9];
   double* next[] = {q, rate};
-  ASSERT_EQ(motion.Step(blocks, nullptr, &x[8], 0.1, next, f, g), Status::kOk);
-  ASSERT_EQ(motion.SqrtQ(blocks, nullptr, 0.1, l), Status::kOk);
+  ASSERT_EQ(motion->Step(blocks, nullptr, &x[8], 0.1, {next, f, g}), Status::kOk);
+  ASSERT_EQ(motion->SqrtQ(blocks, nullptr, 0.1, l), Status::kOk);
   out.insert(out.end(), q, q + 4);
   out.insert(out.end(), rate, rate + 3);
   out.insert(out.end(), f, f + 36);
@@ -52,8 +52,8 @@ void EvaluateMotion(const MotionModel& motion, const std::vector<double>& x,
 std::vector<double> Evaluate(const std::filesystem::path& plugin) {
   const PluginHost host({plugin});
   const Config config = Config::FromText("{gain: 1.7, tau_s: 0.6}", "matrix");
-  const SensorModel sensor = host.CreateSensor("matrix_sensor", config.root());
-  const MotionModel motion = host.CreateMotion("matrix_motion", config.root());
+  const SharedSensor sensor = host.CreateSensor("matrix_sensor", config.root());
+  const SharedMotion motion = host.CreateMotion("matrix_motion", config.root());
   std::mt19937_64 engine(7);
   std::vector<double> out;
   for (int i = 0; i < kPoints; ++i) {

@@ -19,27 +19,27 @@ const PluginHost& Shipped() {
   return host;
 }
 
-SensorModel Pixels(const Config& config, const char* name = "pixels") {
+SharedSensor Pixels(const Config& config, const char* name = "pixels") {
   const Node entry = config.root().At("sensors").At(name);
   entry.Declare("model");
-  SensorModel model = Shipped().CreateSensor("inverse_depth_feature", entry);
+  SharedSensor model = Shipped().CreateSensor("inverse_depth_feature", entry);
   entry.RejectUnread();
   return model;
 }
 
 /// u of a point 2 m ahead and 1 m to the right: cx + fx / 2.
-double U(const SensorModel& xyz) {
+double U(const SharedSensor& xyz) {
   const testing::Blocks roles{{0, 0, 0}, {1, 0, 0, 0}, {1, 0, 2}};
   double z[2];
-  EXPECT_EQ(xyz.Predict(Pointers(roles).data(), z), Status::kOk);
+  EXPECT_EQ(xyz->Predict(Pointers(roles).data(), z), Status::kOk);
   return z[0];
 }
 
 TEST_F(SharedParametersTest, AreReadFromTheRoot) {
   const Config config =
       Parse(kCamera + "landmarks: {representation: xyz}\nsensors: {pixels: {sigma_px: 1}}");
-  const SensorModel pixels = Pixels(config);
-  EXPECT_EQ(pixels.roles()[2].geometry, Geometry::Vector(3));
+  const SharedSensor pixels = Pixels(config);
+  EXPECT_EQ(pixels->roles()[2].geometry, Geometry::Vector(3));
   EXPECT_EQ(U(pixels), 320.0 + 500.0 / 2);
   EXPECT_NO_THROW(config.root().RejectUnread());
 }
@@ -52,7 +52,7 @@ TEST_F(SharedParametersTest, TheEntryComesFirstKeyByKey) {
             "  pixels: {sigma_px: 1, camera: {fx: 400}, landmarks: {representation: xyz}}\n"
             "  others: {sigma_px: 1}");
   EXPECT_EQ(U(Pixels(config)), 320.0 + 400.0 / 2);
-  EXPECT_EQ(Pixels(config, "others").roles().size(), 5u);
+  EXPECT_EQ(Pixels(config, "others")->roles().size(), 5u);
 }
 
 TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {

@@ -9,10 +9,10 @@ namespace {
 
 class ThrowsTest : public HostTest {
  protected:
-  SensorModel Sensor(const char* name) {
+  SharedSensor Sensor(const char* name) {
     return host_.CreateSensor(name, Parse("model: any").root());
   }
-  MotionModel Motion(const char* name) {
+  SharedMotion Motion(const char* name) {
     return host_.CreateMotion(name, Parse("model: any").root());
   }
   /// `Predict of model 'NAME' of plugin FILE threw: the dog ate it`
@@ -42,52 +42,52 @@ TEST_F(ThrowsTest, InCreateIsAnErrorOfThePlugin) {
 }
 
 TEST_F(ThrowsTest, InACallIsAFailureOfThatCall) {
-  const SensorModel eval = Sensor("throws_in_eval");
-  EXPECT_EQ(eval.Predict(roles_, &out_), Status::kError);
-  EXPECT_EQ(eval.error_text(), Words("Predict", "throws_in_eval"));
-  const SensorModel noise = Sensor("throws_in_sqrt_noise");
-  EXPECT_EQ(noise.SqrtNoise(roles_, &x_, &out_), Status::kError);
-  EXPECT_EQ(noise.error_text(), Words("SqrtNoise", "throws_in_sqrt_noise"));
-  const SensorModel valid = Sensor("throws_in_valid");
-  EXPECT_EQ(valid.Valid(&x_), Status::kError);
-  EXPECT_EQ(valid.error_text(), Words("Valid", "throws_in_valid", "an exception of unknown type"));
-  const SensorModel inverse = Sensor("throws_in_initialise");
-  EXPECT_EQ(inverse.Initialise(roles_, &x_, &out_, nullptr, nullptr), Status::kError);
-  EXPECT_EQ(inverse.error_text(), Words("Initialise", "throws_in_initialise"));
+  const SharedSensor eval = Sensor("throws_in_eval");
+  EXPECT_EQ(eval->Predict(roles_, &out_), Status::kError);
+  EXPECT_EQ(eval->error_text(), Words("Predict", "throws_in_eval"));
+  const SharedSensor noise = Sensor("throws_in_sqrt_noise");
+  EXPECT_EQ(noise->SqrtNoise(roles_, &x_, &out_), Status::kError);
+  EXPECT_EQ(noise->error_text(), Words("SqrtNoise", "throws_in_sqrt_noise"));
+  const SharedSensor valid = Sensor("throws_in_valid");
+  EXPECT_EQ(valid->Valid({&x_}), Status::kError);
+  EXPECT_EQ(valid->error_text(), Words("Valid", "throws_in_valid", "an exception of unknown type"));
+  const SharedSensor inverse = Sensor("throws_in_initialise");
+  EXPECT_EQ(inverse->Initialise(roles_, {&x_}, nullptr, {.y = &out_}), Status::kError);
+  EXPECT_EQ(inverse->error_text(), Words("Initialise", "throws_in_initialise"));
   double* const next[] = {&out_};
-  const MotionModel step = Motion("throws_in_step");
-  EXPECT_EQ(step.Step(roles_, nullptr, nullptr, 0.1, next, nullptr, nullptr), Status::kError);
-  EXPECT_EQ(step.error_text(), Words("Step", "throws_in_step"));
-  const MotionModel q = Motion("throws_in_sqrt_q");
-  EXPECT_EQ(q.SqrtQ(roles_, nullptr, 0.1, &out_), Status::kError);
-  EXPECT_EQ(q.error_text(), Words("SqrtQ", "throws_in_sqrt_q"));
-  EXPECT_NE(eval.error_text(), Words("SqrtQ", "throws_in_sqrt_q")) << "which is another's";
+  const SharedMotion step = Motion("throws_in_step");
+  EXPECT_EQ(step->Step(roles_, nullptr, nullptr, 0.1, {next, nullptr, nullptr}), Status::kError);
+  EXPECT_EQ(step->error_text(), Words("Step", "throws_in_step"));
+  const SharedMotion q = Motion("throws_in_sqrt_q");
+  EXPECT_EQ(q->SqrtQ(roles_, nullptr, 0.1, &out_), Status::kError);
+  EXPECT_EQ(q->error_text(), Words("SqrtQ", "throws_in_sqrt_q"));
+  EXPECT_NE(eval->error_text(), Words("SqrtQ", "throws_in_sqrt_q")) << "which is another's";
 }
 
 TEST_F(ThrowsTest, WhatWasThrownIsOfTheLastFailureAlone) {
-  const SensorModel sensor = Sensor("throws_at_zero");
-  EXPECT_EQ(sensor.Predict(roles_, &out_), Status::kError);
-  EXPECT_EQ(sensor.error_text(), Words("Predict", "throws_at_zero"));
-  EXPECT_EQ(sensor.error_text(), Words("Predict", "throws_at_zero")) << "as often as it is asked";
+  const SharedSensor sensor = Sensor("throws_at_zero");
+  EXPECT_EQ(sensor->Predict(roles_, &out_), Status::kError);
+  EXPECT_EQ(sensor->error_text(), Words("Predict", "throws_at_zero"));
+  EXPECT_EQ(sensor->error_text(), Words("Predict", "throws_at_zero")) << "as often as it is asked";
   const double below = -1.0;
   const double* const roles[] = {&below};
-  EXPECT_EQ(sensor.Predict(roles, &out_), Status::kError);
-  EXPECT_EQ(sensor.error_text(), "");
+  EXPECT_EQ(sensor->Predict(roles, &out_), Status::kError);
+  EXPECT_EQ(sensor->error_text(), "");
 }
 
 TEST_F(ThrowsTest, InErrorTextIsSaidInItsPlace) {
-  const SensorModel sensor = Sensor("throws_in_error_text");
+  const SharedSensor sensor = Sensor("throws_in_error_text");
   const double below = -1.0;
   const double* const roles[] = {&below};
-  EXPECT_EQ(sensor.Predict(roles, &out_), Status::kError);
-  EXPECT_EQ(sensor.error_text(), Words("error_text", "throws_in_error_text"));
+  EXPECT_EQ(sensor->Predict(roles, &out_), Status::kError);
+  EXPECT_EQ(sensor->error_text(), Words("error_text", "throws_in_error_text"));
 }
 
 TEST_F(ThrowsTest, InDestroyIsAWarning) {
   std::vector<std::string> said;
   const LogSubscription log(LogLevel::kWarning,
                             [&](LogLevel, std::string_view text) { said.emplace_back(text); });
-  { const SensorModel sensor = Sensor("throws_in_destroy_too"); }
+  { const SharedSensor sensor = Sensor("throws_in_destroy_too"); }
   EXPECT_EQ(said, std::vector<std::string>{Words("Destroy", "throws_in_destroy_too")});
 }
 

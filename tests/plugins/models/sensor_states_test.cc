@@ -281,7 +281,7 @@ TEST(SensorStates, AreMovedByAModelThatIsNamedAfterItsDynamics) {
   const auto name = [](const std::string& dynamics) {
     const Experiment experiment = BuildExperiment(
         testing::Read(Filled("", "", ", dynamics: {clock_bias: " + dynamics + '}')), TheHost());
-    return experiment.estimators[0].system.motions.back().model.name();
+    return experiment.estimators[0].system.motions.back().model->name();
   };
   EXPECT_EQ(name("constant"), "constant");
   EXPECT_EQ(name("{random_walk: 1}"), "random_walk");

@@ -71,9 +71,9 @@ TEST_F(BundleFiles, ReadsBal) {
   EXPECT_EQ(file.format, BundleFormat::kBal);
   ASSERT_EQ(file.problem.observations.size(), 1u);
   EXPECT_EQ(file.problem.observations[0].z[1], -10.125) << "v grows downwards";
-  const SensorModel sensor =
-      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
-  EXPECT_LT(BundleRms(sensor, file.problem), 1e-12);
+  const SharedSensor sensor =
+      MakeSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  EXPECT_LT(BundleRms(*sensor, file.problem), 1e-12);
 }
 
 TEST_F(BundleFiles, BalIsReadAndWrittenWithoutALoss) {
@@ -106,9 +106,9 @@ TEST_F(BundleFiles, ReadsBundler) {
   EXPECT_EQ(file.format, BundleFormat::kBundler);
   EXPECT_EQ(file.colours, (std::vector<std::string>{"255 0 7", "1 2 3"}));
   EXPECT_EQ(file.keys, std::vector<std::int64_t>{42});
-  const SensorModel sensor =
-      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
-  EXPECT_LT(BundleRms(sensor, file.problem), 1e-12);
+  const SharedSensor sensor =
+      MakeSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  EXPECT_LT(BundleRms(*sensor, file.problem), 1e-12);
   EXPECT_EQ(BundleText(file), kBundler);
 }
 
@@ -147,14 +147,14 @@ std::string Libmv(bool little) {
 }
 
 TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
-  const SensorModel sensor =
-      InProcessSensor(SelfCalibratingFeature<RadtanLens>(1.0), "self_calibrating_feature");
+  const SharedSensor sensor =
+      MakeSensor(SelfCalibratingFeature<RadtanLens>(1.0), "self_calibrating_feature");
   for (const bool little : {true, false}) {
     const BundleFile file = ReadText(Libmv(little));
     EXPECT_EQ(file.format, BundleFormat::kLibmv);
     EXPECT_EQ(file.camera_ids, std::vector<std::int64_t>{7});
     EXPECT_EQ(file.point_ids, std::vector<std::int64_t>{9});
-    EXPECT_LT(BundleRms(sensor, file.problem), 1e-4) << "32-bit numbers";
+    EXPECT_LT(BundleRms(*sensor, file.problem), 1e-4) << "32-bit numbers";
     EXPECT_EQ(BundleText(file), Libmv(true));
   }
 }

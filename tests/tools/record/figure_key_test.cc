@@ -70,7 +70,7 @@ TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
   for (int i = 0; i < 7; ++i) {
     NamedEstimator named;
     named.name = "an_estimator_" + std::to_string(i);
-    const MotionModel constant = testing::ConstantMotion(1);
+    const SharedMotion constant = testing::ConstantMotion(1);
     for (const char* entry : {"first", "second"}) {
       AddMotion(named.system, entry, constant, {{"x", 0.3, 0.1}});
     }

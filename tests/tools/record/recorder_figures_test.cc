@@ -77,7 +77,7 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
   for (NamedEstimator& named : experiment.estimators) {
-    testing::AddMotion(named.system, "top", InProcessMotion(Spinning(), "spinning"),
+    testing::AddMotion(named.system, "top", MakeMotion(Spinning(), "spinning"),
                        {{"heading", 0.0, 0.1}});
     named.estimator =
         std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());

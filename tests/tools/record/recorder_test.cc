@@ -138,7 +138,7 @@ struct HandMade {
     layout.Declare("a.attitude", "a",
                    {"q", "rad", "", {"w", "x", "y", "z"}, Geometry::UnitQuaternion()});
     testing::AddSensor(named.system, "disparity",
-                       InProcessSensor(StereoDisparity(400.0, 0.065, 1.0, 0.3), "stereo_disparity"),
+                       MakeSensor(StereoDisparity(400.0, 0.065, 1.0, 0.3), "stereo_disparity"),
                        {"a.waits"});
     state = State(layout);
     const double fixed = 0.25, attitude[4] = {1.0, 0.0, 0.0, 0.0};

@@ -199,9 +199,9 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
   return elements;
 }
 
-SensorModel BundleSensor(const PluginHost& host, const BundleProblem& problem) {
+SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem) {
   const Config config = Config::FromText(problem.sensor, "sensor of the bundle");
-  const SensorModel sensor =
+  const SharedSensor sensor =
       host.CreateSensor(config.root().At("model").Text(), config.root(), "xyz");
   config.root().RejectUnread();
   return sensor;

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/models.h"
 #include "alidade/estimation/robust_loss.h"
 #include "alidade/plugin/cpp_plugin.h"
-#include "alidade/plugin/model_instance.h"
 #include "alidade/plugin/plugin_host.h"
 
 /// Bundle adjustment: cameras and the points that they see, estimated together from the pixels.
@@ -95,7 +95,7 @@ std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProb
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
 
 /// The sensor that `problem` names. Errors: kPlugin, kBadConfig.
-SensorModel BundleSensor(const PluginHost& host, const BundleProblem& problem);
+SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
 /// Leaves out, by BundleObservation::used, the observations for which the sensor is not defined at
 /// the problem's values (a point behind its camera; for a projective camera, in its plane), and

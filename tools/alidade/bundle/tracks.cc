@@ -136,9 +136,8 @@ std::optional<std::array<double, 3>> Triangulate(const SensorModel& sensor,
     values[roles.orientation] = camera.orientation.data();
     Eigen::Vector3d y;
     const double prior = 1.0;
-    if (sensor.Initialise(values.data(), one.z.data(), &prior, y.data(), nullptr, j.data(),
-                          nullptr) != Status::kOk)
-      continue;
+    const SensorModel::InverseOutput out{.y = y.data(), .jz = j.data()};
+    if (sensor.Initialise(values.data(), {one.z.data()}, &prior, out) != Status::kOk) continue;
     const Eigen::Matrix3d w = PseudoInverse(j * j.transpose(), kAlongRay);
     a += w;
     b += w * y;
@@ -151,15 +150,15 @@ std::optional<std::array<double, 3>> Triangulate(const SensorModel& sensor,
 }
 
 /// The sensor of tracks, checked while its file is known.
-SensorModel MakeSensor(const BundleTracks& from, int dims, const PluginHost& host,
-                       std::string& text) {
+SharedSensor TrackSensor(const BundleTracks& from, int dims, const PluginHost& host,
+                         std::string& text) {
   Config config = Config::FromFile(from.camera);
   const char* const model = dims == 4 ? "stereo_feature" : "inverse_depth_feature";
   config.Set("model", model, "bundle");
   const bool has_noise =
       config.root().HasUnread("sigma_px") || config.root().HasUnread("covariance");
   if (!has_noise) config.Set("sigma_px", "1", "bundle");
-  const SensorModel sensor = host.CreateSensor(model, config.root(), "xyz");
+  const SharedSensor sensor = host.CreateSensor(model, config.root(), "xyz");
   config.root().Declare("model");
   config.root().RejectUnread();
   text = config.ToYaml();
@@ -177,7 +176,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
   const Start start = ReadStart(from.start);
   const auto poses = PosesOf(
       tracks, start, from.tracks == "-" ? "" : from.tracks.parent_path() / "timestamps.csv");
-  const SensorModel sensor = MakeSensor(from, dims, host, problem.sensor);
+  const SharedSensor sensor = TrackSensor(from, dims, host, problem.sensor);
 
   std::map<std::int64_t, std::vector<BundleObservation>> features;
   for (const auto& [frame, all] : tracks) {
@@ -192,7 +191,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
     file.camera_ids.push_back(frame);
     file.timestamps.push_back(start.timestamps[pose->second]);
     for (const auto& [feature, seen] : all) {
-      if (sensor.Valid(seen.z.data()) == Status::kOk) {
+      if (sensor->Valid({seen.z.data()}) == Status::kOk) {
         features[feature].push_back({camera, 0, seen.z, true});
       } else {
         ++file.invalid;
@@ -200,7 +199,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
     }
   }
   for (auto& [feature, seen] : features) {
-    const auto place = Triangulate(sensor, problem, seen);
+    const auto place = Triangulate(*sensor, problem, seen);
     if (!place) {
       ++file.points_left_out;
       file.unplaced += static_cast<int>(seen.size());

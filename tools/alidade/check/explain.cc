@@ -102,16 +102,15 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
 
 /// The control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
 std::string InputText(const MotionBinding& motion) {
-  if (!motion.model.has_input()) return "none";
+  if (!motion.model->has_input()) return "none";
   const InputBinding& input = motion.input;
-  return motion.model.input().name + " <- " + input.stream +
+  return motion.model->input().name + " <- " + input.stream +
          (std::isfinite(input.timeout_s) ? ", up to " + NumberText(input.timeout_s) + " s old"
                                          : "");
 }
 
 /// A line for a state or sensor entry whose noise the config gives as a covariance; else "".
-std::string GivenNoise(const std::string& name, const ModelInstance& model, int size) {
-  const std::vector<double>& root = model.given_noise();
+std::string GivenNoise(const std::string& name, const std::vector<double>& root, int size) {
   if (root.empty()) return "";
   const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
   return "    noise of " + name + ": the covariance of the config, sigma " +
@@ -120,7 +119,7 @@ std::string GivenNoise(const std::string& name, const ModelInstance& model, int 
 
 std::string Motions(const System& system) {
   const bool driven = std::ranges::any_of(
-      system.motions, [](const MotionBinding& motion) { return motion.model.has_input(); });
+      system.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
   if (driven) rows[0].emplace_back("control input");
   std::string given;
@@ -130,12 +129,12 @@ std::string Motions(const System& system) {
       if (system.layout[id].status == BlockStatus::kConstant) continue;
       blocks.push_back(system.layout[id].name);
     }
-    const int noise = motion.model.noise_size();
-    const char* const kind = motion.model.discrete_noise() ? " discrete" : " continuous";
-    rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
+    const int noise = motion.model->noise_size();
+    const char* const kind = motion.model->discrete_noise() ? " discrete" : " continuous";
+    rows.push_back({motion.name, motion.model->name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise) + kind});
     if (driven) rows.back().push_back(InputText(motion));
-    given += GivenNoise(motion.name, motion.model.instance(), noise);
+    given += GivenNoise(motion.name, motion.model->description().sqrt_noise, noise);
   }
   return TextTable(rows, kIndent) + given;
 }
@@ -157,14 +156,14 @@ std::string Sensors(const System& system) {
       {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
   std::string given;
   for (const SensorBinding& sensor : system.sensors) {
-    TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
-    given += GivenNoise(sensor.name, sensor.model.instance(),
-                        sensor.model.measurement().geometry.tangent);
+    TextRow front = {sensor.name, sensor.stream, sensor.model->name()};
+    given += GivenNoise(sensor.name, sensor.model->description().sqrt_noise,
+                        sensor.model->measurement().geometry.tangent);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
       TextRow row = std::exchange(front, TextRow(3));
-      row.push_back(sensor.model.roles()[i].name);
-      if (sensor.model.roles()[i].landmark()) {
+      row.push_back(sensor.model->roles()[i].name);
+      if (sensor.model->roles()[i].landmark()) {
         row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
       } else if (role.block < 0) {
         row.insert(row.end(), {"(unbound)", "", ""});

@@ -9,9 +9,9 @@ namespace alidade::internal {
 
 std::vector<TextRow> LandmarkRows(const System& system) {
   const LandmarkOptions& options = *system.landmarks;
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   const auto sensor = std::ranges::find_if(system.sensors, sees);
-  const auto representation = RepresentationOf(sensor->model.roles());
+  const auto representation = RepresentationOf(sensor->model->roles());
   std::vector<TextRow> rows = {
       {"representation", representation ? ToString(*representation) : "the sensor's own"}};
   const auto add = [&rows](const std::string& what, const std::string& text) {

@@ -16,7 +16,7 @@ std::string GateText(const EkfOptions& options, const System& system) {
   if (options.gate >= 1.0) return "none: every measurement is used";
   std::map<int, std::string> thresholds;
   for (const SensorBinding& sensor : system.sensors) {
-    const int dof = sensor.model.measurement().geometry.tangent;
+    const int dof = sensor.model->measurement().geometry.tangent;
     thresholds[dof] = FixedText(ChiSquareQuantile(options.gate, dof), 2);
   }
   std::vector<std::string> parts;

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
+#include "alidade/plugin/abi_read.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade::internal {
 namespace {
@@ -64,7 +66,7 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
     const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
-    const AlidadeObservation seen = detail::Seen(nullptr, knows ? in[count] : nullptr);
+    const AlidadeObservation seen = Shown(nullptr, knows ? in[count] : nullptr);
     return sensor.eval(self, &seen, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
   };
   model.functions.push_back(std::move(predict));
@@ -78,7 +80,7 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
        [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
                                                    double* const* l, const std::int32_t* strides) {
          if (CopyGiven(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
-         const AlidadeObservation seen = detail::Seen(in[count], knows ? in[count + 1] : nullptr);
+         const AlidadeObservation seen = Shown(in[count], knows ? in[count + 1] : nullptr);
          return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
@@ -90,7 +92,7 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
          0,
          false,
          [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
-           const AlidadeObservation seen = detail::Seen(in[0], knows ? in[1] : nullptr);
+           const AlidadeObservation seen = Shown(in[0], knows ? in[1] : nullptr);
            return sensor.valid(self, &seen);
          }});
   }
@@ -162,8 +164,7 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     }
     const bool has_prior = prior > 0, apart = outputs.size() > 1;
     std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
-    const AlidadeObservation seen =
-        detail::Seen(in[k], knows ? in[k + (has_prior ? 2 : 1)] : nullptr);
+    const AlidadeObservation seen = Shown(in[k], knows ? in[k + (has_prior ? 2 : 1)] : nullptr);
     const std::int32_t code = sensor.initialise(
         self, &seen, all.data(), has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
         jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
@@ -279,7 +280,7 @@ ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
 }
 
 std::vector<int> ModelUnderTest::Initialised() const {
-  const SensorModel sensor(instance);
+  const PluginSensor sensor(instance);
   std::vector<int> roles(static_cast<std::size_t>(sensor.inverse().count));
   std::iota(roles.begin(), roles.end(), sensor.inverse().role);
   return roles;

@@ -32,13 +32,13 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
   RecordedEstimator recorded;
   recorded.name = named.name;
   for (const SensorBinding& binding : named.system.sensors) {
-    const Space& space = binding.model.measurement();
+    const Space& space = binding.model->measurement();
     RecordedSensor& sensor = recorded.sensors.emplace_back();
     sensor.name = binding.name;
     sensor.stream = binding.stream;
     sensor.unit = space.unit;
     sensor.tangent = space.geometry.tangent;
-    sensor.has_landmark = sensor.has_several = binding.model.has_landmark();
+    sensor.has_landmark = sensor.has_several = binding.model->has_landmark();
     recorded.width = std::max(recorded.width, space.geometry.ambient);
   }
   return recorded;
@@ -129,8 +129,8 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
   std::vector<std::string> header = {"t_s", "sensor"};
   std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const Space& space = system.sensors[s].model.measurement();
-    if (system.sensors[s].model.has_landmark()) continue;
+    const Space& space = system.sensors[s].model->measurement();
+    if (system.sensors[s].model->has_landmark()) continue;
     for (const BlockColumns& columns : blocks_) {
       const Block& block = system.layout[columns.id];
       if (block.status == BlockStatus::kConstant) continue;

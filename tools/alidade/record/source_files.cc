@@ -127,7 +127,7 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
   const auto& [model, truths] = found->second;
   const std::vector<const double*> roles = RolesAtTruth(frame.truth, truths);
   std::vector<double> z(m.values.size());
-  if (roles.empty() || model.Predict(roles.data(), z.data(), m.known.data()) != Status::kOk) {
+  if (roles.empty() || model->Predict(roles.data(), z.data(), m.known.data()) != Status::kOk) {
     return;
   }
   const auto stream = static_cast<std::size_t>(m.stream);

@@ -36,7 +36,7 @@ class SourceFiles {
   };
   /// The first sensor of a stream whose roles all have a truth.
   struct Expectation {
-    SensorModel model;
+    SharedSensor model;
     std::vector<int> truths;
   };
 

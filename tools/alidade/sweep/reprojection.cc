@@ -125,7 +125,7 @@ void ReprojectionOfRun::Begin(const Experiment& experiment) {
       const SensorBinding& sensor = named.system.sensors[s];
       if (!HasReprojection(sensor)) continue;
       places_.push_back({static_cast<int>(e), static_cast<int>(s)});
-      errors_.push_back({named.name, sensor.name, sensor.model.measurement().unit, {}});
+      errors_.push_back({named.name, sensor.name, sensor.model->measurement().unit, {}});
     }
   }
 }

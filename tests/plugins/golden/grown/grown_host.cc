@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "alidade/plugin/abi_read.h"
-#include "plugins/golden/golden_fixture.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade {
 namespace {
@@ -29,24 +29,24 @@ TEST_P(GrownHost, TakesWhatAPluginOf10DoesNotSayAsZero) {
   const AlidadeBuildTag tag = ReadBuildTag(Lent());
   EXPECT_TRUE(SaysNothing(tag));
   EXPECT_EQ(tag.abi_minor, 0);
-  const SensorModel line = Sensor("golden_line", "{gain: 1, sigma_m: 1}");
-  const MotionModel cart = Cart();
-  EXPECT_TRUE(SaysNothing(*line.instance().c().description));
-  EXPECT_TRUE(SaysNothing(*line.instance().c().sensor));
-  EXPECT_TRUE(SaysNothing(*cart.instance().c().description));
-  EXPECT_TRUE(SaysNothing(*cart.instance().c().motion));
-  EXPECT_EQ(line.instance().c().taken, nullptr);
+  const SharedSensor line = Sensor("golden_line", "{gain: 1, sigma_m: 1}");
+  const SharedMotion cart = Cart();
+  EXPECT_TRUE(SaysNothing(*dynamic_cast<const PluginSensor&>(*line).instance().c().description));
+  EXPECT_TRUE(SaysNothing(*dynamic_cast<const PluginSensor&>(*line).instance().c().sensor));
+  EXPECT_TRUE(SaysNothing(*dynamic_cast<const PluginMotion&>(*cart).instance().c().description));
+  EXPECT_TRUE(SaysNothing(*dynamic_cast<const PluginMotion&>(*cart).instance().c().motion));
+  EXPECT_EQ(dynamic_cast<const PluginSensor&>(*line).instance().c().taken, nullptr);
 }
 
 TEST_P(GrownHost, MayLendWhatAPluginOf10DoesNotKnow) {
   static const int kSomething = 0;
-  const SensorModel line = Sensor("golden_line", "{gain: 2, sigma_m: 1, height_m: 4}");
+  const SharedSensor line = Sensor("golden_line", "{gain: 2, sigma_m: 1, height_m: 4}");
   const double x = 4.0, b = 0.25, k = 1.0;
   const double* roles[] = {&x, &b};
-  AlidadeObservation seen = detail::Seen(nullptr, &k);
+  AlidadeObservation seen = internal::Shown(nullptr, &k);
   seen.taken = const_cast<int*>(&kSomething);
   double z = 0.0;
-  const AlidadeInstance& c = line.instance().c();
+  const AlidadeInstance& c = dynamic_cast<const PluginSensor&>(*line).instance().c();
   ASSERT_EQ(c.sensor->eval(c.self, &seen, roles, &z, nullptr, nullptr), ALIDADE_OK);
   EXPECT_NEAR(z, 2.0 * 5.0 + 0.25, 1e-12);
 

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/estimation/models.h"
+#include "alidade/model/autodiff_inverse.h"
+#include "alidade/model/model_members.h"
+
+/// Models of a program itself: the structs of authors (alidade/model/model.h) without a plugin.
+namespace alidade {
+namespace detail {
+
+/// The names and flags of a quantity that has this geometry; `parts`: of a product.
+Space SpaceOf(const Quantity& quantity, const Geometry& geometry,
+              const std::vector<Space>& parts = {});
+
+template <class G>
+Geometry GeometryOf(int size) {
+  return {static_cast<GeometryKind>(G::kGeometry), size,
+          G::kTangent == kDynamic ? size : G::kTangent};
+}
+
+template <class Model>
+Space MeasurementSpace() {
+  using Z = typename Model::Measurement;
+  std::vector<Space> parts;
+  std::vector<Geometry> geometries;
+  if constexpr (Z::kGeometry == ALIDADE_PRODUCT) {
+    constexpr auto quantities = Model::kParts;
+    static_assert(quantities.size() == Z::kParts, "one Quantity in kParts for each part");
+    Z::ForEachPart([&](auto part, int, int) {
+      geometries.push_back(GeometryOf<decltype(part)>(decltype(part)::kAmbient));
+      parts.push_back(SpaceOf(quantities[parts.size()], geometries.back()));
+    });
+    return SpaceOf(Model::kMeasurement, Geometry::Product(geometries), parts);
+  } else {
+    return SpaceOf(Model::kMeasurement, GeometryOf<Z>(Z::kAmbient));
+  }
+}
+
+/// Errors: kPlugin.
+OwnedRole OwnedRoleOf(const Owned& owned, const Space& role);
+
+template <class Model>
+SensorModel::Description DescribeSensor(const Model& model, std::string name) {
+  static_assert(CheckSensorMembers<Model>());
+  static_assert(std::tuple_size_v<decltype(Model::kRoles)> == Blocks<Model>::kCount,
+                "one Quantity in kRoles for each role");
+  SensorModel::Description description;
+  description.name = std::move(name);
+  ForEach(
+      [&](auto i) {
+        using G = SpaceAt<i, Model>;
+        description.roles.push_back(SpaceOf(Model::kRoles[i], GeometryOf<G>(G::kAmbient)));
+        if constexpr (HasOwnedRole<Model>::value) {
+          const Space& role = description.roles.back();
+          if ((role.flags & ALIDADE_ROLE_OWNED) != 0) {
+            description.owned[i] = OwnedRoleOf(model.OwnedRole(i), role);
+          }
+        }
+      },
+      typename Blocks<Model>::Indices{});
+  description.measurement = MeasurementSpace<Model>();
+  if constexpr (kHasKnown<Model>) {
+    description.known =
+        SpaceOf(Model::kKnown, GeometryOf<typename Model::Known>(Model::Known::kAmbient));
+  }
+  if constexpr (Model::kInitialises >= 0) {
+    description.inverse.role = Model::kInitialises;
+    description.inverse.prior_size = Model::kPrior;
+    for (int i = 0; i < Blocks<Model>::kCount; ++i) {
+      description.inverse.count += IsInitialised<Model>(i) ? 1 : 0;
+    }
+  }
+  description.has_validity = HasValid<Model>::value;
+  return description;
+}
+
+template <class Model>
+MotionModel::Description DescribeMotion(const Model& model, std::string name) {
+  static_assert(CheckMotionMembers<Model>());
+  static_assert(std::tuple_size_v<decltype(Model::kBlocks)> == Blocks<Model>::kCount,
+                "one Quantity in kBlocks for each block");
+  MotionModel::Description description;
+  description.name = std::move(name);
+  ForEach(
+      [&](auto i) {
+        using G = SpaceAt<i, Model>;
+        int size = G::kAmbient;
+        if constexpr (HasSize<Model>::value) size = model.Size(i);
+        description.blocks.push_back(SpaceOf(Model::kBlocks[i], GeometryOf<G>(size)));
+      },
+      typename Blocks<Model>::Indices{});
+  if constexpr (Model::Input::kAmbient > 0) {
+    description.input =
+        SpaceOf(Model::kInput, GeometryOf<typename Model::Input>(Model::Input::kAmbient));
+  }
+  description.noise_size = NoiseSizeOf(model);
+  description.discrete_noise = model.noise_kind() == NoiseKind::kDiscrete;
+  if constexpr (HasStationary<Model>::value) description.stationary = model.Stationary();
+  return description;
+}
+
+/// Runs `call` of a model; an exception becomes its error text.
+template <class Call>
+Status Guarded(const void* model, const Call& call) {
+  try {
+    return call();
+  } catch (const std::exception& e) {
+    return internal::NoteModelError(model, e.what());
+  }
+}
+
+}  // namespace detail
+
+/// A sensor by its author's struct.
+template <class Model>
+class DirectSensor final : public SensorModel {
+ public:
+  explicit DirectSensor(Model model, std::string name = "model")
+      : SensorModel(detail::DescribeSensor(model, std::move(name))), model_(std::move(model)) {}
+  const Model& model() const { return model_; }
+
+ private:
+  using Indices = typename detail::Blocks<Model>::Indices;
+
+  ALIDADE_FLATTEN Status DoEvaluate(const Observation& seen, const double* const* roles,
+                                    const Output& out) const override {
+    return detail::Guarded(this, [&] {
+      Status status = Status::kOk;
+      if (out.h != nullptr) {
+        status = alidade::Evaluate(model_, roles, out.h, out.jacobians, out.strides, seen.known);
+      }
+      if (status == Status::kOk && out.sqrt_noise != nullptr) {
+        constexpr int m = Model::Measurement::kTangent;
+        std::fill_n(out.sqrt_noise, m * m, 0.0);
+        detail::CallSqrtNoise(model_, roles, seen.known, seen.z, out.sqrt_noise, Indices{});
+      }
+      return status;
+    });
+  }
+  Status DoValid(const Observation& seen) const override {
+    if constexpr (detail::HasValid<Model>::value) {
+      return detail::Guarded(this, [&] {
+        return detail::CallValid(model_, seen.known, seen.z) ? Status::kOk : Status::kInvalid;
+      });
+    } else {
+      return Status::kOk;
+    }
+  }
+  Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
+                      const InverseOutput& out) const override {
+    if constexpr (Model::kInitialises >= 0) {
+      return detail::Guarded(this, [&] {
+        return InitialiseRole(model_, roles, seen.z, prior, out.y, out.jx, out.strides,
+                              MatrixRef{out.jz, Model::Measurement::kTangent},
+                              MatrixRef{out.jp, Model::kPrior}, seen.known);
+      });
+    } else {
+      return Status::kError;
+    }
+  }
+
+  Model model_;
+};
+
+/// A motion model by its author's struct.
+template <class Model>
+class DirectMotion final : public MotionModel {
+ public:
+  explicit DirectMotion(Model model, std::string name = "model")
+      : MotionModel(detail::DescribeMotion(model, std::move(name))), model_(std::move(model)) {}
+  const Model& model() const { return model_; }
+
+ private:
+  ALIDADE_FLATTEN Status DoStep(const double* const* blocks, const double* input, const double* w,
+                                double dt_s, const Output& out) const override {
+    return detail::Guarded(this, [&] {
+      Status status = Status::kOk;
+      if (out.next != nullptr) {
+        status = alidade::Step(model_, blocks, input, w, dt_s, out.next,
+                               MatrixRef{out.f, tangent_size()}, MatrixRef{out.g, noise_size()});
+      }
+      if (status == Status::kOk && out.sqrt_q != nullptr) {
+        std::fill_n(out.sqrt_q, noise_size() * noise_size(), 0.0);
+        detail::CallSqrtQ(model_, blocks, dt_s, MatrixRef{out.sqrt_q, noise_size()},
+                          typename detail::Blocks<Model>::Indices{});
+      }
+      return status;
+    });
+  }
+
+  Model model_;
+};
+
+template <class Model>
+SharedSensor MakeSensor(Model model, std::string name = "model") {
+  return std::make_shared<DirectSensor<Model>>(std::move(model), std::move(name));
+}
+template <class Model>
+SharedMotion MakeMotion(Model model, std::string name = "model") {
+  return std::make_shared<DirectMotion<Model>>(std::move(model), std::move(name));
+}
+
+}  // namespace alidade

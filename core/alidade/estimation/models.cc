@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/models.h"
+
+#include <cmath>
+#include <new>
+
+#include "alidade/base/all_finite.h"
+#include "alidade/base/error.h"
+
+namespace alidade {
+namespace {
+
+struct ModelError {
+  const void* model;
+  std::string text;
+};
+
+/// The last of this thread, each of another model.
+thread_local std::vector<ModelError> model_errors;
+
+std::string ErrorTextOf(const void* model) {
+  const auto found = std::ranges::find(model_errors, model, &ModelError::model);
+  return found == model_errors.end() ? "" : found->text;
+}
+
+std::vector<double> NeutralElement(const Geometry& geometry) {
+  std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(value.data());
+  return value;
+}
+
+}  // namespace
+
+std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
+  const std::ptrdiff_t n = geometry.tangent;
+  const auto fits = [](const std::vector<double>& values, std::ptrdiff_t size) {
+    return values.empty() || std::ssize(values) == size;
+  };
+  if (!fits(owned.mean, geometry.ambient) || !fits(owned.sqrt_prior, n * n) ||
+      !fits(owned.sqrt_density, n * n)) {
+    return "have another size than the role";
+  }
+  if (owned.mean.empty()) owned.mean = NeutralElement(geometry);
+  if (!AllFinite(owned.mean) || !AllFinite(owned.sqrt_prior) || !AllFinite(owned.sqrt_density) ||
+      !std::isfinite(owned.time_constant_s)) {
+    return "are not finite";
+  }
+  if (DistanceFrom(geometry, owned.mean.data()) > kUnitTolerance) {
+    return "have a mean that is not of unit length";
+  }
+  geometry.Normalise(owned.mean.data());
+  if (owned.dynamics != OwnedDynamics::kGaussMarkov) owned.time_constant_s = 0.0;
+  if (owned.dynamics == OwnedDynamics::kGaussMarkov && !(owned.time_constant_s > 0.0)) {
+    return "have a time constant of 0 s or less";
+  }
+  return {};
+}
+
+Status internal::NoteModelError(const void* model, const std::string& text) noexcept {
+  constexpr std::size_t kMost = 64;
+  try {
+    std::erase_if(model_errors, [&](const ModelError& error) { return error.model == model; });
+    if (model_errors.size() == kMost) model_errors.erase(model_errors.begin());
+    model_errors.push_back({model, text});
+  } catch (const std::bad_alloc&) {  // an error without a text
+  }
+  return Status::kError;
+}
+
+SensorModel::SensorModel(Description description) : description_(std::move(description)) {
+  if (!known().name.empty()) known_size_ = known().geometry.ambient;
+  for (const Space& role : roles()) tangents_.push_back(role.geometry.tangent);
+}
+
+SensorModel::~SensorModel() = default;
+
+bool SensorModel::has_landmark() const { return std::ranges::any_of(roles(), &Space::landmark); }
+
+OwnedRole SensorModel::owned(std::size_t role) const {
+  const auto found = description_.owned.find(role);
+  if (found != description_.owned.end()) return found->second;
+  return {NeutralElement(roles()[role].geometry)};
+}
+
+Status SensorModel::Initialise(const double* const* roles, const Observation& seen,
+                               const double* prior, InverseOutput out) const {
+  ALIDADE_EXPECTS(inverse().role >= 0);
+  if (out.strides == nullptr) out.strides = tangents_.data();
+  return DoInitialise(roles, seen, prior, out);
+}
+
+std::string SensorModel::error_text() const { return ErrorTextOf(this); }
+
+MotionModel::MotionModel(Description description)
+    : description_(std::move(description)),
+      zero_noise_(static_cast<std::size_t>(description_.noise_size) + 1) {
+  for (const Space& block : blocks()) tangent_size_ += block.geometry.tangent;
+}
+
+MotionModel::~MotionModel() = default;
+
+std::string MotionModel::error_text() const { return ErrorTextOf(this); }
+
+}  // namespace alidade

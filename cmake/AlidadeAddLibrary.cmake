@@ -46,7 +46,7 @@ function(alidade_add_library name)
     FILE_SET HEADERS BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR} FILES ${arg_HEADERS})
   set_target_properties(${target} PROPERTIES
     OUTPUT_NAME alidade-${name} EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION 0
-    LINK_DEPENDS ${exports})
+    LINK_DEPENDS ${exports} INSTALL_RPATH "$ORIGIN")
   alidade_warnings(${target})
   alidade_unity(${target} 40 4)
   target_compile_features(${target} PUBLIC cxx_std_20)

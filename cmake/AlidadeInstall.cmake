@@ -28,7 +28,12 @@ set(plugin_folder ${CMAKE_INSTALL_LIBDIR}/alidade/plugins)
 file(RELATIVE_PATH bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
 set_target_properties(alidade PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 install(TARGETS alidade)
-install(TARGETS alidade_model alidade_core alidade_tools EXPORT alidadeTargets FILE_SET HEADERS)
+# The component `estimation` is of use alone.
+install(TARGETS alidade_model alidade_estimation EXPORT alidadeEstimationTargets
+        COMPONENT estimation
+        LIBRARY NAMELINK_COMPONENT estimation
+        FILE_SET HEADERS COMPONENT estimation)
+install(TARGETS alidade_core alidade_tools EXPORT alidadeTargets FILE_SET HEADERS)
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
@@ -42,9 +47,11 @@ endforeach()
 
 foreach(folder IN ITEMS motion_models sensors)
   install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/alidade/${folder}
-          FILES_MATCHING PATTERN "*.h")
+          COMPONENT estimation FILES_MATCHING PATTERN "*.h")
 endforeach()
 
+install(EXPORT alidadeEstimationTargets NAMESPACE alidade:: DESTINATION ${package_folder}
+        COMPONENT estimation)
 install(EXPORT alidadeTargets NAMESPACE alidade:: DESTINATION ${package_folder})
 configure_package_config_file(cmake/alidadeConfig.cmake.in alidadeConfig.cmake
                               INSTALL_DESTINATION ${package_folder}
@@ -53,5 +60,5 @@ write_basic_package_version_file(alidadeConfigVersion.cmake COMPATIBILITY SameMi
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/alidadeConfig.cmake
               ${CMAKE_CURRENT_BINARY_DIR}/alidadeConfigVersion.cmake
               cmake/AlidadeAddPlugin.cmake
-        DESTINATION ${package_folder})
+        DESTINATION ${package_folder} COMPONENT estimation)
 install(FILES LICENSE TYPE DOC)

@@ -15,7 +15,7 @@
 #include "alidade/base/error.h"
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
-#include "alidade/estimation/system.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/plugin_host.h"
 #include "sensor_schedule.h"
 
@@ -95,7 +95,7 @@ class Models : public Source {
     const auto overrides = arguments.entry.Find("overrides");
     const Config truth =
         overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
-    system_ = BuildSystem(truth.root(), *arguments.host, {});
+    system_ = ReadProblem(truth.root(), *arguments.host, {});
     start_s_ = system_.initial_time_s.value_or(0.0);
     if (!overrides) return;
     for (const auto& [key, node] : overrides->Entries()) {

@@ -14,6 +14,7 @@
 
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
 #include "sensors/inverse_depth_feature.h"
 
@@ -65,11 +66,11 @@ TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
   const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]");
   const PluginHost host;
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
-  System system = BuildSystem(config.root(), host, {"pixels"});
+  System system = ReadProblem(config.root(), host, {"pixels"});
   const std::vector<StreamInfo> streams = source->streams();
   Ekf by_config(system, {}, streams);
   const Config other = WithCovariance("[[9, 0], [0, 9]]");
-  Ekf by_measurement(BuildSystem(other.root(), host, {"pixels"}), {}, streams);
+  Ekf by_measurement(ReadProblem(other.root(), host, {"pixels"}), {}, streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
   system.sensors.at(0).model =
       MakeSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");

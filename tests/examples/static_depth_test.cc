@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "alidade/estimation/ekf.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
 #include "examples/09_static_depth/measurements.h"
 
@@ -42,7 +43,7 @@ TEST(StaticDepth, ItsNumbersAreThoseOfExample05) {
 TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
   const Config config = Example05();
   const PluginHost host;
-  const System system = BuildSystem(config.root(), host, {});
+  const System system = ReadProblem(config.root(), host, {});
   EkfOptions options;
   options.gate = 0.9999;
   options.fuse = Fuse::kPerMeasurement;

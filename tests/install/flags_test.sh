@@ -4,7 +4,7 @@
 # tests/install/flags_test.sh FLAG FOLDER OPTIONS COMPILER [CXXFLAG...] INCLUDE...
 #
 # Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by commas) that
-# the target alidade::core adds, and runs it against the libraries in FOLDER, built without it. If
+# the target alidade::estimation adds, and runs it against the libraries in FOLDER, built without it. If
 # the processor lacks the instructions it is compiled only. Without OPTIONS the program must either
 # mean the same or be refused in words that name the remedy.
 set -euo pipefail
@@ -22,7 +22,7 @@ done
 flags+=("$flag")
 source=tests/install/outsider/filter.cc
 
-"$compiler" "${flags[@]}" "${options[@]}" "$source" -L"$folder" -lalidade-tools -lalidade-core \
+"$compiler" "${flags[@]}" "${options[@]}" "$source" -L"$folder" -lalidade-tools -lalidade-core -lalidade-estimation \
   -Wl,-rpath,"$folder" \
   -o "$work/filter"
 if [[ $flag == -mavx2 ]] && ! grep -qw avx2 /proc/cpuinfo; then
@@ -39,13 +39,13 @@ grep -q '__SANITIZE_ADDRESS__' <<<"$macros" && remedy=-DEIGEN_MALLOC_ALREADY_ALI
 grep -q '__AVX__' <<<"$macros" && remedy=-DEIGEN_MAX_ALIGN_BYTES=16
 if "$compiler" "${flags[@]}" -fsyntax-only "$source" 2>"$work/errors"; then
   [[ -z $remedy ]] && exit
-  echo "error: $flag is not refused without the options of alidade::core" >&2
+  echo "error: $flag is not refused without the options of alidade::estimation" >&2
   exit 1
 fi
-if [[ -z $remedy ]] || ! grep -qF -- "link the CMake target alidade::core" "$work/errors" ||
+if [[ -z $remedy ]] || ! grep -qF -- "link the CMake target alidade::estimation" "$work/errors" ||
   ! grep -qF -- "$remedy" "$work/errors"; then
   cat "$work/errors" >&2
   echo "error: $flag is not refused in the words expected, with the remedy '$remedy'" >&2
   exit 1
 fi
-echo "$flag: refused without the options of alidade::core"
+echo "$flag: refused without the options of alidade::estimation"

@@ -8,11 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/config/config.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/estimation/models.h"
 #include "alidade/estimation/robust_loss.h"
-#include "alidade/plugin/plugin_host.h"
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/state.h"
 
@@ -71,7 +69,7 @@ struct Prior {
 };
 
 /// The problem that every estimator is given: blocks, how they move, what measures them, how they
-/// start. Built from a config, or by hand.
+/// start.
 struct System {
   StateLayout layout;
   std::vector<MotionBinding> motions;
@@ -86,11 +84,6 @@ struct System {
   /// -1 where there is none.
   int FindSensor(std::string_view name) const;
 };
-
-/// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of a config's root. `only`
-/// keeps named sensors, in its own order, and the state entries that they touch; empty: everything.
-/// Errors: kBadConfig with place and remedy, kPlugin.
-System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
 
 namespace internal {
 

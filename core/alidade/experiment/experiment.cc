@@ -7,6 +7,7 @@
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/named_estimator.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/experiment/truth_match.h"
@@ -262,7 +263,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
   // Every sensor is checked, whether or not an estimator uses it.
-  const System whole = BuildSystem(root, host, {});
+  const System whole = ReadProblem(root, host, {});
   internal::CheckStreams(root, whole, streams);
   experiment.out_of_sequence.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);

@@ -10,6 +10,7 @@
 #include "alidade/estimation/compression.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
@@ -355,7 +356,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (use && use->is_map()) use->Declare("accepted_by");
   RefuseUnsupportedKeys(named.type, entry);
   entry.RejectUnread();
-  named.system = BuildSystem(own.root(), host, only);
+  named.system = ReadProblem(own.root(), host, only);
   RefuseUnsupported(named.type, support, own.root(), named.system);
   if (of_core != nullptr) {
     RefuseLoneMatches(entry, named.system);

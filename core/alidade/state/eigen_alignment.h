@@ -7,15 +7,17 @@
 
 /// Matrices of Eigen go in and out of the library. It aligns them to 16 bytes and takes their
 /// memory from malloc: so must a program that uses them, whatever its flags. The CMake target
-/// alidade::core sees to it.
-static_assert(EIGEN_MAX_ALIGN_BYTES == 16 && EIGEN_MAX_STATIC_ALIGN_BYTES == 16,
-              "Eigen aligns matrices in another way than libalidade-core, because of -mavx, "
-              "-march=native or a macro of Eigen: link the CMake target alidade::core, or compile "
-              "every source with -DEIGEN_MAX_ALIGN_BYTES=16");
-static_assert(EIGEN_MALLOC_ALREADY_ALIGNED == 1,
-              "Eigen allocates memory in another way than libalidade-core, because of "
-              "-fsanitize=address or a macro of Eigen: link the CMake target alidade::core, or "
-              "compile every source with -DEIGEN_MALLOC_ALREADY_ALIGNED=1");
+/// alidade::estimation sees to it.
+static_assert(
+    EIGEN_MAX_ALIGN_BYTES == 16 && EIGEN_MAX_STATIC_ALIGN_BYTES == 16,
+    "Eigen aligns matrices in another way than libalidade-estimation, because of -mavx, "
+    "-march=native or a macro of Eigen: link the CMake target alidade::estimation, or compile "
+    "every source with -DEIGEN_MAX_ALIGN_BYTES=16");
+static_assert(
+    EIGEN_MALLOC_ALREADY_ALIGNED == 1,
+    "Eigen allocates memory in another way than libalidade-estimation, because of "
+    "-fsanitize=address or a macro of Eigen: link the CMake target alidade::estimation, or "
+    "compile every source with -DEIGEN_MALLOC_ALREADY_ALIGNED=1");
 static_assert(!Eigen::MatrixXd::IsRowMajor && std::is_same_v<Eigen::Index, std::ptrdiff_t>,
-              "Eigen stores matrices in another way than libalidade-core: compile without "
+              "Eigen stores matrices in another way than libalidade-estimation: compile without "
               "EIGEN_DEFAULT_TO_ROW_MAJOR and EIGEN_DEFAULT_DENSE_INDEX_TYPE");

@@ -6,6 +6,7 @@
 
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/experiment.h"
+#include "alidade/experiment/read_problem.h"
 #include "batch_landmarks_fixture.h"
 #include "plugins/scene/scene_fixture.h"
 
@@ -86,7 +87,7 @@ const std::string kDrawn =
 TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const testing::MadeScene made = testing::MakeScene(kDrawn);
   const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");
-  const System system = BuildSystem(config.root(), testing::Shipped(), {});
+  const System system = ReadProblem(config.root(), testing::Shipped(), {});
   const Config entry = Config::FromText("type: ceres_batch", "batch.yaml");
   const auto batch = CreateEstimator(testing::Shipped(), "ceres_batch", entry.root())(
       system, made.scene->streams());

@@ -4,7 +4,7 @@
 // entry.
 #include <cmath>
 
-#include "alidade/estimation/system.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/plugin_host.h"
 #include "host_fixture.h"
 
@@ -56,7 +56,7 @@ const std::string kPixels =
 
 System PixelsWith(const std::string& keys) {
   const Config config = Config::FromText(kPixels + "    " + keys + "\n", "test.yaml");
-  return BuildSystem(config.root(), ShippedModels(), {});
+  return ReadProblem(config.root(), ShippedModels(), {});
 }
 
 // [1 0.6; 0.6 4] = L L', L = [1 0; 0.6 sqrt(4 - 0.36)], px

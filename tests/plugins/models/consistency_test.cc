@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "alidade/base/statistics.h"
+#include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
 #include "alidade/plugin/plugin_host.h"
 #include "alidade/state/dense_algebra.h"

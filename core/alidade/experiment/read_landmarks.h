@@ -4,7 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "alidade/config/config.h"
 #include "alidade/estimation/system.h"
+#include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
 

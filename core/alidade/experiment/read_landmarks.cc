@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/read_landmarks.h"
+#include "alidade/experiment/read_landmarks.h"
 
 #include <algorithm>
 #include <functional>

@@ -1,0 +1,545 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/experiment/read_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "alidade/base/words.h"
+#include "alidade/config/tree.h"
+#include "alidade/estimation/owned_state.h"
+#include "alidade/estimation/time_offset.h"
+#include "alidade/experiment/read_landmarks.h"
+#include "alidade/state/quaternion_sign.h"
+
+namespace alidade {
+namespace {
+
+using internal::NamesOf;
+
+/// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
+std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
+  std::vector<double> mean;
+  if (geometry.kind == GeometryKind::kUnitQuaternion) {
+    for (const char* part : {"w", "x", "y", "z"}) mean.push_back(node.At(part).Number());
+    node.RejectUnread();
+  } else {
+    mean = node.Numbers(geometry.ambient);
+  }
+  if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
+    node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
+  }
+  geometry.Normalise(mean.data());
+  if (geometry.kind == GeometryKind::kUnitQuaternion) internal::ChooseSign({}, mean);
+  return mean;
+}
+
+/// Exactly one of sigma, covariance.
+Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
+  const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
+  if (sigma.has_value() == covariance.has_value()) {
+    node.Fail("needs its uncertainty once", "sigma or covariance");
+  }
+  if (covariance) {
+    const std::vector<double> values = covariance->Covariance(size);
+    return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
+  }
+  std::vector<double> values = sigma->Numbers();
+  if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
+  if (values.size() != static_cast<std::size_t>(size)) {
+    sigma->Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+  }
+  const Eigen::VectorXd sigmas = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  if (sigmas.minCoeff() < 0.0) sigma->Fail("negative", ">= 0");
+  return sigmas.cwiseAbs2().asDiagonal();
+}
+
+/// Blocks of the entry that a list such as `consider: [depth]` names.
+std::vector<std::string> ReadNames(const Node& entry, const char* key,
+                                   const std::vector<std::string>& accepted) {
+  std::vector<std::string> names;
+  const auto list = entry.Find(key);
+  if (!list) return names;
+  for (const Node& item : list->Items()) {
+    const std::string name = item.Text();
+    if (std::find(accepted.begin(), accepted.end(), name) == accepted.end()) {
+      item.Fail("no block '" + name + "' in this entry", {}, Nearest(name, accepted));
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+bool Contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Names of the blocks as the entry renames them, in the order of the model.
+std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
+  std::vector<std::string> names = NamesOf(model.blocks());
+  const auto renamed = entry.Find("blocks");
+  for (std::string& name : names) {
+    const auto given = renamed ? renamed->Find(name) : std::nullopt;
+    if (given) name = given->Text();
+    internal::ExpectName(name, given.value_or(entry), "a block");
+  }
+  if (!renamed) return names;
+  renamed->RejectUnread();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (std::count(names.begin(), names.end(), names[i]) > 1) {
+      renamed->Fail("two blocks are called '" + names[i] + "'", "a name of its own for each block");
+    }
+  }
+  return names;
+}
+
+void ReadPrior(const Node& initial, const Block& block, BlockId id, System& system) {
+  Prior prior;
+  prior.block = id;
+  if (const auto from = initial.Find("from_measurement")) {
+    prior.from = from->Text();
+  } else {
+    prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
+    if (block.status != BlockStatus::kConstant) {
+      prior.covariance = ReadCovariance(initial, block.geometry().tangent);
+    } else {
+      for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
+    }
+  }
+  initial.RejectUnread();
+  system.priors.push_back(std::move(prior));
+}
+
+/// `input: {stream: NAME, timeout_s: S}` of a model that takes a control input.
+InputBinding ReadInput(const Node& entry, const MotionModel& model) {
+  constexpr double kMostSeconds = 1e9;
+  InputBinding binding;
+  if (!model.has_input()) {
+    if (const auto input = entry.Find("input")) {
+      input->Fail("model '" + model.name() + "' takes no control input", "the key left out");
+    }
+    return binding;
+  }
+  const std::string needed_by =
+      "the control input " + model.input().name + " of model " + model.name();
+  const Node input = entry.At("input", needed_by);
+  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
+  binding.stream = input.At("stream", needed_by).Text();
+  if (const auto timeout = input.Find("timeout_s")) {
+    binding.timeout_s = timeout->Number(0.0, kMostSeconds, true);
+  }
+  input.RejectUnread();
+  return binding;
+}
+
+void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
+                    System& system) {
+  const std::string model_name = entry.At("model", "a state entry").Text();
+  MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
+  binding.input = ReadInput(entry, *binding.model);
+  const std::vector<std::string> names = ReadBlockNames(entry, *binding.model);
+  const auto considered = ReadNames(entry, "consider", names);
+  const auto constant = ReadNames(entry, "constant", names);
+  for (const std::string& both : constant) {
+    if (!Contains(considered, both)) continue;
+    entry.At("constant")
+        .Fail("block '" + both + "' is in `consider` too",
+              "a block in one of them: a constant is exact, a consider state uncertain");
+  }
+  const Node initial = entry.At("initial", "the state entry '" + name + "'");
+  const std::vector<Space>& spaces = binding.model->blocks();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
+                       !Contains(considered, names[i]);
+    const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
+                               : Contains(considered, names[i])      ? BlockStatus::kConsider
+                                                                     : BlockStatus::kEstimated;
+    const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
+    binding.blocks.push_back(id);
+    if (known) {
+      Prior prior{
+          id, std::vector<double>(static_cast<std::size_t>(spaces[i].geometry.ambient)), {}, {}};
+      spaces[i].geometry.Identity(prior.mean.data());
+      system.priors.push_back(std::move(prior));
+      continue;
+    }
+    ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
+              system);
+  }
+  initial.RejectUnread();
+  entry.RejectUnread();
+  system.motions.push_back(std::move(binding));
+}
+
+/// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
+std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
+  const auto n = static_cast<std::size_t>(size);
+  std::vector<double> sigma = node.Numbers();
+  if (sigma.size() == 1) sigma.assign(n, sigma[0]);
+  if (sigma.size() != n) {
+    node.Fail(std::to_string(sigma.size()) + " numbers", std::to_string(size) + ", or one");
+  }
+  std::vector<double> root(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sigma[i] < 0.0) node.Fail("negative", ">= 0");
+    root[i * n + i] = sigma[i];
+  }
+  return root;
+}
+
+/// `constant`, {random_walk: sigma after one second} or {gauss_markov: {sigma, time_constant_s}},
+/// sigma that of the stationary process.
+void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
+  owned.dynamics = OwnedDynamics::kConstant;
+  owned.sqrt_density.clear();
+  constexpr const char* kKinds =
+      "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, time_constant_s: S}}";
+  if (!node.is_map()) {
+    if (node.Text() != "constant") node.Fail("no kind of dynamics", kKinds);
+    return;
+  }
+  const auto walk = node.Find("random_walk"), markov = node.Find("gauss_markov");
+  if (walk.has_value() == markov.has_value()) {
+    node.RejectUnread();
+    node.Fail("not one kind of dynamics", kKinds);
+  }
+  node.RejectUnread();
+  if (walk) {
+    owned.dynamics = OwnedDynamics::kRandomWalk;
+    owned.sqrt_density = ReadSqrtDiagonal(*walk, size);
+    return;
+  }
+  constexpr double kMostSeconds = 1e9;
+  owned.dynamics = OwnedDynamics::kGaussMarkov;
+  owned.time_constant_s =
+      markov->At("time_constant_s", "gauss_markov").Number(0.0, kMostSeconds, true);
+  owned.sqrt_density = ReadSqrtDiagonal(markov->At("sigma", "gauss_markov"), size);
+  for (double& one : owned.sqrt_density) one *= std::sqrt(2.0 / owned.time_constant_s);
+  markov->RejectUnread();
+}
+
+/// What a sensor entry says of the states that the sensor owns: `initial` and `dynamics` by role,
+/// `consider` and `constant` as lists, `time_offset_s`. Where it says nothing the model does.
+class OwnedReader {
+  static constexpr const char* kTimeOffset = "time_offset";
+
+ public:
+  OwnedReader(std::string name, const Node& entry, const Node& roles, const SensorModel& model)
+      : name_(std::move(name)), entry_(entry), offset_(entry.Find("time_offset_s")) {
+    std::vector<std::string> owned;
+    for (const Space& role : model.roles()) {
+      if ((role.flags & ALIDADE_ROLE_OWNED) != 0 && !roles.Find(role.name)) {
+        owned.push_back(role.name);
+      }
+    }
+    if (offset_) owned.emplace_back(kTimeOffset);
+    if (owned.empty()) return;
+    considered_ = ReadNames(entry, "consider", owned);
+    constant_ = ReadNames(entry, "constant", owned);
+    for (const char* key : {"initial", "dynamics"}) entry.Declare(key);
+    initial_ = entry.Find("initial");
+    dynamics_ = entry.Find("dynamics");
+  }
+
+  /// Declares the block of a role, `SENSOR.ROLE`, with its prior and its motion.
+  BlockId Add(const Space& role, OwnedRole owned, System& system) {
+    const auto taken = [&](const Block& block) { return block.owner == name_; };
+    if (!std::exchange(added_, true) && std::ranges::any_of(system.layout.blocks(), taken)) {
+      entry_.Fail(
+          "it brings the state '" + name_ + '.' + role.name + "', and a state entry has its name",
+          "another name for the sensor, or the role bound under `roles`");
+    }
+    const bool is_offset = role.name == kTimeOffset;
+    const auto own = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
+                     : initial_ ? initial_->Find(role.name)
+                                : std::nullopt;
+    const bool considered = Contains(considered_, role.name);
+    const bool constant = Contains(constant_, role.name) || (!own && owned.sqrt_prior.empty());
+    if (considered && constant) {
+      entry_.At("consider")
+          .Fail("'" + role.name + "' is constant: it has no uncertainty",
+                "`initial` with a sigma, and `constant` without it");
+    }
+    const BlockId id = system.layout.Declare(name_ + '.' + role.name, name_, role,
+                                             constant     ? BlockStatus::kConstant
+                                             : considered ? BlockStatus::kConsider
+                                                          : BlockStatus::kEstimated);
+    if (own) {
+      if (const auto from = own->Find("from_measurement")) {
+        from->Fail("a state that a sensor owns starts from no measurement", "mean and sigma");
+      }
+      ReadPrior(*own, system.layout[id], id, system);
+      owned.mean = system.priors.back().mean;
+    } else {
+      const int n = role.geometry.tangent;
+      Prior prior{id, owned.mean, {}, {}};
+      if (!constant) {
+        const Eigen::Map<const RowMajor> root(owned.sqrt_prior.data(), n, n);
+        prior.covariance = root * root.transpose();
+      }
+      system.priors.push_back(std::move(prior));
+    }
+    if (is_offset) CheckOffset(system.priors.back());
+    const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt;
+    if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, owned);
+    if (constant && dynamics && owned.dynamics != OwnedDynamics::kConstant) {
+      dynamics->Fail("'" + role.name + "' is constant",
+                     "a sigma where it starts, or the key left out");
+    }
+    if (constant) owned.dynamics = OwnedDynamics::kConstant;
+    system.motions.push_back({name_, internal::OwnedMotion(role.geometry, owned), {id}});
+    return id;
+  }
+
+  /// The time offset of a sensor whose roles are bound; nothing where none is given, or 0.
+  void AddTimeOffset(System& system, SensorBinding& sensor) {
+    if (!offset_ || (!offset_->is_map() && offset_->Number() == 0.0)) return;
+    OwnedRole at_first;
+    at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
+    const Space space{
+        kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
+    const std::string why =
+        internal::OffsetInTime(system, Add(space, std::move(at_first), system), sensor);
+    if (!why.empty()) offset_->Fail(why, "the key left out");
+  }
+
+  void RejectUnread() const {
+    if (initial_) initial_->RejectUnread();
+    if (dynamics_) dynamics_->RejectUnread();
+  }
+
+ private:
+  /// Of a clock that is off by more than a filter can look ahead.
+  void CheckOffset(const Prior& prior) const {
+    constexpr double kMostSeconds = 60.0;
+    const double sigma = prior.covariance.size() == 0 ? 0.0 : std::sqrt(prior.covariance(0, 0));
+    if (std::abs(prior.mean[0]) <= kMostSeconds && sigma <= kMostSeconds) return;
+    offset_->Fail("more than a motion model can look ahead", "at most 60 s, sigma too");
+  }
+
+  std::string name_;
+  Node entry_;
+  bool added_ = false;  ///< one of its states
+  std::optional<Node> offset_, initial_, dynamics_;
+  std::vector<std::string> considered_, constant_;
+};
+
+BlockId FindBlock(const Node& node, const System& system) {
+  const std::string name = node.Text();
+  const BlockId id = system.layout.Find(name);
+  if (id >= 0) return id;
+  const std::vector<std::string> names = NamesOf(system.layout.blocks());
+  node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
+            Nearest(name, names));
+}
+
+RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& model,
+                     const System& system) {
+  RoleBinding binding;
+  if (!node.is_map()) {
+    binding.block = FindBlock(node, system);
+  } else {
+    binding.block = FindBlock(node.At("block", "a role"), system);
+    if (const auto mode = node.Find("mode")) {
+      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
+    }
+    if (const auto at = node.Find("jacobian_at")) {
+      binding.jacobian_at = static_cast<JacobianAt>(at->Choice({"prediction", "measurement"}));
+      const int initialised = model.inverse().role;
+      if (binding.jacobian_at == JacobianAt::kMeasurement &&
+          (initialised < 0 ||
+           model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
+        at->Fail("model '" + model.name() + "' has no inverse measurement model of role '" +
+                     role.name + "'",
+                 "prediction");
+      }
+    }
+    node.RejectUnread();
+  }
+  const Block& block = system.layout[binding.block];
+  if (!(block.geometry() == role.geometry)) {
+    node.Fail(
+        "block '" + block.name + "' is of geometry " + ToString(block.geometry()),
+        ToString(role.geometry) + ", as role '" + role.name + "' of model '" + model.name() + "'");
+  }
+  return binding;
+}
+
+/// `{huber: k}` or `{cauchy: k}`.
+RobustLoss ReadLoss(const Node& node) {
+  const auto huber = node.Find("huber"), cauchy = node.Find("cauchy");
+  if (huber.has_value() == cauchy.has_value()) {
+    node.RejectUnread();
+    node.Fail("not one loss with its scale", "one of {huber: SCALE}, {cauchy: SCALE}");
+  }
+  const Node& scale = huber ? *huber : *cauchy;
+  node.RejectUnread();
+  return {huber ? LossKind::kHuber : LossKind::kCauchy,
+          scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
+}
+
+SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
+                         System& system) {
+  const std::string model_name = entry.At("model", "a sensor entry").Text();
+  SensorBinding binding{name,
+                        entry.At("stream", "sensor '" + name + "'").Text(),
+                        host.CreateSensor(model_name, entry),
+                        {},
+                        {}};
+  if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
+  const Node roles = entry.At("roles", "sensor '" + name + "'");
+  OwnedReader owned(name, entry, roles, *binding.model);
+  for (std::size_t i = 0; i < binding.model->roles().size(); ++i) {
+    const Space& role = binding.model->roles()[i];
+    if (role.landmark()) {
+      binding.roles.push_back({});
+      continue;
+    }
+    const auto node = roles.Find(role.name);
+    if (!node && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+      binding.roles.push_back({owned.Add(role, binding.model->owned(i), system)});
+      continue;
+    }
+    if (!node && role.optional()) {
+      binding.roles.push_back({});
+      continue;
+    }
+    const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
+    binding.roles.push_back(ReadRole(given, role, *binding.model, system));
+    const BlockId block = binding.roles.back().block;
+    const auto same = [block](const RoleBinding& r) { return r.block == block; };
+    if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
+      given.Fail("block '" + system.layout[block].name + "' already fills another role",
+                 "a block of its own for each role");
+    }
+  }
+  if (binding.model->has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
+  owned.AddTimeOffset(system, binding);
+  roles.RejectUnread();
+  owned.RejectUnread();
+  entry.RejectUnread();
+  return binding;
+}
+
+/// Checks that every block that starts from a sensor can do so: the sensor measures it, and the
+/// blocks it needs start without waiting for this one.
+void CheckInitialisation(const Node& root, const System& system) {
+  const auto place = [&](BlockId id) {
+    const Block& block = system.layout[id];
+    const std::string name = block.name.substr(block.owner.size() + 1);
+    return root.At("state").At(block.owner).At("initial").At(name).At("from_measurement");
+  };
+  const auto prior_of = [&](BlockId id) -> const Prior& {
+    return *std::find_if(system.priors.begin(), system.priors.end(),
+                         [id](const Prior& p) { return p.block == id; });
+  };
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty()) continue;
+    const int sensor = system.FindSensor(prior.from);
+    if (sensor < 0) {
+      place(prior.block)
+          .Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
+                Nearest(prior.from, NamesOf(system.sensors)));
+    }
+    const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
+    const int role = binding.model->inverse().role;
+    if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
+      place(prior.block)
+          .Fail("sensor '" + prior.from + "' does not determine this block",
+                "a sensor whose inverse measurement model is this block");
+    }
+  }
+  std::vector<BlockId> chain;
+  const std::function<void(BlockId)> follow = [&](BlockId id) {
+    const Prior& prior = prior_of(id);
+    if (prior.from.empty()) return;
+    if (std::find(chain.begin(), chain.end(), id) != chain.end()) {
+      std::string text;
+      for (const BlockId b : chain) text += system.layout[b].name + " <- ";
+      place(id).Fail("cyclic: " + text + system.layout[id].name,
+                     "one block of the cycle with a mean of its own");
+    }
+    chain.push_back(id);
+    const SensorBinding& binding =
+        system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
+    for (const RoleBinding& role : binding.roles) {
+      if (role.block >= 0 && role.block != id) follow(role.block);
+    }
+    chain.pop_back();
+  };
+  for (const Prior& prior : system.priors) follow(prior.block);
+}
+
+/// The system without the state entries that no sensor touches.
+System WithoutUntouched(System system) {
+  std::vector<std::string> touched;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block >= 0) touched.push_back(system.layout[role.block].owner);
+    }
+  }
+  System kept;
+  kept.initial_time_s = system.initial_time_s;
+  kept.landmarks = std::move(system.landmarks);
+  std::vector<BlockId> moved;
+  for (const Block& block : system.layout.blocks()) {
+    moved.push_back(Contains(touched, block.owner)
+                        ? kept.layout.Declare(block.name, block.owner, block.space, block.status)
+                        : -1);
+  }
+  const auto follow = [&moved](BlockId& id) {
+    if (id >= 0) id = moved[static_cast<std::size_t>(id)];
+  };
+  for (MotionBinding& motion : system.motions) {
+    if (!Contains(touched, motion.name)) continue;
+    for (BlockId& id : motion.blocks) follow(id);
+    kept.motions.push_back(std::move(motion));
+  }
+  for (Prior& prior : system.priors) {
+    follow(prior.block);
+    if (prior.block >= 0) kept.priors.push_back(std::move(prior));
+  }
+  for (SensorBinding& sensor : system.sensors) {
+    for (RoleBinding& role : sensor.roles) follow(role.block);
+    kept.sensors.push_back(std::move(sensor));
+  }
+  return kept;
+}
+
+}  // namespace
+
+System ReadProblem(const Node& root, const PluginHost& host, const std::vector<std::string>& only) {
+  System system;
+  for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a state entry");
+    if (name == "landmarks") entry.Fail("'landmarks' is not a state entry", "another name");
+    ReadStateEntry(name, entry, host, system);
+  }
+  std::vector<SensorBinding> sensors;
+  for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a sensor");
+    sensors.push_back(ReadSensor(name, entry, host, system));
+  }
+  system.landmarks = internal::ReadLandmarks(root, sensors);
+  if (only.empty()) {
+    system.sensors = std::move(sensors);
+  } else {
+    for (const std::string& name : only) {
+      for (const SensorBinding& sensor : sensors) {
+        if (sensor.name == name) system.sensors.push_back(sensor);
+      }
+    }
+  }
+  constexpr double kLatestSeconds = 4.6e9;  // two timestamps may differ by twice that
+  if (const auto start = root.Find("initial_time_s"))
+    system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
+  if (!only.empty()) system = WithoutUntouched(std::move(system));
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
+  if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
+  CheckInitialisation(root, system);
+  return system;
+}
+
+}  // namespace alidade

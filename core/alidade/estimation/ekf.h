@@ -40,6 +40,8 @@ class Ekf : public Filter {
 
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Ekf(const System& problem, const EkfOptions& options = {})
+      : Ekf(problem, options, problem.streams) {}
 };
 
 }  // namespace alidade

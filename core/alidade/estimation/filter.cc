@@ -116,6 +116,8 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
   return Process(frame);
 }
 
+BlockEstimate Filter::Estimate(BlockId id) const { return state().Estimate(id); }
+
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
   later.Process({timestamp, {}});

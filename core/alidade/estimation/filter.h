@@ -66,11 +66,18 @@ inline EkfOptions WithoutRecovery(EkfOptions options) {
 
 }  // namespace internal
 
-/// A value of one stream, as it comes.
+/// A measurement of a sensor, or a control input of a state, as it comes.
 struct Reading {
-  int stream = 0;  ///< Filter::stream
+  Reading(int number, std::vector<double> numbers, std::int64_t of_landmark = -1)
+      : stream(number), values(std::move(numbers)), landmark(of_landmark) {}
+  Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t of_landmark = -1)
+      : Reading(sensor.stream, std::move(z), of_landmark) {}
+  /// Of a state whose model takes a control input.
+  Reading(const StateHandle& state, std::vector<double> u) : Reading(state.input, std::move(u)) {}
+
+  int stream;  ///< Filter::stream
   std::vector<double> values;
-  std::int64_t landmark = -1;
+  std::int64_t landmark;
   std::vector<double> covariance = {};  ///< row-major, overrides the model's noise; empty: none
   std::vector<double> known = {};       ///< as many as its sensors take; mostly none
 };
@@ -131,6 +138,11 @@ class Filter : public Estimator {
   /// numbers of another size than its sensors take, or a quaternion or direction whose length is
   /// off by more than 1e-3.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
+  const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
+    return Push(timestamp, {Reading(sensor, {z})});
+  }
+  /// The estimate of a block that has a value. ContractViolation if it has none yet.
+  BlockEstimate Estimate(BlockId block) const;
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
   /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
   State At(Timestamp timestamp) const;

@@ -39,6 +39,8 @@ class Iekf : public Filter {
   /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an
   /// option is out of its range.
   Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Iekf(const System& problem, const IekfOptions& options = {})
+      : Iekf(problem, options, problem.streams) {}
 };
 
 }  // namespace alidade

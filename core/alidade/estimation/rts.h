@@ -36,6 +36,8 @@ class RtsSmoother : public Estimator {
   /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more
   /// than kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit RtsSmoother(const System& problem, const EkfOptions& options = {})
+      : RtsSmoother(problem, options, problem.streams) {}
   ~RtsSmoother() override;
 
   void Start(Timestamp timestamp) override;

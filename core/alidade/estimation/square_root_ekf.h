@@ -36,6 +36,8 @@ class SquareRootEkf : public Filter {
   /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more
   /// than kSupport.
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit SquareRootEkf(const System& problem, const EkfOptions& options = {})
+      : SquareRootEkf(problem, options, problem.streams) {}
 
   /// L, n x n; ContractViolation where another kind of filter was assigned. state().covariance() is
   /// L L' in double precision, and so has half its digits.

@@ -2,12 +2,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "alidade/estimation/direct_models.h"
+#include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/estimation/models.h"
 #include "alidade/estimation/robust_loss.h"
@@ -24,7 +29,13 @@ enum class RoleMode { kEstimate, kConsider, kKnown };
 /// measurement itself implies (Initialise of that role).
 enum class JacobianAt { kPrediction, kMeasurement };
 
+/// What fills a role of a sensor; a block alone is estimated.
 struct RoleBinding {
+  RoleBinding() = default;
+  RoleBinding(BlockId id, RoleMode use = RoleMode::kEstimate,
+              JacobianAt at = JacobianAt::kPrediction)
+      : block(id), mode(use), jacobian_at(at) {}
+
   BlockId block = -1;  ///< -1: an optional role left unbound
   RoleMode mode = RoleMode::kEstimate;
   JacobianAt jacobian_at = JacobianAt::kPrediction;
@@ -68,21 +79,89 @@ struct Prior {
   std::string from;  ///< a sensor's name, or "" where mean and covariance are given
 };
 
+/// How a block of a state starts: from a mean with standard deviations, or from the first
+/// measurement of a sensor.
+struct InitialValue {
+  /// One standard deviation for all elements of the tangent, or one for each.
+  InitialValue(std::string block, std::vector<double> mean, std::vector<double> sigma,
+               BlockStatus status = BlockStatus::kEstimated);
+  InitialValue(std::string block, std::vector<double> mean, double sigma,
+               BlockStatus status = BlockStatus::kEstimated);
+  InitialValue(std::string block, double mean, double sigma,
+               BlockStatus status = BlockStatus::kEstimated);
+  /// A value that is known exactly.
+  static InitialValue Constant(std::string block, std::vector<double> value);
+  /// `sensor` has to have an inverse measurement model of the block.
+  static InitialValue FromMeasurement(std::string block, std::string sensor);
+
+  std::string block;
+  std::vector<double> mean, sigma;
+  BlockStatus status = BlockStatus::kEstimated;
+  std::string from;  ///< the sensor; empty: mean and sigma count
+};
+
+/// A state of a problem: its blocks by the names of the motion model.
+struct StateHandle {
+  /// Error kBadConfig if there is no block of that name.
+  BlockId operator[](std::string_view block) const;
+
+  std::string name;
+  std::map<std::string, BlockId, std::less<>> blocks;
+  int input = -1;  ///< the stream of its control input; -1: it takes none
+};
+
+/// A sensor of a problem.
+struct SensorHandle {
+  int index = -1;   ///< into System::sensors
+  int stream = -1;  ///< into System::streams
+};
+
+/// What a sensor has besides its model and roles.
+struct SensorOptions {
+  RobustLoss loss = {};
+  SharedSensor xyz = {};  ///< as in SensorBinding
+  std::optional<OnePointRansac> outlier_rejection = {};
+};
+
 /// The problem that every estimator is given: blocks, how they move, what measures them, how they
-/// start.
+/// start. Add* check what they add at once. Errors: kBadConfig, which says what does not fit.
 struct System {
-  StateLayout layout;
-  std::vector<MotionBinding> motions;
-  std::vector<SensorBinding> sensors;
-  std::vector<Prior> priors;
-  std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
-  std::optional<LandmarkOptions> landmarks;  ///< there where a sensor measures landmarks
+  /// A state whose blocks are those of the model, each with its initial value. Its control input,
+  /// if the model takes one, acts until it is older than `input_timeout_s`.
+  StateHandle AddState(const std::string& name, SharedMotion model,
+                       const std::vector<InitialValue>& initial,
+                       double input_timeout_s = std::numeric_limits<double>::infinity());
+  template <class Model>
+  requires requires { Model::kBlocks; }
+  StateHandle AddState(const std::string& name, Model model,
+                       const std::vector<InitialValue>& initial,
+                       double input_timeout_s = std::numeric_limits<double>::infinity()) {
+    return AddState(name, MakeMotion(std::move(model), name), initial, input_timeout_s);
+  }
+  /// A sensor with what fills its roles, in their order, but those of a landmark, which a
+  /// measurement names. Roles at the end that are optional may be left out.
+  SensorHandle AddSensor(const std::string& name, SharedSensor model,
+                         std::vector<RoleBinding> roles, const SensorOptions& options = {});
+  template <class Model>
+  requires requires { Model::kRoles; }
+  SensorHandle AddSensor(const std::string& name, Model model, std::vector<RoleBinding> roles,
+                         const SensorOptions& options = {}) {
+    return AddSensor(name, MakeSensor(std::move(model), name), std::move(roles), options);
+  }
 
   /// The state before the first measurement, in the order of the layout: all blocks with a given
   /// prior are present. `reserved`: those that start from a measurement have their places.
   State InitialState(bool reserved = false) const;
-  /// -1 where there is none.
+  /// -1: there is none.
   int FindSensor(std::string_view name) const;
+
+  StateLayout layout;
+  std::vector<MotionBinding> motions;
+  std::vector<SensorBinding> sensors;
+  std::vector<Prior> priors;
+  std::vector<StreamInfo> streams;           ///< of what was added, as frames number them
+  std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
+  std::optional<LandmarkOptions> landmarks;  ///< there if a sensor measures landmarks
 };
 
 namespace internal {

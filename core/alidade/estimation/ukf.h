@@ -51,6 +51,8 @@ class Ukf : public Filter {
 
   /// ContractViolation where `system` asks for more than kSupport or an option is out of its range.
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Ukf(const System& problem, const UkfOptions& options = {})
+      : Ukf(problem, options, problem.streams) {}
 };
 
 }  // namespace alidade

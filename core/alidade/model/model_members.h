@@ -36,6 +36,51 @@ ALIDADE_DECLARES(Stationary)
 ALIDADE_DECLARES(OwnedRole)
 #undef ALIDADE_DECLARES
 
+struct PredictCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const
+      -> std::enable_if_t<std::is_convertible_v<decltype(model.Predict(a...)), bool>>;
+};
+template <class Model, class Indices>
+struct HasPredict : TakesRoles<PredictCall, Model, Indices, double*> {};
+
+template <class Model, class Indices>
+struct HasSqrtNoise {
+  static constexpr bool value = TakesRoles<SqrtNoiseCall, Model, Indices, double*>::value ||
+                                HasNoiseOfMeasurement<Model, Indices>::value;
+};
+
+struct StepCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.Step(a...));
+};
+template <std::size_t>
+using Next = double*;
+template <class Model, class Indices>
+struct HasStep;
+template <class Model, std::size_t... I>
+struct HasStep<Model, std::index_sequence<I...>> {
+  static constexpr bool value =
+      Model::Input::kAmbient > 0
+          ? std::is_invocable_v<StepCall, const Model&, Pointer<double, I>..., const double*,
+                                const double*, double, Next<I>...>
+          : std::is_invocable_v<StepCall, const Model&, Pointer<double, I>..., const double*,
+                                double, Next<I>...>;
+};
+
+struct SqrtQCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.SqrtQ(a...));
+};
+template <class Model, class Indices>
+struct HasSqrtQ;
+template <class Model, std::size_t... I>
+struct HasSqrtQ<Model, std::index_sequence<I...>> {
+  static constexpr bool value =
+      HasSimpleSqrtQ<Model>::value ||
+      std::is_invocable_v<SqrtQCall, const Model&, Pointer<double, I>..., double, MatrixRef>;
+};
+
 struct ValidCall {
   template <class Model, class... A>
   auto operator()(const Model& model, A... a) const
@@ -92,6 +137,12 @@ template <class Model>
 constexpr bool CheckSensorMembers() {
   using Indices = typename Blocks<Model>::Indices;
   using Others = std::make_index_sequence<OtherCount<Model>()>;
+  static_assert(HasPredict<Model, Indices>::value,
+                "a sensor needs template <class T> bool Predict(const T* role..., [const double* "
+                "known,] T* z) const, with one pointer for each role: see docs/add_a_sensor.md");
+  static_assert(HasSqrtNoise<Model, Indices>::value,
+                "a sensor needs template <class T> void SqrtNoise(const T* role..., [const double* "
+                "known,] [const T* z,] T* L) const: see docs/add_a_sensor.md");
   static_assert(!DeclaresJacobian<Model>::value || HasJacobian<Model, Indices>::value,
                 "Jacobian exists but cannot be called as Jacobian(const double* role..., "
                 "[const double* known,] MatrixRef J_z_role...) const: see docs/add_a_sensor.md");
@@ -115,6 +166,13 @@ constexpr bool CheckSensorMembers() {
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;
+  static_assert(HasStep<Model, Indices>::value,
+                "a motion model needs template <class T> void Step(const T* block..., [const T* "
+                "u,] const T* w, double dt_s, T* next...) const, with one pointer for each block: "
+                "see alidade/model/model.h");
+  static_assert(HasSqrtQ<Model, Indices>::value,
+                "a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef "
+                "Lq) const: see alidade/model/model.h");
   static_assert(!DeclaresStepJacobian<Model>::value || HasStepJacobian<Model, Indices>::value,
                 "StepJacobian exists but cannot be called as StepJacobian(const double* block..., "
                 "const double* w, double dt_s, MatrixRef F, MatrixRef G) const: see "

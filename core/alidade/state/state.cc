@@ -64,6 +64,15 @@ double State::sigma(BlockId id, int i) const {
   return std::sqrt(covariance_.Variance(block.tangent_offset + i));
 }
 
+BlockEstimate State::Estimate(BlockId id) const {
+  const Block& block = layout_[id];
+  ALIDADE_EXPECTS(block.present);
+  BlockEstimate estimate{Eigen::Map<const Eigen::VectorXd>(value(id), block.geometry().ambient),
+                         Eigen::VectorXd(block.geometry().tangent)};
+  for (int i = 0; i < block.geometry().tangent; ++i) estimate.sigma[i] = sigma(id, i);
+  return estimate;
+}
+
 void State::Reserve(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   if (block.value_offset >= 0) return;

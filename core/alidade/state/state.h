@@ -54,6 +54,11 @@ class StateLayout {
   std::vector<BlockId> dropped_;  ///< their places wait for the next block
 };
 
+/// A block of a state: its value, ambient, and the standard deviations of its tangent.
+struct BlockEstimate {
+  Eigen::VectorXd value, sigma;
+};
+
 /// Layout, values and covariance of the blocks, kept consistent. Copying it is a snapshot.
 ///
 /// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
@@ -74,6 +79,8 @@ class State {
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
   /// The standard deviation of element i of a present block, in its tangent; 0 if it is constant.
   double sigma(BlockId id, int i = 0) const;
+  /// ContractViolation if the block is not present.
+  BlockEstimate Estimate(BlockId id) const;
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }
 

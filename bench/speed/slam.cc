@@ -18,11 +18,7 @@
 // Then the exponents of time over states: of a step, of a frame that measures 20 landmarks, and of
 // dropping a landmark and initialising another.
 //
-// Then, with `covariance: compressed`, frames that measure 20 of N landmarks, of which so many
-// change from one to the next, beside frames of the full covariance; to catch up is part of
-// the mean.
-//
-//   bench_slam [--size N/observed ...] [--no-compressed] [--no-exponents]
+//   bench_slam [--size N/observed ...] [--no-exponents]
 #include <CLI/CLI.hpp>
 #include <Eigen/Cholesky>
 #include <array>
@@ -84,11 +80,11 @@ estimators: {ekf: {type: ekf}}
 )";
 
 /// The filter, and frames of a camera that sways before a box of points. It looks at `observed` of
-/// them, from one frame to the next at so many others.
+/// them, from one frame to the next at as many others.
 class Slam {
  public:
-  Slam(const PluginHost& host, const Config& config, int landmarks, int observed, double others)
-      : filter_(MakeFilter(config, host, "ekf")), observed_(observed), others_(others) {
+  Slam(const PluginHost& host, const Config& config, int landmarks, int observed)
+      : filter_(MakeFilter(config, host, "ekf")), observed_(observed) {
     Random random(1);
     for (int i = 0; i < landmarks; ++i) {
       points_.push_back({2.0 * random.Uniform() - 1.0, 1.6 * random.Uniform() - 0.8,
@@ -111,7 +107,7 @@ class Slam {
     const Timestamp at = NextTime();
     const double t = Seconds(at);
     const double x = 0.2 * std::sin(t), y = 0.1 * std::sin(1.3 * t);
-    const long first = std::lround(std::floor(others_ * count_));
+    const long first = static_cast<long>(observed_) * count_;
     std::vector<Reading> readings;
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<std::size_t>((first + k) % std::ssize(points_));
@@ -130,7 +126,6 @@ class Slam {
   std::unique_ptr<Filter> filter_;
   std::vector<std::array<double, 3>> points_;
   int observed_, stream_ = 0, count_ = 0;
-  double others_;
   long taken_ = 0, used_ = 0;
 };
 
@@ -256,49 +251,6 @@ class Exchange {
   const Eigen::MatrixXd own_ = Eigen::MatrixXd::Identity(kLandmark, kLandmark);
 };
 
-double Mean(const Contender& one) {
-  return std::accumulate(one.ns.begin(), one.ns.end(), 0.0) / static_cast<double>(one.ns.size());
-}
-
-void CompareCompressed(const PluginHost& host, const Config& config, const Config& compressed,
-                       int landmarks, int frames) {
-  constexpr int kObserved = 20, kChunk = 10;
-  const auto of = [&](int count, double others) {
-    return Slam(host, compressed, count, kObserved, others);
-  };
-  Slam full(host, config, landmarks, kObserved, 0.0);
-  std::vector<Contender> contenders;
-  const auto add = [&](const char* name, Slam& slam, int steps) {
-    contenders.push_back({name,
-                          [&slam, steps] {
-                            for (int i = 0; i < steps; ++i) slam();
-                          },
-                          static_cast<double>(steps),
-                          {}});
-  };
-  {
-    Slam small = of(landmarks / 10, 0.0), large = of(landmarks, 0.0);
-    add("small", small, 1);
-    add("large", large, 1);
-    Interleave(contenders, frames);
-    const std::string n = std::to_string(landmarks);
-    std::printf("compressed, %d observed: %.3f ms a frame\n", kObserved,
-                1e-6 * contenders[1].Quantile(0.5));
-    std::printf("ratio compressed_%s/compressed_%d %.3f\n", n.c_str(), landmarks / 10,
-                contenders[1].Quantile(0.5) / contenders[0].Quantile(0.5));
-  }
-  for (const double others : {0.0, 0.3, 1.0}) {
-    Slam slam = of(landmarks, others);
-    contenders.clear();
-    add("full", full, 1);
-    add("compressed", slam, kChunk);
-    Interleave(contenders, frames / kChunk);
-    if (!full.used_all() || !slam.used_all()) throw std::runtime_error("not every one was used");
-    std::printf("ratio full/compressed_%.1f %.2f\n", others,
-                contenders[0].Quantile(0.5) / Mean(contenders[1]));
-  }
-}
-
 /// The update of n states by m rows in other ways.
 std::vector<Contender> PeersOf([[maybe_unused]] int landmarks, [[maybe_unused]] int observed,
                                long n, long m) {
@@ -325,7 +277,7 @@ void CompareSize(const PluginHost& host, const Config& config, const std::string
                  const Peak& peak, int rounds, bool peers) {
   const int landmarks = std::atoi(size.c_str());
   const int observed = std::atoi(size.c_str() + size.find('/') + 1);
-  Slam slam(host, config, landmarks, observed, observed);
+  Slam slam(host, config, landmarks, observed);
   const long n = slam.size(), m = 2L * observed;
   volatile double sink = 0.0;
   std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
@@ -374,7 +326,7 @@ void CompareSizes(const PluginHost& host, const Config& config, int rounds) {
   std::vector<long> states;
   for (const int size : kSizes) {
     Slam* const slam =
-        slams.emplace_back(std::make_unique<Slam>(host, config, size, kObserved, kObserved)).get();
+        slams.emplace_back(std::make_unique<Slam>(host, config, size, kObserved)).get();
     Exchange* const one = exchanges.emplace_back(std::make_unique<Exchange>(size)).get();
     states.push_back(slam->size());
     step.push_back({"step", [slam] { slam->Step(); }, 1.0, {}});
@@ -401,10 +353,6 @@ int Main(int argc, char** argv) {
   app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
   std::vector<std::string> settings;
   app.add_option("--set", settings, "KEY=VALUE of the config");
-  bool compressed = true;
-  int frames = 500;
-  app.add_flag("--compressed,!--no-compressed", compressed, "the compressed covariance too");
-  app.add_option("--frames", frames, "of the compressed covariance")->capture_default_str();
   app.add_flag("--peers,!--no-peers", peers, "the dense update and other libraries too");
   bool exponents = true;
   app.add_flag("--exponents,!--no-exponents", exponents, "of time over states too");
@@ -413,27 +361,18 @@ int Main(int argc, char** argv) {
   const testing::TemporaryFolder temporary;
   const std::string file = (temporary.path() / "config.yaml").string();
   std::ofstream(file) << kConfig;
-  const auto load = [&] {
-    Config config = Config::FromFile(file);
-    for (const std::string& setting : settings) {
-      const std::size_t equals = setting.find('=');
-      if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
-      config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
-    }
-    return config;
-  };
-  const Config config = load();
+  Config config = Config::FromFile(file);
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
+    config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
+  }
   const PluginHost host;
   const std::string kernels = internal::BestVectorKernels().name;
   const Peak peak = PeakOf(kernels);
   std::printf("kernels: %s\n", kernels.c_str());
   for (const std::string& size : sizes) CompareSize(host, config, size, peak, rounds, peers);
   if (exponents) CompareSizes(host, config, rounds);
-  if (compressed) {
-    Config of_compressed = load();
-    of_compressed.Set("estimators.ekf.covariance", "compressed", "");
-    CompareCompressed(host, config, of_compressed, 1000, frames);
-  }
   return 0;
 }
 

@@ -245,9 +245,6 @@ const Fault kEstimatorFaults[] = {
     MakeFault("key_of_another_estimator", "depth", {{kEkf, "{type: rts, alpha: 0.1}"}}, 30,
               "estimators.ekf.alpha: unknown key; expected one of fuse, gate, max_dt_s, "
               "on_divergence, on_plugin_failure, overrides, sensors"),
-    MakeFault("unsupported_compressed_covariance", "depth",
-              {{kEkf, "{type: iekf, covariance: auto}"}}, 30,
-              "estimator type 'iekf' has no choice of covariance"),
     MakeFault("unsupported_consider_block", "depth",
               {After(kTemplateBlocks, "    consider: [inverse_distance]"), {kEkf, "{type: rts}"}},
               13,
@@ -299,18 +296,6 @@ const Fault kLandmarkFaults[] = {
     MakeFault("landmarks_attempts_without_a_ratio", "landmarks",
               {After(kPrior, "  prune: {min_attempts: 30}")}, 11,
               "landmarks.prune.min_attempts: without a use"),
-    MakeFault("landmarks_compressed_and_anchored", "pose",
-              {{"representation: inverse_depth", "representation: anchored"},
-               {kEkf, "{type: ekf, covariance: compressed}"}},
-              26,
-              "those of `landmarks.representation: anchored` have the role 'direction', of "
-              "geometry unit_vector, where many small corrections are not one; those of "
-              "`inverse_depth` can; expected full or auto"),
-    MakeFault(
-        "landmarks_compressed_and_deleted_by_depth", "pose",
-        {After(kPrior, "  negative_depth: delete"), {kEkf, "{type: ekf, covariance: compressed}"}},
-        27,
-        "estimators.ekf.covariance: landmarks cannot be postponed: `negative_depth: delete` asks"),
     MakeFault("landmarks_known_position_of_two", "landmarks",
               {After(kPrior, "  known:\n    - {id: 3, position: [0, 1], sigma: 0}")}, 12,
               "landmarks.known[0].position"),

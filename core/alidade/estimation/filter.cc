@@ -121,7 +121,6 @@ BlockEstimate Filter::Estimate(BlockId id) const { return state().Estimate(id); 
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
   later.Process({timestamp, {}});
-  later.f.state.Recall();
   return std::move(later.f.state);
 }
 

@@ -33,20 +33,12 @@ enum class JacobianPolicy {
   kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
 };
 
-/// How an Ekf carries landmarks that are not measured for a while.
-enum class CovarianceForm {
-  kFull,        ///< as all others
-  kCompressed,  ///< postponed, exactly: see Postponed
-  kAuto,        ///< postponed where that takes less time, and can be done
-};
-
 /// What the Kalman filters have in common to choose.
 struct EkfOptions {
   /// Probability with which a measurement that fits passes the gate; 1: no gate (`gate: none`).
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
   JacobianPolicy jacobian = JacobianPolicy::kLatest;
-  CovarianceForm covariance = CovarianceForm::kFull;  ///< of an Ekf
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
   int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
   int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends
@@ -119,7 +111,6 @@ class Filter : public Estimator {
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
-  /// Without the landmarks that a compressed covariance has postponed; At has them too.
   const State& state() const override;
   std::vector<LandmarkEstimate> landmarks() const override;
   Timestamp timestamp() const override;

@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "alidade/base/error.h"
 #include "alidade/estimation/first_values.h"
 #include "alidade/estimation/linear.h"
 
@@ -18,10 +17,7 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
       time_(f.binding->system, streams, options.max_dt_s),
       gate_(f.binding->system, options),
       consensus_(f.binding->system),
-      recovery_(options),
-      compression_(f.binding->system, options) {
-  ALIDADE_EXPECTS(options.covariance == CovarianceForm::kFull ||
-                  dynamic_cast<const Linear*>(&*method) != nullptr);
+      recovery_(options) {
   if (f.binding->system.landmarks) {
     landmarks.emplace(*f.binding);
     landmarks->AddKnown(f);
@@ -74,7 +70,6 @@ void FrameLoop::Run(const Frame& frame) {
   Spent(FramePart::kUpdate);
   if (!landmarks) return;
   landmarks->Maintain(f, all);
-  compression_.Apply(f, *landmarks, all);
   Spent(FramePart::kLandmarks);
 }
 

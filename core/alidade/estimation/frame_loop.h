@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "alidade/base/indirect.h"
-#include "alidade/estimation/compression.h"
 #include "alidade/estimation/consensus.h"
 #include "alidade/estimation/fast_path.h"
 #include "alidade/estimation/filter.h"
@@ -32,7 +31,7 @@ namespace alidade::internal {
 ///   gate                            Gate::Pass of each row; Consensus::Split
 ///   correct      Correct            Gate::Weigh, Method::Correct
 ///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
-///   landmarks                       LandmarkMap::Maintain, Compression::Apply
+///   landmarks                       LandmarkMap::Maintain
 ///   inputs                          Timeline::TakeInputs: they act from here on
 ///
 /// Parts point to the binding, which copies share, and not into one another; only the fast path
@@ -80,7 +79,6 @@ class FrameLoop {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
-  Compression compression_;
   std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
   Scratch<Rows> rows_;
   Scratch<Groups> groups_;

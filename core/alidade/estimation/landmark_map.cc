@@ -24,13 +24,6 @@ Space Xyz() {
 
 bool IsUsed(const Row& row) { return row.report->outcome == Outcome::kAccepted; }
 
-/// Brings what is postponed of it back into x and P.
-void Recall(State& state, const LandmarkRecord& landmark) {
-  for (const BlockId id : landmark.blocks) {
-    if (state.layout()[id].postponed) state.Recall(id);
-  }
-}
-
 /// Of a landmark that has a representation.
 std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
   std::array<const double*, 3> values{};
@@ -191,7 +184,6 @@ void LandmarkMap::Attach(FilterState& f, std::span<Row> rows) {
     if (row.measurement->landmark < 0) {
       outcome = Outcome::kInvalid;
     } else if (found != landmarks_.end() && found->second.in_state()) {
-      Recall(f.state, found->second);
       Attach(f, row, found->second);
     } else {
       outcome = Outcome::kNotReady;
@@ -211,7 +203,7 @@ void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& l
 
 void LandmarkMap::Maintain(FilterState& f, std::span<Row> rows) {
   Count(f, rows);
-  CheckDepths(f, rows);
+  CheckDepths(f);
   Prune(f);
   Convert(f, rows);
   InitialiseNew(f, rows);
@@ -254,18 +246,12 @@ LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
   return landmarks_.insert(at, std::move(node))->second;
 }
 
-/// Looks for inverse distances that an update left at zero or below. Where landmarks are postponed
-/// it looks at those of the rows alone: none of the others is worth a pass over the map.
-void LandmarkMap::CheckDepths(FilterState& f, std::span<Row> rows) {
-  if (f.state.postponed() == nullptr) {
-    return DeleteIf(f, [&](LandmarkRecord& landmark) {
-      return IsNegative(f, landmark) &&
-             options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete;
-    });
-  }
-  for (const Row& row : rows) {
-    if (row.on_landmark()) IsNegative(f, landmarks_.at(row.measurement->landmark));
-  }
+/// Looks for inverse distances that an update left at zero or below.
+void LandmarkMap::CheckDepths(FilterState& f) {
+  DeleteIf(f, [&](LandmarkRecord& landmark) {
+    return IsNegative(f, landmark) &&
+           options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete;
+  });
 }
 
 /// Counts it where it has become so.
@@ -302,22 +288,6 @@ std::int64_t LandmarkMap::DueOf(const LandmarkRecord& landmark) const {
   return most > 0 ? landmark.seen + most : std::numeric_limits<std::int64_t>::max();
 }
 
-void LandmarkMap::FindUnseen(const FilterState& f, std::vector<BlockId>& blocks) const {
-  constexpr std::int64_t kRecent = 2;
-  std::vector<BlockId> stay;
-  blocks.clear();
-  for (const auto& [id, landmark] : landmarks_) {
-    const bool seen = frame_ - landmark.seen < kRecent;
-    for (const BlockId block : landmark.blocks) {
-      if (f.state.layout()[block].has_covariance()) (seen ? stay : blocks).push_back(block);
-    }
-  }
-  std::ranges::sort(stay);
-  std::ranges::sort(blocks);
-  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-  std::erase_if(blocks, [&](BlockId block) { return std::ranges::binary_search(stay, block); });
-}
-
 template <class Condition>
 void LandmarkMap::DeleteIf(FilterState& f, const Condition& condition) {
   for (auto at = landmarks_.begin(); at != landmarks_.end();) {
@@ -327,7 +297,6 @@ void LandmarkMap::DeleteIf(FilterState& f, const Condition& condition) {
 
 LandmarkMap::ById::iterator LandmarkMap::Delete(FilterState& f, ById::iterator at) {
   if (at->second.in_state()) {
-    Recall(f.state, at->second);
     NoteRemoval(f, at->first, at->second);
     DropBlocks(f, at->second);
     ++f.report.landmarks.deleted;
@@ -522,11 +491,6 @@ Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, Row& row,
 }
 
 std::vector<LandmarkEstimate> LandmarkMap::Estimates(const State& state) const {
-  if (state.postponed() != nullptr) {
-    State whole = state;
-    whole.Recall();
-    return Estimates(whole);
-  }
   std::vector<LandmarkEstimate> estimates;
   for (const auto& [id, landmark] : landmarks_) {
     if (landmark.in_state()) estimates.push_back(EstimateOf(state, id, landmark));

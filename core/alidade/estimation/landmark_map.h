@@ -54,10 +54,6 @@ class LandmarkMap {
   /// After the updates with those rows.
   void Maintain(FilterState& f, std::span<Row> rows);
 
-  /// The blocks with a covariance of landmarks that are in x and P, and were seen neither in this
-  /// frame nor in the one before; not those that they share with others.
-  void FindUnseen(const FilterState& f, std::vector<BlockId>& blocks) const;
-
   std::vector<LandmarkEstimate> Estimates(const State& state) const;
   /// Frames with a measurement of a landmark.
   std::int64_t frame() const { return frame_; }
@@ -77,7 +73,7 @@ class LandmarkMap {
   bool Has(const Row& row) const { return FamilyOf(row).first >= 0; }
   void Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark);
   void Count(FilterState& f, std::span<Row> rows);
-  void CheckDepths(FilterState& f, std::span<Row> rows);
+  void CheckDepths(FilterState& f);
   bool IsNegative(FilterState& f, LandmarkRecord& landmark);
   bool Fails(const LandmarkRecord& landmark) const;
   std::int64_t DueOf(const LandmarkRecord& landmark) const;

@@ -125,8 +125,7 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
     return std::ranges::find(consider, true) != consider.end();
   };
   const bool small = IsSmall(f.state.covariance()) && TotalDof(rows) <= kSmall &&
-                     !f.blocks.considering && std::ranges::none_of(rows, considers) &&
-                     f.state.postponed() == nullptr;
+                     !f.blocks.considering && std::ranges::none_of(rows, considers);
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
@@ -220,7 +219,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const Panels w = ProjectionOf(f, rows);
   Workspace::Matrix l = NoiseOf(f, rows);
   const Eigen::Index n = w.rows, m = w.columns;
-  Workspace::Matrix gain = f.work.Take(n, m), outside = OutsideOf(f, rows);
+  Workspace::Matrix gain = f.work.Take(n, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n), left = f.work.Take(n);
   AddProjected(f, w, l);
   if (!Factorise(l)) return Outcome::kNotPd;
@@ -253,12 +252,6 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   } else {
     SubtractOuterProduct(p.lower(), w);
     AddOuterProduct(p.lower(), lost_, e);
-  }
-  if (f.state.postponed() != nullptr) {
-    DivideByTransposed(l, outside);
-    Workspace::Matrix columns = f.work.Take(n, m);
-    Copy(w, columns);
-    f.state.postponed()->Correct(p, outside, columns, y);
   }
   f.state.MoveTo(f.moved);
   if (recorded) RecordGain(f, rows, gain.data());

@@ -65,7 +65,6 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   constexpr double kRounding = 1e-12;
   const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
   if (std::ranges::none_of(rows, is_not_pd)) return;
-  f.state.Recall();
   Covariance& p = f.state.covariance();
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   Eigen::MatrixXd root;

@@ -238,14 +238,4 @@ void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s)
   BestVectorKernels().add_projected(pht.rows, f.jacobians, pht.data, s.data(), s.outerStride());
 }
 
-Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
-  const OutsideCorrelation& correlation = f.state.covariance().outside();
-  Workspace::Matrix outside = f.work.Take(correlation.columns(), TotalDof(rows));
-  if (correlation.columns() == 0) return outside;
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    correlation.Project(row.jacobian(), outside.data() + at * outside.rows());
-  });
-  return outside;
-}
-
 }  // namespace alidade::internal

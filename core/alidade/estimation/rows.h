@@ -122,8 +122,6 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
 Panels ProjectionOf(FilterState& f, std::span<Row* const> rows);
-/// (H Phi)' of all rows, k x m, in f.work: see OutsideCorrelation.
-Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows);
 /// The lower triangle of s += H P H', m x m, from the P H' that ProjectionOf returned last.
 void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at

@@ -49,10 +49,6 @@ EkfOptions ReadEkf(Params& p) {
   options.jacobian = static_cast<JacobianPolicy>(p.Choice(
       "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
       static_cast<int>(options.jacobian)));
-  options.covariance = static_cast<CovarianceForm>(
-      p.Choice("covariance", {"full", "compressed", "auto"},
-               "how landmarks that are not measured for a while are carried",
-               static_cast<int>(options.covariance)));
   return options;
 }
 
@@ -81,13 +77,9 @@ UkfOptions ReadUkf(Params& p) {
 Description DescribeCommon(const EkfOptions& options) { return {options, {}}; }
 Description DescribeEkf(const EkfOptions& options) {
   const bool latest = options.jacobian == JacobianPolicy::kLatest;
-  constexpr const char* kForms[] = {
-      "full", "compressed: landmarks that are not measured are postponed",
-      "auto: landmarks that are not measured are postponed where that takes less time"};
   return {options,
           {{"jacobian", latest ? "latest: H at the estimate"
-                               : "first_estimate: H where stationary blocks started from"},
-           {"covariance", kForms[static_cast<int>(options.covariance)]}}};
+                               : "first_estimate: H where stationary blocks started from"}}};
 }
 Description DescribeIekf(const IekfOptions& options) {
   return {options,

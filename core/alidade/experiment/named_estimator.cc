@@ -7,7 +7,6 @@
 
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
-#include "alidade/estimation/compression.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
 #include "alidade/experiment/read_problem.h"
@@ -166,7 +165,6 @@ void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
       {"gate", "gate"},
       {"fuse", "choice of updates"},
       {"jacobian", "choice of Jacobian"},
-      {"covariance", "choice of covariance"},
       {"rejection_recovery", "rejection recovery"}};
   for (const auto& [key, what] : kKeys) {
     if (!entry.HasUnread(key)) continue;
@@ -185,14 +183,6 @@ void RefuseLoneMatches(const Node& entry, const System& system) {
                    "' asks by its `outlier_rejection`",
                "joint or per_sensor");
   }
-}
-
-/// Refuses `covariance: compressed` where it would not be exact.
-void RefuseInexact(const Node& entry, const System& system) {
-  const auto covariance = entry.Find("covariance");
-  if (!covariance || covariance->Text() != "compressed") return;
-  const std::string why = WhyNotCompressed(system);
-  if (!why.empty()) covariance->Fail("landmarks cannot be postponed: " + why, "full or auto");
 }
 
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
@@ -360,7 +350,6 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   RefuseUnsupported(named.type, support, own.root(), named.system);
   if (of_core != nullptr) {
     RefuseLoneMatches(entry, named.system);
-    RefuseInexact(entry, named.system);
   }
   if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator

@@ -13,7 +13,6 @@ int Covariance::Add(int rows) {
   const int offset = size_;
   Reserve(rows);
   size_ += rows;
-  outside_.Resize(size_);
   return offset;
 }
 
@@ -28,7 +27,6 @@ void Covariance::Reserve(int rows) {
 
 void Covariance::Clear() {
   p_.topLeftCorner(size_, size_).setZero();
-  outside_.Clear();
   size_ = 0;
   gaps_.clear();
 }
@@ -50,7 +48,6 @@ int Covariance::TakeGap(int rows) {
 void Covariance::Clear(int offset, int rows) {
   p_.block(offset, 0, rows, offset).setZero();
   p_.block(offset, offset, size_ - offset, rows).setZero();
-  outside_.Zero(offset, rows);
 }
 
 void Covariance::Release(int offset, int rows) {
@@ -68,7 +65,6 @@ void Covariance::Release(int offset, int rows) {
   }
   if (offset + rows == size_) {
     size_ = offset;
-    outside_.Resize(size_);
   } else {
     gaps_.emplace_back(offset, rows);
   }
@@ -82,7 +78,6 @@ int Covariance::MoveToGap(int from, int rows) {
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
   SetRows(to, cross.middleRows(from, rows), cross);
-  outside_.Copy(from, to, rows);
   Release(from, rows);
   return to;
 }
@@ -138,7 +133,6 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   int k = 0;
   for (const JacobianPart& part : parts) k += part.size;
   const Workspace::Use use(memory_);
-  outside_.Propagate({f, k, k, parts}, memory_);
   if (q == nullptr) {
     Workspace::Matrix zero = memory_.Take(k, k);
     zero.setZero();

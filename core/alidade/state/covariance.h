@@ -8,7 +8,6 @@
 
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/jacobian_rows.h"
-#include "alidade/state/outside_correlation.h"
 #include "alidade/state/workspace.h"
 
 namespace alidade {
@@ -22,9 +21,7 @@ using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStri
 /// capacity; what corrects all of it takes it from where it lies. Offsets and sizes lie in
 /// [0, size()], as Add gave them; they are not checked, but where said.
 /// Nothing allocates memory in the steady state but what returns a matrix.
-///
-/// The correlation with what lies outside of the state goes along: see OutsideCorrelation. P H' and
-/// H P H' are made in projection.h.
+/// P H' and H P H' are made in projection.h.
 class Covariance {
  public:
   /// Rows in use, gaps included; a gap has zero rows and columns.
@@ -48,15 +45,15 @@ class Covariance {
   void SetBlock(int a, int b, const ConstMatrix& value);
   /// P(i, i), 0 <= i < size().
   double Variance(int i) const { return p_(i, i); }
-  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, zero elsewhere, in Phi too.
+  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, zero elsewhere.
   void SetRows(int offset, const ConstMatrix& own);
   /// Sets the rows of all `parts`, of k columns together: `own` (k x k) among them, `cross` (n x k,
-  /// n = size()) elsewhere. Phi stays.
+  /// n = size()) elsewhere.
   void SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
                 const ConstMatrix& cross);
 
   /// x' = F x + w of the k rows in `parts`, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai,
-  /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k). Phi_a <- F Phi_a.
+  /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k).
   void Propagate(std::span<const JacobianPart> parts, const double* f, const double* q);
 
   /// P where it lies.
@@ -69,8 +66,6 @@ class Covariance {
 
   /// Gives all rows back; the memory is kept.
   void Clear();
-  const OutsideCorrelation& outside() const { return outside_; }
-  OutsideCorrelation& outside() { return outside_; }
 
  private:
   int TakeGap(int rows);
@@ -79,7 +74,6 @@ class Covariance {
 
   Eigen::MatrixXd p_;  ///< capacity x capacity
   int size_ = 0;
-  OutsideCorrelation outside_;
   std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)
   Scratch<Workspace> memory_;
 };

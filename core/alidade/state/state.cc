@@ -113,11 +113,8 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
                        static_cast<int>(jacobian.outerStride()), parts_};
   Project(covariance_, j, cross.data(), p.data());
   p += own;
-  Workspace::Matrix phi = memory_.Take(covariance_.outside().columns(), rows);
-  covariance_.outside().Project(j, phi.data());
   FindParts(ids);
   covariance_.SetParts(parts_, p, cross);
-  covariance_.outside().SetParts(parts_, phi);
 }
 
 /// Puts the rows of the blocks in P into parts_, and returns the size of their tangents.
@@ -161,13 +158,6 @@ void State::FillGaps() {
 }
 
 void State::Drop(BlockId id) {
-  if (layout_[id].postponed) Recall(id);
-  if (postponed_ && id < std::ssize(postponed_->homes)) {
-    Postponed::Home& home = postponed_->homes[static_cast<std::size_t>(id)];
-    const Geometry& geometry = layout_[id].geometry();
-    if (home.value >= 0) postponed_->left.push_back({home, geometry.tangent, geometry.ambient});
-    home = {};
-  }
   if (layout_[id].value_offset >= 0) Release(id);
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   block.present = false;
@@ -197,131 +187,6 @@ void State::MoveTo(const std::vector<double>& values) {
     covariance_.Propagate({&part, 1}, j.data(), nullptr);
   }
   std::copy(values.begin(), values.end(), values_.begin());
-}
-
-/// Brings P0 and x0 up to date, and makes them where there are none.
-void State::CatchUp() {
-  const std::size_t count = layout_.blocks().size();
-  if (!postponed_) {
-    postponed_.emplace(std::move(covariance_), std::move(values_), std::move(value_gaps_));
-    covariance_ = {};
-    postponed_->homes.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Block& block = layout_.blocks()[i];
-      postponed_->homes[i] = {block.tangent_offset, block.value_offset};
-    }
-    return;
-  }
-  Postponed& outside = *postponed_;
-  outside.homes.resize(count);
-  std::vector<int> homes(static_cast<std::size_t>(covariance_.size()), -1);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Block& block = layout_.blocks()[i];
-    Postponed::Home& home = outside.homes[i];
-    if (block.value_offset < 0) continue;
-    if (home.value < 0) {
-      home.value = TakeValues(outside.x, outside.x_gaps, block.geometry().ambient);
-      if (block.tangent_offset >= 0) home.row = outside.p.Add(block.geometry().tangent);
-    }
-    for (int k = 0; block.tangent_offset >= 0 && k < block.geometry().tangent; ++k) {
-      const int row = block.tangent_offset + k;
-      homes[static_cast<std::size_t>(row)] = home.row + k;
-    }
-  }
-  std::vector<double> dx;
-  outside.CatchUp(covariance_, homes, dx);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Block& block = layout_.blocks()[i];
-    double* const x = outside.x.data() + outside.homes[i].value;
-    if (block.value_offset >= 0) {
-      std::copy_n(values_.data() + block.value_offset, block.geometry().ambient, x);
-    } else if (block.postponed) {
-      block.geometry().Plus(x, dx.data() + outside.homes[i].row, x);
-    }
-  }
-  for (const Postponed::Left& one : outside.left) {
-    outside.x_gaps.emplace_back(one.home.value, one.numbers);
-    if (one.home.row >= 0) outside.p.Release(one.home.row, one.rows);
-  }
-  outside.left.clear();
-}
-
-void State::Postpone(std::span<const BlockId> leaving) {
-  CatchUp();
-  for (const BlockId id : leaving) {
-    Block& block = At(id);
-    ALIDADE_EXPECTS(block.has_covariance());
-    block.present = false;
-    block.postponed = true;
-    block.value_offset = -1;
-  }
-  Compact();
-}
-
-/// Puts what has a place one after the other, in the order it had.
-void State::Compact() {
-  std::vector<BlockId> stay;
-  for (std::size_t i = 0; i < layout_.blocks().size(); ++i) {
-    if (layout_.blocks()[i].value_offset >= 0) stay.push_back(static_cast<BlockId>(i));
-  }
-  std::ranges::sort(stay, {}, [&](BlockId id) { return layout_[id].value_offset; });
-  values_.clear();
-  value_gaps_.clear();
-  for (const BlockId id : stay) {
-    const double* const x =
-        postponed_->x.data() + postponed_->homes[static_cast<std::size_t>(id)].value;
-    At(id).value_offset = static_cast<int>(values_.size());
-    values_.insert(values_.end(), x, x + layout_[id].geometry().ambient);
-  }
-  std::erase_if(placed_, [&](BlockId id) {
-    if (!layout_[id].postponed) return false;
-    At(id).tangent_offset = -1;
-    return true;
-  });
-  stay = placed_;
-  std::ranges::sort(stay, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
-  std::vector<int> rows;
-  for (const BlockId id : stay) {
-    At(id).tangent_offset = static_cast<int>(rows.size());
-    for (int k = 0; k < layout_[id].geometry().tangent; ++k) {
-      rows.push_back(postponed_->homes[static_cast<std::size_t>(id)].row + k);
-    }
-  }
-  postponed_->Begin(rows, covariance_);
-}
-
-void State::Recall(BlockId id) {
-  ALIDADE_EXPECTS(layout_[id].postponed);
-  Reserve(id);
-  Block& block = At(id);
-  const Workspace::Use use(memory_);
-  Workspace::Vector dx = memory_.Take(block.geometry().tangent);
-  const Postponed::Home home = postponed_->homes[static_cast<std::size_t>(id)];
-  postponed_->Recall(home.row, block.geometry().tangent, block.tangent_offset, covariance_,
-                     dx.data());
-  block.geometry().Plus(postponed_->x.data() + home.value, dx.data(),
-                        values_.data() + block.value_offset);
-  block.present = true;
-  block.postponed = false;
-}
-
-void State::Recall() {
-  if (!postponed_) return;
-  CatchUp();
-  placed_.clear();
-  for (std::size_t i = 0; i < layout_.blocks().size(); ++i) {
-    Block& block = layout_.blocks_[i];
-    if (block.value_offset < 0 && !block.postponed) continue;
-    block.tangent_offset = postponed_->homes[i].row;
-    block.value_offset = postponed_->homes[i].value;
-    block.present |= block.postponed;
-    block.postponed = false;
-    if (block.tangent_offset >= 0) placed_.push_back(static_cast<BlockId>(i));
-  }
-  covariance_ = std::move(postponed_->p);
-  values_ = std::move(postponed_->x);
-  value_gaps_ = std::move(postponed_->x_gaps);
-  postponed_.reset();
 }
 
 Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,

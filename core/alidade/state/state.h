@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,7 +10,6 @@
 #include "alidade/state/covariance.h"
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/manifold.h"
-#include "alidade/state/postponed.h"
 
 namespace alidade {
 
@@ -29,7 +27,6 @@ struct Block {
   Space space;
   BlockStatus status = BlockStatus::kEstimated;
   bool present = false;     ///< has a value; else declared only, waiting to be initialised
-  bool postponed = false;   ///< has one that State::Recall brings; not present
   int value_offset = -1;    ///< into State::values(), where present or reserved
   int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not constant
 
@@ -64,9 +61,6 @@ struct BlockEstimate {
 /// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
 /// a block moves O(n) numbers: a removed block leaves a gap that the last block fills where it is
 /// no larger, or that a later one takes. A block that has a value takes another one in place.
-///
-/// Blocks may be postponed: they are then outside of x and P, and cost nothing, until they are
-/// recalled with what has become of them (Postponed).
 class State {
  public:
   explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
@@ -103,20 +97,6 @@ class State {
   /// Drops the block, with its id: a block declared later may have it. The rest keeps its value and
   /// covariance.
   void Drop(BlockId id);
-
-  /// Catches up with all that is postponed, and postpones those blocks besides, of vectors and
-  /// angles. The others keep their order, so those before the first that leaves keep their place.
-  /// O(n^2 k) for all n rows, k those that were active in the meantime; O(n) where nothing was
-  /// postponed.
-  void Postpone(std::span<const BlockId> leaving);
-  /// Brings a postponed block back into x and P. O(k (k + n)), n the active ones.
-  void Recall(BlockId id);
-  /// Brings all of them back.
-  void Recall();
-  /// Null where nothing is postponed.
-  const Postponed* postponed() const { return postponed_ ? &*postponed_ : nullptr; }
-  /// For an update, which it has to hear of before P moves on to new values (Postponed::Correct).
-  Postponed* postponed() { return postponed_ ? &*postponed_ : nullptr; }
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
   /// indexed like the covariance. Changes nothing: see MoveTo.
   void Retract(const double* dx, std::vector<double>& moved) const;
@@ -129,8 +109,6 @@ class State {
   int FindParts(std::span<const BlockId> blocks);
   void Release(BlockId id);
   void FillGaps();
-  void CatchUp();
-  void Compact();
   Block& At(BlockId id) { return layout_.blocks_[static_cast<std::size_t>(id)]; }
 
   StateLayout layout_;
@@ -138,7 +116,6 @@ class State {
   std::vector<std::pair<int, int>> value_gaps_;  ///< (offset, size)
   Covariance covariance_;
   std::vector<BlockId> placed_;  ///< that have rows of P, ascending
-  std::optional<Postponed> postponed_;
   Scratch<Workspace> memory_;
   Scratch<std::vector<JacobianPart>> parts_;
 };

@@ -212,28 +212,6 @@ TEST(AllocationOfLandmarks, AnUpdateOfManyTakesNone) {
   EXPECT_TRUE(IsSkipped() || filter.state().covariance().size() >= 13 + 6 * 100);
 }
 
-TEST(AllocationOfLandmarks, AFrameBesidePostponedOnesTakesNone) {
-  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
-  EkfOptions options = Gated();
-  options.covariance = CovarianceForm::kCompressed;
-  Ekf filter = testing::EkfOf(
-      testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(0.2, 0.1)), options);
-  std::vector<Frame> frames;
-  for (int k = 0; k < 60; ++k) {
-    std::vector<testing::Observation> observations;
-    for (int id = 0; id < (k == 0 ? 100 : 15); ++id) {
-      observations.push_back({id, PixelOf(id, 0.01 * k)});
-    }
-    frames.push_back(testing::FrameOf(0.1 * k, observations));
-  }
-  for (std::size_t k = 0; k < 40; ++k) filter.Process(frames[k]);
-  EXPECT_EQ(filter.state().covariance().size(), 3 + 6 * 15);
-  const long before = allocations;
-  for (std::size_t k = 40; k < frames.size(); ++k) filter.Process(frames[k]);
-  EXPECT_EQ(allocations - before, 0);
-  EXPECT_EQ(filter.landmarks().size(), 100u);
-}
-
 TEST(AllocationOfLandmarks, TheIteratedEkfTakesNone) {
   const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
   Iekf filter(system, {Gated()}, {{"tracks", 2}});

@@ -13,7 +13,7 @@ using internal::Copy;
 using internal::Panels;
 using internal::TakePanels;
 
-constexpr double kRounding = 1e-12;  // products of order 10 numbers of order 10
+constexpr double kTolerance = 1e-12;  // products of order 10 numbers of order 10
 
 TEST(Projection, ProjectEqualsTheDenseProduct) {
   Random random(2);
@@ -25,11 +25,11 @@ TEST(Projection, ProjectEqualsTheDenseProduct) {
   dense_h.middleCols(2, 3) = h.rightCols(3);
   Eigen::MatrixXd pht(8, 2), s = Eigen::MatrixXd::Zero(2, 2);
   Project(p, {h.data(), 2, 4, parts}, pht.data(), s.data());
-  EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kRounding * pht.norm());
-  EXPECT_LT((s - dense_h * pht).norm(), kRounding * pht.norm());
+  EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kTolerance * pht.norm());
+  EXPECT_LT((s - dense_h * pht).norm(), kTolerance * pht.norm());
   Eigen::MatrixXd added = Eigen::MatrixXd::Identity(2, 2);
   AddProjection(p, {h.data(), 2, 4, parts}, added.data());
-  EXPECT_LT((added - Eigen::MatrixXd::Identity(2, 2) - s).norm(), kRounding * pht.norm());
+  EXPECT_LT((added - Eigen::MatrixXd::Identity(2, 2) - s).norm(), kTolerance * pht.norm());
 }
 
 TEST(Projection, ProjectOfSeveralRowsEqualsTheDenseProduct) {
@@ -68,7 +68,7 @@ TEST(Projection, ProjectOfSeveralRowsEqualsTheDenseProduct) {
       AddProjection(p, one, s.data());
       EXPECT_EQ(s, s.transpose());
       s.array() -= 1.0;
-      EXPECT_LT((s - whole.block(at, at, one.rows, one.rows)).norm(), kRounding * whole.norm());
+      EXPECT_LT((s - whole.block(at, at, one.rows, one.rows)).norm(), kTolerance * whole.norm());
       at += one.rows;
     }
     Workspace work;
@@ -76,7 +76,7 @@ TEST(Projection, ProjectOfSeveralRowsEqualsTheDenseProduct) {
     Project(p, all, panels);
     Eigen::MatrixXd pht(p.size(), 9);
     Copy(panels, pht);
-    EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kRounding * pht.norm());
+    EXPECT_LT((pht - p.Dense() * dense.transpose()).norm(), kTolerance * pht.norm());
   }
 }
 
@@ -90,7 +90,7 @@ TEST(Projection, AddProjectionOfManyRowsEqualsTheDenseProduct) {
   Eigen::MatrixXd s = Eigen::MatrixXd::Zero(5, 5);
   AddProjection(p, {h.data(), 5, 37, parts}, s.data());
   const Eigen::MatrixXd expected = dense * p.Dense() * dense.transpose();
-  EXPECT_LT((s - expected).norm(), kRounding * expected.norm());
+  EXPECT_LT((s - expected).norm(), kTolerance * expected.norm());
 }
 
 TEST(Projection, ProjectOfFewStatesEqualsTheDenseProduct) {
@@ -101,10 +101,10 @@ TEST(Projection, ProjectOfFewStatesEqualsTheDenseProduct) {
   const JacobianRows rows{h.data(), 3, 5, parts, true};
   Eigen::MatrixXd pht(5, 3), s = Eigen::MatrixXd::Zero(3, 3), added = s;
   Project(p, rows, pht.data(), s.data());
-  EXPECT_LT((pht - p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
-  EXPECT_LT((s - h * pht).norm(), kRounding * pht.norm());
+  EXPECT_LT((pht - p.Dense() * h.transpose()).norm(), kTolerance * pht.norm());
+  EXPECT_LT((s - h * pht).norm(), kTolerance * pht.norm());
   AddProjection(p, rows, added.data());
-  EXPECT_LT((added - h * p.Dense() * h.transpose()).norm(), kRounding * pht.norm());
+  EXPECT_LT((added - h * p.Dense() * h.transpose()).norm(), kTolerance * pht.norm());
 }
 
 }  // namespace

@@ -107,7 +107,6 @@ TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
   expect("gate", "0.99", "'ceres_batch' has no gate; expected the key left out");
   expect("fuse", "joint", "'ceres_batch' has no choice of updates");
   expect("jacobian", "latest", "'ceres_batch' has no choice of Jacobian");
-  expect("covariance", "compressed", "'ceres_batch' has no choice of covariance");
   expect("rejection_recovery", "{after: 3}", "'ceres_batch' has no rejection recovery");
 }
 

@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state/kernels.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#pragma GCC diagnostic ignored "-Wpsabi"  // vectors are inlined, never passed
+
+#define ALIDADE_KERNEL [[gnu::always_inline]] static inline
+#define ALIDADE_UNROLL _Pragma("GCC unroll 8")
+
+namespace alidade::internal {
+namespace {
+
+constexpr int kSmall = 8;
+
+/// Of a variance, less than this left of it has lost nearly all its digits.
+constexpr double kCancelled = 1e-10;
+
+/// Finite too.
+inline bool IsPositive(double x) { return x > 0.0 && x < std::numeric_limits<double>::infinity(); }
+
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+
+/// All N states of a small filter, number by number: what has just been written is not read as a
+/// vector, which would wait for the store.
+template <int N>
+struct Scalars {
+  static constexpr int kRows = N, kStates = N;
+  double v[N];
+
+  void Load(const double* from) { ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] = from[i]; }
+  void Store(double* to) const { ALIDADE_UNROLL for (int i = 0; i < N; ++i) to[i] = v[i]; }
+  void Add(double k, const Scalars& x) {
+    ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] += k * x.v[i];
+  }
+  void Subtract(double k, const Scalars& x) {
+    ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] -= k * x.v[i];
+  }
+  void AddSquares(double k, const Scalars& x) {
+    ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] += k * x.v[i] * x.v[i];
+  }
+};
+
+/// N of many states, in one vector register.
+template <int N>
+struct Vector {
+  static constexpr int kRows = N, kStates = 0;
+  using Register [[gnu::vector_size(N * sizeof(double))]] = double;
+  Register v;
+
+  [[gnu::always_inline]] void Load(const double* from) { std::memcpy(&v, from, sizeof v); }
+  [[gnu::always_inline]] void Store(double* to) const { std::memcpy(to, &v, sizeof v); }
+  [[gnu::always_inline]] void Add(double k, const Vector& x) { v += k * x.v; }
+  [[gnu::always_inline]] void Subtract(double k, const Vector& x) { v -= k * x.v; }
+  [[gnu::always_inline]] void AddSquares(double k, const Vector& x) { v += k * x.v * x.v; }
+};
+
+/// The kernels on panels of Column::kRows rows, for updates of M rows (0: any number).
+template <class Column, int M>
+struct Arithmetic {
+  static constexpr int kRows = Column::kRows, kStates = Column::kStates;
+  /// How many panels a tile of the downdate is high: enough sums to keep the pipes full.
+  static constexpr int kHigh = kStates > 0 ? 1 : 2;
+
+  // What the compiler knows of a small state or update.
+  ALIDADE_KERNEL SymmetricView Sized(const SymmetricView& p) {
+    return kStates > 0 ? SymmetricView{p.data, kStates, kSmall} : p;
+  }
+  ALIDADE_KERNEL int Rows(int m) { return M > 0 ? M : m; }
+  /// Element (i, j) of a matrix in panels.
+  ALIDADE_KERNEL double& At(const Update& u, double* panels, int i, int j) {
+    if (kStates > 0) return panels[j * kRows + i];
+    const int row = i % kRows;
+    return panels[std::ptrdiff_t{i - row} * u.capacity + std::ptrdiff_t{j} * kRows + row];
+  }
+
+  /// y += k x, n numbers.
+  ALIDADE_KERNEL void AddScaled(int n, double k, const double* x, double* y) {
+    int i = 0;
+    for (; kStates == 0 && i + kRows <= n; i += kRows) {
+      Column sum, term;
+      sum.Load(y + i);
+      term.Load(x + i);
+      sum.Add(k, term);
+      sum.Store(y + i);
+    }
+    ALIDADE_UNROLL for (; i < n; ++i) y[i] += k * x[i];
+  }
+  /// S = L D L' in place, m x m by columns; false unless positive definite.
+  ALIDADE_KERNEL bool Factorise(int m, double* s, double* inverse_d) {
+    const int stride = PaddedSize(m);
+    ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
+      double* const l = s + std::ptrdiff_t{k} * stride;
+      if (!IsPositive(l[k])) return false;
+      inverse_d[k] = 1.0 / l[k];
+      ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {  // to the right, while l is still L D
+        AddScaled(m - j, -l[j] * inverse_d[k], l + j, s + std::ptrdiff_t{j} * stride + j);
+      }
+      ALIDADE_UNROLL for (int i = k + 1; i < m; ++i) l[i] *= inverse_d[k];
+    }
+    return true;
+  }
+  /// y <- L^-1 y.
+  ALIDADE_KERNEL void Substitute(int m, const double* l, double* y) {
+    const int stride = PaddedSize(m);
+    ALIDADE_UNROLL for (int k = 0; k + 1 < m; ++k) {
+      AddScaled(m - k - 1, -y[k], l + std::ptrdiff_t{k} * stride + k + 1, y + k + 1);
+    }
+  }
+
+  /// Rows [i, i + kRows) of column c of P.
+  ALIDADE_KERNEL Column ColumnOf(const SymmetricView& p, int c, int i) {
+    Column column;
+    if (kStates == 0 && c <= i) {
+      column.Load(p.data + std::ptrdiff_t{c} * p.stride + i);
+    } else {
+      double rows[kRows];
+      ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = p(i + r, c);
+      column.Load(rows);
+    }
+    return column;
+  }
+  /// P H' of `rows` rows of H, a multiple of kAtOnce, in the columns of w from `at` on.
+  template <int kAtOnce>
+  ALIDADE_KERNEL void Project(const Update& u, const SparseRows& rows, int m, int at) {
+    const SymmetricView p = Sized(u.p);
+    const int width = rows.width();
+    const int* const columns = rows.columns.data();
+    for (int i = 0; i < p.size; i += kRows) {
+      double* const pht = &At(u, u.w, i, at);
+      for (int r = 0; r < m; r += kAtOnce) {
+        Column sum[kAtOnce]{};
+        for (int c = 0; c < width; ++c) {
+          const Column column = ColumnOf(p, columns[c], i);
+          ALIDADE_UNROLL for (int k = 0; k < kAtOnce; ++k) {
+            sum[k].Add(rows.data[(r + k) * width + c], column);
+          }
+        }
+        ALIDADE_UNROLL for (int k = 0; k < kAtOnce; ++k) sum[k].Store(pht + (r + k) * kRows);
+      }
+    }
+  }
+  ALIDADE_KERNEL double Gate(const Update& u, const MeasurementRows& one) {
+    const int m = Rows(one.h.rows), width = one.h.width();
+    const double* const h = one.h.data;
+    const int* const columns = one.h.columns.data();
+    double* const s = one.s;
+    Project<M == 0 ? 1 : M>(u, one.h, m, one.column);
+    ALIDADE_UNROLL for (int i = 0; i < m; ++i) {
+      ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
+        double sum = s[i * m + j];
+        for (int c = 0; c < width; ++c) {
+          sum += h[i * width + c] * At(u, u.w, columns[c], one.column + j);
+        }
+        s[i * m + j] = s[j * m + i] = sum;
+      }
+    }
+    const double* const r = one.innovation;
+    if (M == 1) return IsPositive(s[0]) ? r[0] * r[0] / s[0] : kNotANumber;
+    const int stride = PaddedSize(m);
+    ALIDADE_UNROLL for (int j = 0; j < m; ++j) {
+      ALIDADE_UNROLL for (int i = j; i < m; ++i) u.s[j * stride + i] = s[i * m + j];
+      u.y[j] = r[j];
+    }
+    if (!Factorise(m, u.s, u.inverse_d)) return kNotANumber;
+    Substitute(m, u.s, u.y);
+    double nis = 0.0;
+    ALIDADE_UNROLL for (int i = 0; i < m; ++i) nis += u.y[i] * u.y[i] * u.inverse_d[i];
+    return nis;
+  }
+
+  /// The lower triangle of S, and the innovations.
+  ALIDADE_KERNEL void Stack(const Update& u, int m) {
+    const int stride = PaddedSize(m);
+    for (const MeasurementRows& one : u.measurements) {
+      const int at = one.column, rows = one.h.rows, width = one.h.width();
+      const int* const columns = one.h.columns.data();
+      const double* h = one.h.data;
+      for (int r = 0; r < rows; ++r, h += width) {
+        double* const s = u.s + at + r;
+        for (int j = 0; j < at; ++j) {
+          double sum = 0.0;
+          for (int c = 0; c < width; ++c) sum += h[c] * At(u, u.w, columns[c], j);
+          s[std::ptrdiff_t{j} * stride] = sum;
+        }
+        for (int j = 0; j <= r; ++j) s[std::ptrdiff_t{at + j} * stride] = one.s[r * rows + j];
+        u.y[at + r] = one.innovation[r];
+      }
+    }
+  }
+  /// A panel of P H' to one of W, kRows columns at a time.
+  ALIDADE_KERNEL void Divide(int m, const double* l, double* panel) {
+    const int stride = PaddedSize(m);
+    int j = 0;
+    for (; kStates == 0 && j + kRows <= m; j += kRows) {
+      Column x[kRows];
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(panel + (j + c) * kRows);
+      for (int k = 0; k < j; ++k) {
+        Column done;
+        done.Load(panel + k * kRows);
+        const double* const row = l + std::ptrdiff_t{k} * stride + j;
+        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(row[c], done);
+      }
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
+        ALIDADE_UNROLL for (int k = 0; k < c; ++k) {
+          x[c].Subtract(l[std::ptrdiff_t{j + k} * stride + j + c], x[k]);
+        }
+        x[c].Store(panel + (j + c) * kRows);
+      }
+    }
+    ALIDADE_UNROLL for (; j < m; ++j) {
+      Column x;
+      x.Load(panel + j * kRows);
+      ALIDADE_UNROLL for (int k = 0; k < j; ++k) {
+        Column done;
+        done.Load(panel + k * kRows);
+        x.Subtract(l[std::ptrdiff_t{k} * stride + j], done);
+      }
+      x.Store(panel + j * kRows);
+    }
+  }
+  /// dx and the variances of P' in the rows of a panel from i on.
+  ALIDADE_KERNEL Solution Correct(const Update& u, int m, int i, const double* panel) {
+    const SymmetricView p = Sized(u.p);
+    Column dx{}, lost{};
+    ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
+      Column w;
+      w.Load(panel + k * kRows);
+      dx.Add(u.inverse_d[k] * u.y[k], w);
+      lost.AddSquares(u.inverse_d[k], w);
+    }
+    dx.Store(u.dx + i);
+    lost.Store(u.lost + i);
+    double defect = 0.0;  // or not a number
+    bool cancels = false;
+    ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) {
+      const double before = p.data[std::ptrdiff_t{i + r} * (p.stride + 1)];
+      const double after = before - u.lost[i + r];
+      defect += 0.0 * u.dx[i + r] + 0.0 * after;
+      cancels |= after < kCancelled * before;
+    }
+    if (defect != 0.0) return Solution::kNotFinite;
+    return cancels ? Solution::kCancels : Solution::kFine;
+  }
+  /// A panel of K from one of W.
+  ALIDADE_KERNEL void Gain(const Update& u, int m, const double* panel, double* gain) {
+    const int stride = PaddedSize(m);
+    ALIDADE_UNROLL for (int j = m - 1; j >= 0; --j) {
+      Column w, k{};
+      w.Load(panel + j * kRows);
+      k.Add(u.inverse_d[j], w);
+      ALIDADE_UNROLL for (int i = j + 1; i < m; ++i) {
+        Column done;
+        done.Load(gain + i * kRows);
+        k.Subtract(u.s[std::ptrdiff_t{j} * stride + i], done);
+      }
+      k.Store(gain + j * kRows);
+    }
+  }
+
+  ALIDADE_KERNEL Solution Solve(const Update& u) {
+    const int n = Sized(u.p).size, m = Rows(u.m);
+    Stack(u, m);
+    if (!Factorise(m, u.s, u.inverse_d)) return Solution::kNotPositiveDefinite;
+    Substitute(m, u.s, u.y);
+    Solution worst = Solution::kFine;
+    for (int i = 0; i < n; i += kRows) {
+      double* const panel = &At(u, u.w, i, 0);
+      Divide(m, u.s, panel);
+      worst = std::max(worst, Correct(u, m, i, panel));
+      if (u.gain != nullptr) Gain(u, m, panel, &At(u, u.gain, i, 0));
+    }
+    return worst;
+  }
+
+  /// P'(i, j) of kTile panels of rows from i and one of columns from j; `scaled`: D^-1 times the
+  /// panel of W at j.
+  template <int kTile>
+  ALIDADE_KERNEL void Tile(const Update& u, int m, int i, int j, const double* scaled) {
+    const std::ptrdiff_t stride = Sized(u.p).stride;
+    double* const p = u.p.data + j * stride + i;
+    const double* const w = &At(u, u.w, i, 0);
+    Column sum[kRows][kTile];
+    ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
+      ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Load(p + c * stride + t * kRows);
+    }
+    for (int k = 0; k < m; ++k) {
+      Column left[kTile];
+      ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
+        left[t].Load(w + (std::ptrdiff_t{t} * u.capacity + k) * kRows);
+      }
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
+        ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
+          sum[c][t].Subtract(scaled[k * kRows + c], left[t]);
+        }
+      }
+    }
+    ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
+      ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Store(p + c * stride + t * kRows);
+    }
+  }
+  ALIDADE_KERNEL void Downdate(const Update& u) {
+    const int n = Sized(u.p).size, m = Rows(u.m);
+    double few[M > 0 ? M * kRows : 1];
+    double* const scaled = M > 0 ? few : u.scaled;
+    for (int j = 0; j < n; j += kRows) {
+      ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
+        Column w, column{};
+        w.Load(&At(u, u.w, j, k));
+        column.Add(u.inverse_d[k], w);
+        column.Store(scaled + k * kRows);
+      }
+      int i = j;
+      for (; i + kHigh * kRows <= n; i += kHigh * kRows) Tile<kHigh>(u, m, i, j, scaled);
+      for (; i < n; i += kRows) Tile<1>(u, m, i, j, scaled);
+    }
+  }
+
+  /// K: k, or 0 if it is known at run time alone.
+  template <int K>
+  ALIDADE_KERNEL bool PropagateRows(const SymmetricView& whole, const Transition& step) {
+    const SymmetricView p = Sized(whole);
+    const int n = p.size, stride = PaddedSize(n);
+    const int k = K > 0 ? K : static_cast<int>(step.rows.size());
+    const int* const rows = step.rows.data();
+    double few[K > 0 ? 2 * K * kSmall : 1];
+    double* const before = K > 0 ? few : step.memory;  // P_a
+    double* const moved = before + std::ptrdiff_t{k} * stride;
+    ALIDADE_UNROLL for (int c = 0; c < k; ++c) {
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) before[c * stride + i] = p(rows[c], i);
+    }
+    for (int i = 0; i < n; i += kRows) {  // F P_a
+      ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
+        Column sum{};
+        ALIDADE_UNROLL for (int c = 0; c < k; ++c) {
+          Column row;
+          row.Load(before + c * stride + i);
+          sum.Add(step.f[r * k + c], row);
+        }
+        sum.Store(moved + r * stride + i);
+      }
+    }
+    double own[K > 0 ? K * K : 1], defect = 0.0;
+    double* const q = K > 0 ? own : before;  // P_a is not needed any more
+    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
+      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
+        double sum = step.q[r * k + c];
+        ALIDADE_UNROLL for (int j = 0; j < k; ++j) {
+          sum += moved[r * stride + rows[j]] * step.f[c * k + j];
+        }
+        q[r * k + c] = sum;
+      }
+      defect += 0.0 * q[r * k + r];
+    }
+    if (defect != 0.0) return false;
+    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p(rows[r], i) = moved[r * stride + i];
+    }
+    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
+      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = q[r * k + c];
+    }
+    return true;
+  }
+  ALIDADE_KERNEL bool Propagate(const SymmetricView& p, const Transition& step) {
+    if constexpr (kStates >= 1) {
+      if (step.rows.size() == 1) return PropagateRows<1>(p, step);
+    }
+    if constexpr (kStates >= 2) {
+      if (step.rows.size() == 2) return PropagateRows<2>(p, step);
+    }
+    return PropagateRows<0>(p, step);
+  }
+};
+
+/// The table of one Column, compiled for an instruction set.
+#define ALIDADE_KERNEL_TABLE(table, target, text)                                      \
+  template <class Column>                                                              \
+  struct table {                                                                       \
+    template <int M>                                                                   \
+    target static double Gate(const Update& u, const MeasurementRows& one) {           \
+      return Arithmetic<Column, M>::Gate(u, one);                                      \
+    }                                                                                  \
+    template <int M>                                                                   \
+    target static Solution Solve(const Update& u) {                                    \
+      return Arithmetic<Column, M>::Solve(u);                                          \
+    }                                                                                  \
+    template <int M>                                                                   \
+    target static void Downdate(const Update& u) {                                     \
+      Arithmetic<Column, M>::Downdate(u);                                              \
+    }                                                                                  \
+    target static void Project(const Update& u, const SparseRows& h, int column) {     \
+      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);                \
+    }                                                                                  \
+    target static bool Propagate(const SymmetricView& p, const Transition& step) {     \
+      return Arithmetic<Column, 0>::Propagate(p, step);                                \
+    }                                                                                  \
+    static constexpr Kernels kTable{text,                                              \
+                                    Column::kRows,                                     \
+                                    {Gate<1>, Gate<2>, Gate<0>},                       \
+                                    {Solve<1>, Solve<2>, Solve<0>},                    \
+                                    {Downdate<1>, Downdate<2>, Downdate<0>},           \
+                                    Project,                                           \
+                                    Propagate};                                        \
+  };
+ALIDADE_KERNEL_TABLE(Baseline, , "baseline")
+#if defined(__x86_64__)
+ALIDADE_KERNEL_TABLE(Avx2, [[gnu::target("avx2,fma")]], "AVX2")
+ALIDADE_KERNEL_TABLE(Avx512, [[gnu::target("avx512f,avx2,fma")]], "AVX-512")
+#endif
+
+template <int... N>
+constexpr std::array<const Kernels*, kSmall + 1> SmallKernels(std::integer_sequence<int, N...>) {
+  return {nullptr, &Baseline<Scalars<N + 1>>::kTable...};
+}
+
+}  // namespace
+
+const Kernels& KernelsFor(const SymmetricView& p) {
+  static constexpr auto kTables = SmallKernels(std::make_integer_sequence<int, kSmall>());
+  static const Kernels& vectors = VectorKernelsOf(BestInstructionSet());
+  const bool small = p.stride == kSmall && p.size > 0;
+  return small ? *kTables[static_cast<std::size_t>(p.size)] : vectors;
+}
+
+const Kernels& VectorKernelsOf([[maybe_unused]] InstructionSet set) {
+#if defined(__x86_64__)
+  if (set == InstructionSet::kAvx512) return Avx512<Vector<8>>::kTable;
+  if (set == InstructionSet::kAvx2) return Avx2<Vector<4>>::kTable;
+#endif
+  return Baseline<Vector<2>>::kTable;
+}
+
+}  // namespace alidade::internal

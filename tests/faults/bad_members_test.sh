@@ -40,4 +40,8 @@ for number in 10 11; do
   refused "$number" Moved 'StepJacobian exists but cannot be called as StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F, MatrixRef G) const'
 done
 refused 12 Moved 'Stationary exists but cannot be called as bool Stationary() const'
+refused 13 Seen 'a sensor needs template <class T> bool Predict(const T* role..., [const double* known,] T* z) const'
+refused 14 Seen 'a sensor needs template <class T> void SqrtNoise(const T* role..., [const double* known,] [const T* z,] T* L) const'
+refused 15 Moved 'a motion model needs template <class T> void Step(const T* block..., [const T* u,] const T* w, double dt_s, T* next...) const'
+refused 16 Moved 'a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const'
 echo "all are refused in words"

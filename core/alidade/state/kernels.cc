@@ -377,34 +377,34 @@ struct Arithmetic {
 };
 
 /// The table of one Column, compiled for an instruction set.
-#define ALIDADE_KERNEL_TABLE(table, target, text)                                      \
-  template <class Column>                                                              \
-  struct table {                                                                       \
-    template <int M>                                                                   \
-    target static double Gate(const Update& u, const MeasurementRows& one) {           \
-      return Arithmetic<Column, M>::Gate(u, one);                                      \
-    }                                                                                  \
-    template <int M>                                                                   \
-    target static Solution Solve(const Update& u) {                                    \
-      return Arithmetic<Column, M>::Solve(u);                                          \
-    }                                                                                  \
-    template <int M>                                                                   \
-    target static void Downdate(const Update& u) {                                     \
-      Arithmetic<Column, M>::Downdate(u);                                              \
-    }                                                                                  \
-    target static void Project(const Update& u, const SparseRows& h, int column) {     \
-      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);                \
-    }                                                                                  \
-    target static bool Propagate(const SymmetricView& p, const Transition& step) {     \
-      return Arithmetic<Column, 0>::Propagate(p, step);                                \
-    }                                                                                  \
-    static constexpr Kernels kTable{text,                                              \
-                                    Column::kRows,                                     \
-                                    {Gate<1>, Gate<2>, Gate<0>},                       \
-                                    {Solve<1>, Solve<2>, Solve<0>},                    \
-                                    {Downdate<1>, Downdate<2>, Downdate<0>},           \
-                                    Project,                                           \
-                                    Propagate};                                        \
+#define ALIDADE_KERNEL_TABLE(table, target, text)                                  \
+  template <class Column>                                                          \
+  struct table {                                                                   \
+    template <int M>                                                               \
+    target static double Gate(const Update& u, const MeasurementRows& one) {       \
+      return Arithmetic<Column, M>::Gate(u, one);                                  \
+    }                                                                              \
+    template <int M>                                                               \
+    target static Solution Solve(const Update& u) {                                \
+      return Arithmetic<Column, M>::Solve(u);                                      \
+    }                                                                              \
+    template <int M>                                                               \
+    target static void Downdate(const Update& u) {                                 \
+      Arithmetic<Column, M>::Downdate(u);                                          \
+    }                                                                              \
+    target static void Project(const Update& u, const SparseRows& h, int column) { \
+      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);            \
+    }                                                                              \
+    target static bool Propagate(const SymmetricView& p, const Transition& step) { \
+      return Arithmetic<Column, 0>::Propagate(p, step);                            \
+    }                                                                              \
+    static constexpr Kernels kTable{text,                                          \
+                                    Column::kRows,                                 \
+                                    {Gate<1>, Gate<2>, Gate<0>},                   \
+                                    {Solve<1>, Solve<2>, Solve<0>},                \
+                                    {Downdate<1>, Downdate<2>, Downdate<0>},       \
+                                    Project,                                       \
+                                    Propagate};                                    \
   };
 ALIDADE_KERNEL_TABLE(Baseline, , "baseline")
 #if defined(__x86_64__)

@@ -53,7 +53,7 @@ struct Update {
   SymmetricView p;
   std::span<const MeasurementRows> measurements;  ///< one after the other
   int m;
-  int capacity;       ///< columns that a panel has room for
+  int capacity;  ///< columns that a panel has room for
   int panel_rows;
   double* w;          ///< PaddedSize(n) x capacity: P H', then W
   double* s;          ///< PaddedSize(capacity) x capacity by columns: S, then L

@@ -51,9 +51,8 @@ struct KernelProblem {
   Update Begin(const Kernels& kernels) {
     const auto number = [](int count) { return static_cast<std::size_t>(count); };
     const int rows = PaddedSize(capacity);
-    memory.assign(number(stride * (stride + 2 * capacity + 2) + rows * (capacity + 2) +
-                         8 * capacity),
-                  0.0);
+    memory.assign(
+        number(stride * (stride + 2 * capacity + 2) + rows * (capacity + 2) + 8 * capacity), 0.0);
     double* next = memory.data();
     const auto take = [&](int count) { return std::exchange(next, next + count); };
     update = {};
@@ -129,8 +128,8 @@ void ForAllKernels(const Test& test) {
 
 TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
   Random random(1);
-  const std::vector<std::vector<int>> updates = {{1},       {2},       {1, 1}, {3},
-                                                 {2, 1, 3}, {1, 6, 2}, std::vector<int>(20, 2)};
+  const std::vector<std::vector<int>> updates = {
+      {1}, {2}, {1, 1}, {3}, {2, 1, 3}, {1, 6, 2}, std::vector<int>(20, 2)};
   ForAllKernels([&](const Kernels& kernels, int n) {
     for (const std::vector<int>& rows : updates) {
       KernelProblem problem(n, rows, random);
@@ -144,9 +143,10 @@ TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
         const MatrixXd own = s.block(at, at, m, m);
         const VectorXd r = problem.r.middleRows(at, m);
         EXPECT_NEAR(nis, r.dot(own.llt().solve(r)), kKernelRounding * (1.0 + nis));
-        EXPECT_LE(RelativeDifference(problem.ones[static_cast<std::size_t>(
-                                 &one - problem.measurements.data())].s, own),
-                  kKernelRounding);
+        EXPECT_LE(
+            RelativeDifference(
+                problem.ones[static_cast<std::size_t>(&one - problem.measurements.data())].s, own),
+            kKernelRounding);
         at += m;
       }
       EXPECT_EQ(Kernels::For(kernels.solve, at)(update), Solution::kFine);
@@ -156,11 +156,13 @@ TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
         EXPECT_NEAR(update.dx[i], dx(i), kKernelRounding * (1.0 + dx.norm()));
         EXPECT_NEAR(update.lost[i], lost(i), kKernelRounding * (1.0 + lost.norm()));
         for (int j = 0; j < at; ++j) {
-          EXPECT_NEAR(update.At(update.gain, i, j), gain(i, j), kKernelRounding * (1.0 + gain.norm()));
+          EXPECT_NEAR(update.At(update.gain, i, j), gain(i, j),
+                      kKernelRounding * (1.0 + gain.norm()));
         }
       }
       Kernels::For(kernels.downdate, at)(update);
-      EXPECT_LE(RelativeDifference(problem.Covariance(), p - gain * s * gain.transpose()), kKernelRounding);
+      EXPECT_LE(RelativeDifference(problem.Covariance(), p - gain * s * gain.transpose()),
+                kKernelRounding);
       for (int i = n; i < problem.stride; ++i) {
         for (int j = 0; j < i && kernels.panel_rows != n; ++j) EXPECT_EQ(update.p(i, j), 0.0);
       }
@@ -184,8 +186,9 @@ TEST(Kernels, AStepIsThatOfTheTextbook) {
       noise(rows, rows) = q;
       std::vector<double> memory(static_cast<std::size_t>(2 * k * problem.stride));
       EXPECT_TRUE(kernels.propagate(update.p, {rows, f.data(), q.data(), memory.data()}));
-      EXPECT_LE(RelativeDifference(problem.Covariance(), whole * problem.p * whole.transpose() + noise),
-                kKernelRounding);
+      EXPECT_LE(
+          RelativeDifference(problem.Covariance(), whole * problem.p * whole.transpose() + noise),
+          kKernelRounding);
     }
   });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models with an optional member that cannot be called, one for each value of BAD_MEMBER, and 0: a
+// Models with a member that is missing or cannot be called, one for each value of BAD_MEMBER, and 0: a
 // model without one. Each must be refused in words: see bad_members_test.sh.
 #include "alidade/model/plugin.h"
 
@@ -40,7 +40,7 @@ struct Seen : Base {
 #elif BAD_MEMBER == 3
   template <class T>
   void Jacobian(const T*, const T*, T*, T*) const {}
-  void Jacobian(double) const {}  // neither of the two
+  void Jacobian(double) const {}                    // neither of the two
 #elif BAD_MEMBER == 4
  private:
   void Jacobian(const double*, const double*, MatrixRef, MatrixRef) const {}
@@ -58,6 +58,17 @@ struct Seen : Base {
   template <class T>
   bool Initialise(const T*, T*) const {  // the role b is missing
     return true;
+  }
+#elif BAD_MEMBER == 13
+  template <class T>
+  bool Predict(const T* a, T* z) const {  // the role b is missing
+    z[0] = a[0];
+    return true;
+  }
+#elif BAD_MEMBER == 14
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) {  // not const
+    l[0] = T(1.0);
   }
 #endif
 };
@@ -79,6 +90,11 @@ struct Moved : MotionBase {
   }
   void StepJacobian(const double*, const double*, const double*, double, MatrixRef,
                     MatrixRef) const {}
+#elif BAD_MEMBER == 15
+  template <class T>
+  void Step(const T* x, double, T* next) const {  // no noise
+    next[0] = x[0];
+  }
 #else
   template <class T>
   void Step(const T* x, const T* w, double, T* next) const {
@@ -94,6 +110,8 @@ struct Moved : MotionBase {
   void StepJacobian(const double*, double, MatrixRef, MatrixRef) const {}  // no noise
 #elif BAD_MEMBER == 12
   bool Stationary(double) const { return false; }
+#elif BAD_MEMBER == 16
+  void SqrtQ(MatrixRef l) const { l(0, 0) = 1.0; }  // no dt
 #endif
 };
 

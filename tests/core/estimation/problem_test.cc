@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Problems that are built in code are those of a config, and what does not fit is refused in words.
+#include <gtest/gtest.h>
+
+#include "alidade/base/error.h"
+#include "alidade/estimation.h"
+#include "motion_models/constant.h"
+#include "motion_models/constant_velocity.h"
+#include "sensors/pseudorange.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using Point = ConstantVelocity<1, false>;
+
+/// What is thrown when `add` is called with a problem that has the state `target`.
+template <class Add>
+std::string Refusal(const Add& add) {
+  System problem;
+  const auto target =
+      problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
+  try {
+    add(problem, target);
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
+    return e.what();
+  }
+  return "nothing";
+}
+
+TEST(Problem, OfCodeIsThatOfBindingsByHand) {
+  System problem;
+  const auto target =
+      problem.AddState("target", Point(1.0), {{"velocity", 0.0, 0.5}, {"position", 0.35, 0.1}});
+  const auto model = problem.AddState("template", Constant<1>(1), {{"value", 3.3, 0.5}});
+  const auto stereo =
+      problem.AddSensor("disparity", StereoDisparity(400.0, 0.065, 1.0), {target["position"]});
+  const auto scale = problem.AddSensor("inverse_scale", Scale2d::FromPixels(300.0, 1.0),
+                                       {target["position"], model["value"]});
+  const System by_hand = testing::DepthFilter();
+  Ekf ekf(problem), other(by_hand, {}, testing::StreamsOf(by_hand));
+  for (int k = 0; k < 20; ++k) {
+    const Timestamp now = TimestampFromSeconds(0.1 * k);
+    const double depth = 0.35 + 0.01 * k;
+    ekf.Push(now, {{stereo, {26.0 / depth}}, {scale, {3.3 * depth}}});
+    other.Process(testing::FrameAt(0.1 * k, {{0, 26.0 / depth}, {1, 3.3 * depth}}));
+    ASSERT_EQ(ekf.state().values(), other.state().values());
+    ASSERT_EQ(ekf.state().covariance().Dense(), other.state().covariance().Dense());
+  }
+  const auto [value, sigma] = ekf.Estimate(target["position"]);
+  EXPECT_EQ(value[0], *ekf.state().value(target["position"]));
+  EXPECT_EQ(sigma[0], ekf.state().sigma(target["position"]));
+}
+
+TEST(Problem, ASensorBringsTheStatesThatItOwns) {
+  System problem;
+  const auto receiver =
+      problem.AddState("receiver", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 10.0}});
+  const std::size_t before = problem.motions.size();
+  const auto sensor = problem.AddSensor("range", Pseudorange(1.0), {receiver["value"]});
+  ASSERT_GE(problem.motions.size(), before + 1);
+  EXPECT_EQ(problem.motions.back().name, "range");
+  EXPECT_GE(problem.sensors[0].roles.back().block, 0);
+  EXPECT_EQ(problem.streams[static_cast<std::size_t>(sensor.stream)].known, 3);
+}
+
+TEST(Problem, ABlockMayStartFromAMeasurement) {
+  System problem;
+  const auto target = problem.AddState(
+      "target", Point(1.0),
+      {InitialValue::FromMeasurement("position", "stereo"), {"velocity", 0.0, 0.5}});
+  const auto stereo =
+      problem.AddSensor("stereo", StereoDisparity(400.0, 0.065, 1.0), {target["position"]});
+  Ekf ekf(problem);
+  ekf.Push(0, stereo, 52.0);
+  EXPECT_NEAR(ekf.Estimate(target["position"]).value[0], 0.5, 1e-12);
+  EXPECT_NEAR(ekf.Estimate(target["position"]).sigma[0], 0.5 / 52.0, 1e-12);
+}
+
+TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
+  const StereoDisparity stereo(400.0, 0.065, 1.0);
+  EXPECT_EQ(Refusal([](System& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
+            "state 'target' is there already");
+  EXPECT_EQ(Refusal([](System& p, auto&) {
+              p.AddState("b", Point(1.0), {{"position", 0.0, 1.0}});
+            }),
+            "state 'b' needs an initial value of 'velocity'");
+  EXPECT_EQ(Refusal([](System& p, auto&) {
+              p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
+            }),
+            "state 'b' has no block 'depth'; those of model 'b' are position, velocity");
+  EXPECT_EQ(Refusal([](System& p, auto&) {
+              p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
+            }),
+            "state 'b' needs 3 numbers as the initial value of 'value', a vector(3), not 2");
+  EXPECT_EQ(Refusal([](System& p, auto&) {
+              p.AddState("b", Constant<1>(1), {{"value", 0.0, -1.0}});
+            }),
+            "state 'b' needs a finite standard deviation of at least 0, or 1 of them, with the "
+            "initial value of 'value', a vector(1)");
+  EXPECT_EQ(Refusal([](System&, auto& target) { static_cast<void>(target["depth"]); }),
+            "state 'target' has no block 'depth'; its blocks are position, velocity");
+  EXPECT_EQ(Refusal([&](System& p, auto&) { p.AddSensor("s", stereo, {}); }),
+            "sensor 's' needs a block that fills its role 'depth', a vector(1)");
+  EXPECT_EQ(Refusal([&](System& p, auto& t) {
+              p.AddSensor("s", stereo, {t["position"], t["velocity"]});
+            }),
+            "sensor 's' has 1 roles to be filled: depth");
+  EXPECT_EQ(Refusal([&](System& p, auto&) {
+              const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
+              p.AddSensor("s", stereo, {wide["value"]});
+            }),
+            "sensor 's' has a role 'depth', a vector(1); block 'wide.value' is a vector(2)");
+}
+
+}  // namespace
+}  // namespace alidade

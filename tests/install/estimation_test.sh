@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/install/estimation_test.sh CMAKE BUILD COMPILER OPTIONS [CXXFLAG...] INCLUDE...
+#
+# Installs the component `estimation` of BUILD into an empty folder, which then has no header of another
+# room, and builds the C++ examples against it and Eigen (INCLUDE) alone. They must give what they
+# estimate.
+set -euo pipefail
+cmake=$1 build=$2 compiler=$3
+IFS=',' read -ra options <<<"$4"
+shift 4
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() {
+  echo "error: $*" >&2
+  exit 1
+}
+
+"$cmake" --install "$build" --prefix "$work/alidade" --component estimation >"$work/log" ||
+  { cat "$work/log" >&2; exit 1; }
+include=$work/alidade/include
+for room in io config plugin experiment record; do
+  [[ ! -e $include/alidade/$room ]] || fail "the component has headers of $room"
+done
+foreign=$(grep -rhoE '#include <(yaml|boost|spdlog|openssl|nlohmann|ceres|opencv)[^>]*>' "$include" || true)
+[[ -z $foreign ]] || fail "headers of the component include $foreign"
+library=$(find "$work/alidade" -name libalidade-estimation.so)
+[[ -n $library ]] || fail "the component has no library"
+
+flags=(-std=c++20 -O1 -I"$include")
+for argument in "$@"; do
+  [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
+done
+# run EXAMPLE: what it prints.
+run() {
+  "$compiler" "${flags[@]}" "${options[@]}" "examples/$1/main.cc" -o "$work/$1" \
+    "$library" -Wl,-rpath,"$(dirname "$library")"
+  "$work/$1"
+}
+
+# The last depth is within 4 sigma of the truth.
+run 31_depth_cpp | tee "$work/depth" | tail -1 |
+  awk '{ d = $3 - $7; if (d * d > 16 * $5 * $5 || $5 > 0.01) exit 1 }' ||
+  fail "examples/31_depth_cpp says: $(cat "$work/depth")"
+run 32_landmarks_cpp >"$work/landmarks"
+found=$(grep -c '^landmark' "$work/landmarks")
+((found >= 8)) || fail "examples/32_landmarks_cpp maps $found landmarks: $(cat "$work/landmarks")"
+awk -F'[(,)]' '/^robot/ {
+    for (i = 0; i < 2; ++i) {
+      d = $(2 + i) - $(8 + i); s = $(5 + i)
+      if (d * d > 16 * s * s || s > 0.5) exit 1
+    }
+  }' "$work/landmarks" || fail "examples/32_landmarks_cpp says: $(cat "$work/landmarks")"
+echo "both examples build and run on the component alone"

@@ -128,6 +128,7 @@ std::vector<ParamInfo> ListedKeys(const std::string& keys) {
 }  // namespace
 
 AlidadeEntry PluginHost::EntryOf(const PluginEntry& entry) const {
+  ALIDADE_EXPECTS(entry.is_model());
   const AlidadeTable table = internal::ReadPrefix(LoadedFrom(entry.plugin).table);
   for (std::uint32_t i = 0; i < table.entry_count; ++i) {
     const AlidadeEntry c = internal::ReadEntry(table.entries, table.entry_stride, i);
@@ -197,8 +198,8 @@ void PluginHost::CallFactory(const PluginEntry& entry, const Node& node,
 
 std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   ParamRecorder recorder;
-  const std::lock_guard lock(create_mutex_);
   const AlidadeEntry c = EntryOf(entry);
+  const std::lock_guard lock(create_mutex_);
   recorder.Run([&] {
     NewInstance instance(entry);
     static_cast<void>(instance.Create(c, recorder.host()));

@@ -35,6 +35,7 @@ TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
   const std::vector<ParamInfo> schema = SourceSchema(host, *counter);
   EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
   EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
+  EXPECT_THROW(host.Schema(*counter), ContractViolation);
 }
 
 TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/error.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "motion_models/constant_velocity.h"

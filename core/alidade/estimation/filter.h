@@ -60,18 +60,24 @@ inline EkfOptions WithoutRecovery(EkfOptions options) {
 
 /// A measurement of a sensor, or a control input of a state, as it comes.
 struct Reading {
-  Reading(int number, std::vector<double> numbers, std::int64_t of_landmark = -1)
-      : stream(number), values(std::move(numbers)), landmark(of_landmark) {}
-  Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t of_landmark = -1)
-      : Reading(sensor.stream, std::move(z), of_landmark) {}
+  Reading(int number, std::vector<double> numbers, std::int64_t of_landmark = -1,
+          std::vector<double> r = {}, std::vector<double> knowing = {})
+      : stream(number),
+        values(std::move(numbers)),
+        landmark(of_landmark),
+        covariance(std::move(r)),
+        known(std::move(knowing)) {}
+  Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t of_landmark = -1,
+          std::vector<double> r = {}, std::vector<double> knowing = {})
+      : Reading(sensor.stream, std::move(z), of_landmark, std::move(r), std::move(knowing)) {}
   /// Of a state whose model takes a control input.
   Reading(const StateHandle& state, std::vector<double> u) : Reading(state.input, std::move(u)) {}
 
   int stream;  ///< Filter::stream
   std::vector<double> values;
   std::int64_t landmark;
-  std::vector<double> covariance = {};  ///< row-major, overrides the model's noise; empty: none
-  std::vector<double> known = {};       ///< as many as its sensors take; mostly none
+  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
+  std::vector<double> known;       ///< as many as its sensors take; mostly none
 };
 
 /// What a sensor would measure.

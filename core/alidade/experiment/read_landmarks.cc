@@ -11,13 +11,13 @@
 namespace alidade {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr int kMost = 1'000'000;
 
 LandmarkOptions::Prior ReadPrior(const Node& node) {
   LandmarkOptions::Prior prior;
-  prior.inverse_distance = node.At("inverse_distance", "landmarks.prior").Number(0.0, kInfinity);
-  prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kInfinity, true);
+  prior.inverse_distance = node.At("inverse_distance", "landmarks.prior").Number(0.0, kUnbounded);
+  prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kUnbounded, true);
   if (const auto n = node.Find("adapt_after"))
     prior.adapt_after = static_cast<int>(n->Integer(1, kMost));
   if (const auto n = node.Find("min_observations"))
@@ -57,7 +57,7 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
     one.id = id.Integer(0, std::numeric_limits<std::int64_t>::max());
     const std::vector<double> position = node.At("position", "a known landmark").Numbers(3);
     std::ranges::copy(position, one.position.begin());
-    one.sigma = node.At("sigma", "a known landmark").Number(0.0, kInfinity);
+    one.sigma = node.At("sigma", "a known landmark").Number(0.0, kUnbounded);
     node.RejectUnread();
     if (!ids.insert(one.id).second) {
       id.Fail("landmark " + std::to_string(one.id) + " is listed twice", "each id once");
@@ -92,8 +92,8 @@ LandmarkOptions ReadOptions(const Node& node) {
   }
   if (const auto prune = node.Find("prune")) ReadPrune(*prune, options);
   if (const auto convert = node.Find("convert_to_xyz")) {
-    options.max_linearity_index =
-        convert->At("max_linearity_index", "landmarks.convert_to_xyz").Number(0.0, kInfinity, true);
+    options.max_linearity_index = convert->At("max_linearity_index", "landmarks.convert_to_xyz")
+                                      .Number(0.0, kUnbounded, true);
     convert->RejectUnread();
   }
   if (const auto negative = node.Find("negative_depth")) {

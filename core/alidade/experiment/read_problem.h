@@ -13,6 +13,6 @@ namespace alidade {
 /// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of a config's root. `only`
 /// keeps named sensors, in its own order, and the state entries that they touch; empty: everything.
 /// Errors: kBadConfig with place and remedy, kPlugin.
-System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
+System ReadProblem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
 
 }  // namespace alidade

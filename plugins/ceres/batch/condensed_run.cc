@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/estimation/rows.h"
 #include "alidade/state/dense_algebra.h"

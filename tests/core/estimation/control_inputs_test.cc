@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/error.h"
 #include "alidade/estimation/iekf.h"
 #include "alidade/estimation/rts.h"
 #include "alidade/estimation/square_root_ekf.h"

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <thread>
 
+#include "alidade/base/error.h"
 #include "alidade/base/random.h"
 #include "alidade/estimation/iekf.h"
 #include "alidade/estimation/square_root_ekf.h"

@@ -291,6 +291,10 @@ struct Wide : Sensor<Vec<20>, Vec<20>> {
     std::copy_n(x, 20, z);
     return true;
   }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < 20; ++i) l[21 * i] = T(1.0);
+  }
   void Jacobian(const double*, MatrixRef J_z_x) const {
     for (int r = 0; r < 20; ++r) {
       for (int c = 0; c < 20; ++c) J_z_x(r, c) = 100.0 * r + c;

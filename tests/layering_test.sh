@@ -102,7 +102,7 @@ sources() {
     function floor_of(path) {
       sub(/^(core|tools)\//, "", path)
       sub(/^alidade\//, "", path)
-      sub(/\/.*/, "", path)
+      sub(/\/.*|\.h$/, "", path)
       return path in floor ? floor[path] : 0
     }
     function foreign_to_model(path, bracket) {

@@ -201,10 +201,12 @@ class DirectMotion final : public MotionModel {
   Model model_;
 };
 
+/// The sensor of an author's struct; `name` is for messages.
 template <class Model>
 SharedSensor MakeSensor(Model model, std::string name = "model") {
   return std::make_shared<DirectSensor<Model>>(std::move(model), std::move(name));
 }
+/// The motion model of an author's struct; `name` is for messages.
 template <class Model>
 SharedMotion MakeMotion(Model model, std::string name = "model") {
   return std::make_shared<DirectMotion<Model>>(std::move(model), std::move(name));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models with a member that is missing or cannot be called, one for each value of BAD_MEMBER, and 0: a
+// Models with a member that is missing or cannot be called, one for each value of BAD_MEMBER; 0: a
 // model without one. Each must be refused in words: see bad_members_test.sh.
 #include "alidade/model/plugin.h"
 

@@ -180,7 +180,7 @@ System SystemOf(const Scene& scene) {
                       MakeSensor(DepthFeature<InverseDepth>(camera, kPixel, kDepth), "depth"),
                       {}};
   for (SensorBinding* sensor : {&pixels, &depth}) {
-    sensor->roles.resize(sensor->model.roles().size());
+    sensor->roles.resize(sensor->model->roles().size());
     for (std::size_t i = 0; i < 2; ++i) sensor->roles[i].block = binding.blocks[i];
     system.sensors.push_back(*sensor);
   }

@@ -42,14 +42,14 @@ run() {
 
 # The last depth is within 4 sigma of the truth.
 run 31_depth_cpp | tee "$work/depth" | tail -1 |
-  awk '{ d = $3 - $7; if (d * d > 16 * $5 * $5 || $5 > 0.01) exit 1 }' ||
+  awk '{ d = $3 - $8; if (d * d > 16 * $5 * $5 || $5 > 0.01) exit 1 }' ||
   fail "examples/31_depth_cpp says: $(cat "$work/depth")"
 run 32_landmarks_cpp >"$work/landmarks"
 found=$(grep -c '^landmark' "$work/landmarks")
 ((found >= 8)) || fail "examples/32_landmarks_cpp maps $found landmarks: $(cat "$work/landmarks")"
 awk -F'[(,)]' '/^robot/ {
     for (i = 0; i < 2; ++i) {
-      d = $(2 + i) - $(8 + i); s = $(5 + i)
+      d = $(2 + i) - $(10 + i); s = $(6 + i)
       if (d * d > 16 * s * s || s > 0.5) exit 1
     }
   }' "$work/landmarks" || fail "examples/32_landmarks_cpp says: $(cat "$work/landmarks")"

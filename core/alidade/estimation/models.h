@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/base/error.h"
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
 
@@ -97,8 +98,9 @@ class SensorModel {
   OwnedRole owned(std::size_t role) const;
 
   /// h, its Jacobians and L at the roles. kOutOfDomain: h is not defined there, and the outputs are
-  /// unspecified.
+  /// unspecified. ContractViolation if the known numbers that it takes are missing.
   Status Evaluate(const Observation& seen, const double* const* roles, const Output& out) const {
+    ALIDADE_EXPECTS(seen.known != nullptr || known_size_ == 0);
     if (out.sqrt_noise == nullptr || description_.sqrt_noise.empty()) {
       return DoEvaluate(seen, roles, out);
     }

@@ -79,7 +79,9 @@ bool SensorModel::has_landmark() const { return std::ranges::any_of(roles(), &Sp
 OwnedRole SensorModel::owned(std::size_t role) const {
   const auto found = description_.owned.find(role);
   if (found != description_.owned.end()) return found->second;
-  return {NeutralElement(roles()[role].geometry)};
+  OwnedRole neutral;
+  neutral.mean = NeutralElement(roles()[role].geometry);
+  return neutral;
 }
 
 Status SensorModel::Initialise(const double* const* roles, const Observation& seen,

@@ -32,6 +32,7 @@ enum class JacobianAt { kPrediction, kMeasurement };
 /// What fills a role of a sensor; a block alone is estimated.
 struct RoleBinding {
   RoleBinding() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): a block alone is a binding
   RoleBinding(BlockId id, RoleMode use = RoleMode::kEstimate,
               JacobianAt at = JacobianAt::kPrediction)
       : block(id), mode(use), jacobian_at(at) {}

@@ -149,7 +149,7 @@ struct Arithmetic {
     const double* const h = one.h.data;
     const int* const columns = one.h.columns.data();
     double* const s = one.s;
-    Project<M == 0 ? 1 : M>(u, one.h, m, one.column);
+    Project<std::max(M, 1)>(u, one.h, m, one.column);
     ALIDADE_UNROLL for (int i = 0; i < m; ++i) {
       ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
         double sum = s[i * m + j];

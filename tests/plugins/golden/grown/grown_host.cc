@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A host of a later minor version: core/alidade/plugin, compiled with the header that grow.sh makes.
+// A host of a later minor version: core/alidade/plugin with the header that grow.sh makes.
 // What a plugin of 1.0 does not say is zero to it, and what it lends besides is not looked at.
 // golden_models_test.cc is part of this program too.
 #include <dlfcn.h>

@@ -13,7 +13,7 @@
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/source_plugin.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/instruction_set.h"
 #include "command.h"
 #include "console.h"
 
@@ -79,7 +79,8 @@ void CheckVersions(Diagnosis& diagnosis) {
   diagnosis.Ok("alidade " ALIDADE_VERSION);
   diagnosis.Ok("built with " + Compiler() + ", Eigen " + EigenVersion() + ", yaml-cpp " +
                ALIDADE_YAML_CPP_VERSION + ", Boost " + ALIDADE_BOOST_VERSION);
-  diagnosis.Ok("processor: " + Processor() + "; kernels: " + internal::BestVectorKernels().name);
+  diagnosis.Ok("processor: " + Processor() +
+               "; kernels: " + ToString(internal::BestInstructionSet()));
 }
 
 std::string RemedyFor(const Refusal& refusal) {

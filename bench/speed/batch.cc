@@ -200,7 +200,9 @@ class StartOf : public Estimator {
     report_.Clear();
     for (const Measurement& m : frame.measurements) {
       MeasurementReport& one = report_.Add();
-      one.Reset(m.stream, m.landmark, m.stream == 1 ? 3 : 2);
+      one.sensor = m.stream;
+      one.landmark = m.landmark;
+      one.dof = m.stream == 1 ? 3 : 2;
       if (m.stream == 1) one.outcome = Outcome::kInitialised;
     }
     const Pose& at = scene_.start[next_++];

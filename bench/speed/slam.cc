@@ -36,7 +36,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/experiment/make_filter.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/instruction_set.h"
 #include "bench/speed/interleaved.h"
 #include "bench/speed/slam_peer.h"
 #include "support/temporary_folder.h"
@@ -368,7 +368,7 @@ int Main(int argc, char** argv) {
     config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
   }
   const PluginHost host;
-  const std::string kernels = internal::BestVectorKernels().name;
+  const std::string kernels = ToString(internal::BestInstructionSet());
   const Peak peak = PeakOf(kernels);
   std::printf("kernels: %s\n", kernels.c_str());
   for (const std::string& size : sizes) CompareSize(host, config, size, peak, rounds, peers);

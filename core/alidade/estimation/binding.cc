@@ -2,27 +2,9 @@
 #include "alidade/estimation/binding.h"
 
 #include "alidade/base/error.h"
-#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 namespace {
-
-/// Lays a row of H out as wide as P, where no two roles have the same block.
-void MakeWhole(SensorPlace& place, int size) {
-  for (std::size_t i = 0; i < place.parts.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (place.parts[i].offset == place.parts[j].offset) return;
-    }
-  }
-  place.whole = true;
-  place.width = size;
-  std::size_t part = 0;
-  for (int& column : place.columns) {
-    if (column < 0) continue;
-    column = place.parts[part].column = place.parts[part].offset;
-    ++part;
-  }
-}
 
 /// Adds a role: a block's place, with a Jacobian or without.
 void AddRole(SensorPlace& place, const Block& block, bool jacobian, bool considered) {
@@ -33,16 +15,21 @@ void AddRole(SensorPlace& place, const Block& block, bool jacobian, bool conside
   place.columns.back() = place.width;
   place.parts.push_back({block.tangent_offset, size, place.width});
   place.consider.push_back(considered);
+  place.considers |= considered;
+  for (int k = 0; k < size; ++k) place.rows.push_back(block.tangent_offset + k);
   place.width += size;
 }
 
-SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool small) {
+SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   SensorPlace place;
+  place.ambient = sensor.model->measurement().geometry.ambient;
+  place.dof = sensor.model->measurement().geometry.tangent;
+  place.has_landmark = sensor.model->has_landmark();
   for (const RoleBinding& role : sensor.roles) {
+    place.elsewhere |= role.block >= 0 && role.jacobian_at == JacobianAt::kMeasurement;
     const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
     AddRole(place, block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
   }
-  if (small && !sensor.model->has_landmark()) MakeWhole(place, initial.covariance().size());
   place.strides.assign(sensor.roles.size(), place.width);
   return place;
 }
@@ -50,19 +37,14 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool smal
 MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
   MotionPlace place;
   place.holds = motion.model->discrete_noise() && motion.model->noise_size() > 0;
-  int column = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = layout[id];
     const int size = block.geometry().tangent, offset = block.tangent_offset;
     place.values.push_back(block.value_offset);
-    for (int k = 0; k < size; ++k) place.at.push_back(offset < 0 ? -1 : offset + k);
-    if (offset < 0) continue;
-    if (!place.parts.empty() && place.parts.back().offset + place.parts.back().size == offset) {
-      place.parts.back().size += size;
-    } else {
-      place.parts.push_back({offset, size, column});
+    for (int k = 0; k < size; ++k) {
+      place.at.push_back(offset < 0 ? -1 : offset + k);
+      if (offset >= 0) place.rows.push_back(offset + k);
     }
-    column += size;
   }
   return place;
 }
@@ -82,10 +64,8 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
       streams(from),
       initial(system.InitialState(true)),
       stream_of_sensor(system.sensors.size(), -1) {
-  // Landmarks come behind: then P has no size of its own.
-  const bool small = IsSmall(initial.covariance()) && !system.landmarks;
   for (const SensorBinding& sensor : system.sensors) {
-    sensor_places.push_back(PlaceOf(sensor, initial, small));
+    sensor_places.push_back(PlaceOf(sensor, initial));
   }
   for (const MotionBinding& motion : system.motions) {
     motion_places.push_back(PlaceOf(motion, initial.layout()));

@@ -16,9 +16,13 @@ struct SensorPlace {
   std::vector<int> columns;         ///< by role: in a row of H; -1: no Jacobian
   std::vector<int> strides;         ///< for the model: `width` for each role
   std::vector<JacobianPart> parts;  ///< of a row of H
+  std::vector<int> rows;            ///< of P, by column of H
   std::vector<bool> consider;       ///< of the parts
-  int width = 0;                    ///< of a row of H
-  bool whole = false;               ///< a row of H is as wide as P, with its columns
+  bool considers = false;           ///< any of them
+  bool elsewhere = false;           ///< one is linearised at what the measurement implies
+  bool has_landmark = false;
+  int width = 0;             ///< of a row of H
+  int ambient = 0, dof = 0;  ///< of the measurement
 
   /// Gives its last roles, from `first` on, the places of the blocks of a landmark.
   void PutLandmark(std::size_t first, const StateLayout& layout,
@@ -27,10 +31,10 @@ struct SensorPlace {
 
 /// How a motion model moves the state, by places in x and P.
 struct MotionPlace {
-  std::vector<int> values;          ///< by block: in x
-  std::vector<JacobianPart> parts;  ///< of F, without the rows that are not in P
-  std::vector<int> at;              ///< in P, of each row of F; -1: not in P
-  bool holds = false;               ///< its noise is discrete
+  std::vector<int> values;  ///< by block: in x
+  std::vector<int> at;      ///< in P, of each row of F; -1: not in P
+  std::vector<int> rows;    ///< those that are in P
+  bool holds = false;       ///< its noise is discrete
 };
 
 /// A system on its layout: which stream each sensor reads, and where its blocks and those of the

@@ -7,8 +7,6 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
-#include "alidade/state/projection.h"
-#include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
@@ -37,6 +35,7 @@ void Consensus::Split(FilterState& f, std::span<Row* const> rows, std::uint64_t 
   for (std::size_t i = 0; i < matches_.size(); ++i) {
     (best_[i] != 0 ? agreed : rest).push_back(matches_[i]);
   }
+  std::ranges::sort(agreed, {}, &Row::column);
 }
 
 /// The best support, in best_.
@@ -76,10 +75,10 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const std::span<Row* const> itself = std::span(matches_).subspan(hypothesis, 1);
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
-  s = Eigen::Map<const RowMajor>(one.R.data(), m, m);
-  Project(f.state.covariance(), one.jacobian(), pht.data(), s.data());
+  s = Eigen::Map<const RowMajor>(own.s.data(), m, m);
+  f.update.CopyColumns(one.column, pht);  // P H', as the gate left it
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
-  ForEachConsidered(f, itself, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
+  ForEachConsidered(f, itself, [&](int offset, int size, int at, int k) {
     pht.block(offset, at, size, k).setZero();
   });
   Factorise(s);  // positive definite: it has passed the gate
@@ -92,11 +91,10 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
     Row& row = *matches_[i];
     const MeasurementReport& entry = *row.report;
     h_.resize(entry.z.size());
-    r_.resize(static_cast<std::size_t>(entry.dof));
+    r_.resize(entry.innovation.size());
     if (PredictAt(f, row, f.moved, h_.data()) != Outcome::kAccepted) continue;
     row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
-    work_.resize(r_.size() * (r_.size() + 1));
-    const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, work_.data());
+    const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, f.work);
     agrees_[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
   }
 }

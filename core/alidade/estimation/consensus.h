@@ -18,7 +18,7 @@ class Consensus {
   /// Whether the sensor of any of the rows asks for it.
   static bool IsAsked(std::span<Row* const> rows);
   /// Puts those of the rows that support the best hypothesis, and those of which none is asked,
-  /// into `agreed`, the others into `rest`. No match is tried twice, and the more support one has,
+  /// into `agreed`, in their order, the others into `rest`. No match is tried twice, and the more support one has,
   /// the fewer are tried: log(1 - confidence) / log(1 - share of support). The same `seed` tries
   /// them in the same order.
   void Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
@@ -38,7 +38,7 @@ class Consensus {
   Scratch<std::vector<Row*>> matches_;  ///< rows of sensors that ask for it
   std::vector<std::size_t> order_;      ///< in which they are tried
   std::vector<char> agrees_, best_;     ///< by match: whether it supports the hypothesis; the best
-  std::vector<double> h_, r_, work_;    ///< of one match
+  std::vector<double> h_, r_;           ///< of one match
 };
 
 }  // namespace alidade::internal

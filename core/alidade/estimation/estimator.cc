@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/estimator.h"
 
+#include <algorithm>
 #include <iterator>
 
 namespace alidade {
@@ -25,6 +26,24 @@ const char* ToString(Outcome outcome) {
                                     "not_ready", "failed",      "ended"};
   static_assert(std::size(kNames) == kOutcomes);
   return kNames[static_cast<int>(outcome)];
+}
+
+MeasurementReports& MeasurementReports::operator=(const MeasurementReports& other) {
+  if (this == &other) return *this;
+  Clear();
+  for (const MeasurementReport& from : other.entries_) {
+    MeasurementReport& entry = entries_.emplace_back(from);
+    for (auto* part : {&entry.z, &entry.h, &entry.innovation, &entry.s, &entry.gain}) {
+      *part = Copy(*part);
+    }
+  }
+  return *this;
+}
+
+Numbers MeasurementReports::Copy(Numbers values) {
+  double* const copy = numbers_.Take(values.size());
+  std::ranges::copy(values, copy);
+  return {copy, values.size()};
 }
 
 }  // namespace alidade

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/model/status.h"
+#include "alidade/state/arena.h"
 #include "alidade/state/state.h"
 
 namespace alidade {
@@ -37,29 +39,54 @@ const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
 
-/// All that is known of one measurement; m = dof, its tangent size. Empty: not reached.
+/// Numbers of a report, which lie in its memory.
+struct Numbers : std::span<const double> {
+  using std::span<const double>::span;
+  friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
+};
+
+/// All that is known of one measurement; m = dof, its tangent size. The numbers lie in the memory
+/// of the UpdateReport, as long as its entries do. Empty: not reached.
 struct MeasurementReport {
   int sensor = -1;  ///< index into System::sensors
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;                ///< r' S^-1 r, not divided by dof; S without the loss
-  std::vector<double> z, h;        ///< ambient
-  std::vector<double> innovation;  ///< r = z (-) h, m
-  std::vector<double> s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
+  double nis = 0.0;    ///< r' S^-1 r, not divided by dof; S without the loss
+  Numbers z, h;        ///< ambient
+  Numbers innovation;  ///< r = z (-) h, m
+  Numbers s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
   /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
   /// unless accepted.
-  std::vector<double> gain;
+  Numbers gain;
+};
 
-  /// Makes it that of a new measurement, nothing reached yet. The memory is kept.
-  void Reset(int of_sensor, std::int64_t of_landmark, int of_dof) {
-    sensor = of_sensor;
-    landmark = of_landmark;
-    dof = of_dof;
-    outcome = Outcome::kAccepted;
-    nis = 0.0;
-    for (std::vector<double>* part : {&z, &h, &innovation, &s, &gain}) part->clear();
+/// Entries of measurements, and the memory of their numbers, which is kept from one frame to the
+/// next. A copy has its own.
+class MeasurementReports {
+ public:
+  MeasurementReports() = default;
+  MeasurementReports(const MeasurementReports& other) { *this = other; }
+  MeasurementReports(MeasurementReports&&) = default;
+  MeasurementReports& operator=(const MeasurementReports& other);
+  MeasurementReports& operator=(MeasurementReports&&) = default;
+  ~MeasurementReports() = default;
+
+  std::span<const MeasurementReport> entries() const { return entries_; }
+  std::span<MeasurementReport> entries() { return entries_; }
+  MeasurementReport& Add() { return entries_.emplace_back(); }
+  /// Memory for `count` numbers, of any value.
+  double* Allocate(std::size_t count) { return numbers_.Take(count); }
+  /// A copy of the values in that memory.
+  Numbers Copy(Numbers values);
+  void Clear() {
+    entries_.clear();
+    numbers_.Reset();
   }
+
+ private:
+  std::vector<MeasurementReport> entries_;
+  Arena numbers_;
 };
 
 /// Something that happened to the filter, worth a line to its user.
@@ -77,13 +104,14 @@ inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
 /// What one frame did. Filled again and again without allocating.
 class UpdateReport {
  public:
-  std::span<const MeasurementReport> measurements() const { return {pool_.data(), count_}; }
-  std::span<MeasurementReport> measurements() { return {pool_.data(), count_}; }
+  std::span<const MeasurementReport> measurements() const { return measurements_.entries(); }
+  std::span<MeasurementReport> measurements() { return measurements_.entries(); }
   /// One more; references to the others end.
-  MeasurementReport& Add() {
-    const auto next = pool_.begin() + static_cast<std::ptrdiff_t>(count_++);
-    return next == pool_.end() ? pool_.emplace_back() : *next;
-  }
+  MeasurementReport& Add() { return measurements_.Add(); }
+  /// Memory for `count` numbers of the entries, of any value.
+  double* Allocate(std::size_t count) { return measurements_.Allocate(count); }
+  /// A copy of the values in that memory.
+  Numbers Copy(Numbers values) { return measurements_.Copy(values); }
   void Clear() {
     stale = false;
     inputs.clear();
@@ -93,7 +121,7 @@ class UpdateReport {
     ClearMeasurements();
     events.clear();
   }
-  void ClearMeasurements() { count_ = 0; }
+  void ClearMeasurements() { measurements_.Clear(); }
 
   bool stale = false;       ///< the frame is older than the state, which stays as it was
   std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
@@ -105,8 +133,7 @@ class UpdateReport {
   std::array<double, kFrameParts> spent_s{};
 
  private:
-  std::vector<MeasurementReport> pool_;  ///< the first count_ are in use
-  std::size_t count_ = 0;
+  MeasurementReports measurements_;
 };
 
 /// An estimator over one system. It takes values and returns values: it neither reads files nor

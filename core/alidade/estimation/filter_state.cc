@@ -45,7 +45,6 @@ FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_est
 
 void FilterState::Activate() {
   const std::size_t count = binding->system.layout.blocks().size();
-  ++blocks.activations;
   blocks.waiting = blocks.considering = false;
   blocks.gain_rows.clear();
   for (std::size_t i = 0; i < count; ++i) {

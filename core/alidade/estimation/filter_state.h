@@ -8,6 +8,7 @@
 #include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/motions.h"
+#include "alidade/state/kalman_update.h"
 #include "alidade/state/state.h"
 #include "alidade/state/workspace.h"
 
@@ -28,8 +29,8 @@ struct Health {
 };
 
 /// What the parts of a filter share: x and P, what moved them last, and what there is to say of it.
-/// Only a Method, or the FastPath in place of Linear, changes P of blocks that have a value, but
-/// where the part that does it says so: a method may carry a root. A copy is a snapshot.
+/// Only a Method changes P of blocks that have a value, but where the part that does it says so: a
+/// method may carry a root. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
 
@@ -37,6 +38,8 @@ struct FilterState {
   /// Has to be called when a block of the system gets a value, its first or another one in place of
   /// a rejected one.
   void Activate();
+  /// Whether there are any first_estimates.
+  bool keeps_first_estimates() const { return keeps_first_estimates_; }
 
   std::shared_ptr<const Binding> binding;
   State state;
@@ -48,15 +51,14 @@ struct FilterState {
   Health health;
   /// What Activate last found among the blocks of the system.
   struct {
-    int activations = 0;         ///< calls of Activate
     bool waiting = false;        ///< one has no value yet
     bool considering = false;    ///< one is a consider state
     std::vector<int> gain_rows;  ///< of P: of those that have a value
   } blocks;
   /// Matrices; what takes from it has a Workspace::Use around it.
   Scratch<Workspace> work;
-  Scratch<std::vector<double>> moved;            ///< values on the way to x
-  Scratch<std::vector<JacobianRows>> jacobians;  ///< of the rows of an update
+  Scratch<std::vector<double>> moved;  ///< values on the way to x
+  Scratch<KalmanUpdate> update;        ///< the last one of a method with Jacobians
 
  private:
   void KeepFirstEstimates();

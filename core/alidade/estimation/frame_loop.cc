@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/frame_loop.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "alidade/estimation/first_values.h"
-#include "alidade/estimation/linear.h"
 
 namespace alidade::internal {
 
 FrameLoop::FrameLoop(System system, const EkfOptions& options,
-                     const std::vector<StreamInfo>& streams, std::unique_ptr<Method> by)
+                     const std::vector<StreamInfo>& streams, std::unique_ptr<Method> equations)
     : f(std::make_shared<const Binding>(std::move(system), streams),
         options.jacobian == JacobianPolicy::kFirstEstimate),
-      method(std::move(by)),
+      method(std::move(equations)),
       options_(options),
       time_(f.binding->system, streams, options.max_dt_s),
       gate_(f.binding->system, options),
@@ -25,19 +25,9 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
   method->Begin(f);
 }
 
-/// fast_.path is null afterwards where Run is the only way.
-void FrameLoop::MakeFastPath() {
-  const bool apt =
-      options_.fuse == Fuse::kJoint && dynamic_cast<const Linear*>(&*method) != nullptr;
-  fast_.path = apt ? FastPath::For(f, time_, gate_) : nullptr;
-  fast_.made_at = f.blocks.activations;
-}
-
 void FrameLoop::Process(const Frame& frame) {
   f.report.Clear();
-  if (fast_.made_at != f.blocks.activations) MakeFastPath();
-  took_fast_path = fast_.path != nullptr && fast_.path->Process(frame);
-  if (!took_fast_path) Run(frame);  // steps no further if that did, and starts the entries anew
+  Run(frame);
   if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
@@ -149,12 +139,22 @@ void FrameLoop::Update(std::span<Row* const> group) {
 /// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
 void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed) {
   passed.clear();
-  for (Row* const row : group) row->report->outcome = method->Predict(f, *row);
+  int capacity = 0;
+  for (Row* const row : group) {
+    row->report->outcome = method->Predict(f, *row);
+    if (row->report->outcome == Outcome::kAccepted) capacity += row->report->dof;
+  }
   Spent(FramePart::kEvaluate);
+  method->BeginUpdate(f, capacity);
+  int columns = 0;
   for (Row* const row : group) {
     Outcome& outcome = row->report->outcome;
-    if (outcome == Outcome::kAccepted) outcome = gate_.Pass(f, *row);
-    if (outcome == Outcome::kAccepted) passed.push_back(row);
+    if (outcome != Outcome::kAccepted) continue;
+    row->column = columns;
+    outcome = gate_.Test(f, *row, method->ComputeS(f, *row));
+    if (outcome != Outcome::kAccepted) continue;
+    passed.push_back(row);
+    columns += row->report->dof;
   }
   Spent(FramePart::kGate);
 }
@@ -162,7 +162,7 @@ void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& p
 /// False where there is no update.
 bool FrameLoop::Correct(std::span<Row* const> rows) {
   if (rows.empty()) return false;
-  for (Row* const row : rows) Gate::Weigh(*row);
+  for (Row* const row : rows) Gate::ApplyRobustWeight(*row);
   const Outcome outcome = method->Correct(f, rows);
   Spent(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
@@ -198,12 +198,16 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
       PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
-  row.report->z = one.values;  // as if it measured what it expects
+  std::ranges::copy(one.values, row.z);  // as if it measured what it expects
   if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
-  const Outcome outcome = gate_.Pass(f, row);  // gated: h at the estimate lies far from its mean
+  const int m = row.report->dof;
+  method->BeginUpdate(f, m);
+  row.column = 0;
+  const Outcome outcome = gate_.Test(f, row, method->ComputeS(f, row));
+  // Gated: h at the estimate lies far from its mean.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
-  const Eigen::Index m = row.report->dof;
-  return Prediction{row.report->h, Eigen::Map<const RowMajor>(row.report->s.data(), m, m)};
+  return Prediction{{row.report->h.begin(), row.report->h.end()},
+                    Eigen::Map<const RowMajor>(row.s, m, m)};
 }
 
 }  // namespace alidade::internal

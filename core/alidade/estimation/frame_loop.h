@@ -9,7 +9,6 @@
 
 #include "alidade/base/indirect.h"
 #include "alidade/estimation/consensus.h"
-#include "alidade/estimation/fast_path.h"
 #include "alidade/estimation/filter.h"
 #include "alidade/estimation/gate.h"
 #include "alidade/estimation/landmark_map.h"
@@ -22,26 +21,23 @@ namespace alidade::internal {
 
 /// What a filter is made of, and what a frame goes through there:
 ///
-///   plain frames of few states      FastPath::Process, all but the inputs; any other, Run:
 ///   step         StepTo             Timeline::First, Method::Step
 ///   collect                         Rows::Collect: one row for each measurement and sensor
 ///   initialise                      InitialiseWaiting, LandmarkMap::Attach
 ///   group        UpdateInGroups     Update of each group by itself, as `fuse` has them:
 ///   predict      PredictAndGate     Method::Predict of each row
-///   gate                            Gate::Pass of each row; Consensus::Split
-///   correct      Correct            Gate::Weigh, Method::Correct
+///   gate                            Method::ComputeS, Gate::Test of each row; Consensus::Split
+///   correct      Correct            Gate::ApplyRobustWeight, Method::Correct
 ///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                       LandmarkMap::Maintain
 ///   inputs                          Timeline::TakeInputs: they act from here on
 ///
-/// Parts point to the binding, which copies share, and not into one another; only the fast path
-/// does, and a copy makes its own. So a copy is a filter by itself.
+/// Parts point to the binding, which copies share, and not into one another. So a copy is a filter
+/// by itself.
 class FrameLoop {
  public:
   FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
             std::unique_ptr<Method> method);
-  FrameLoop(const FrameLoop&) = default;
-  FrameLoop& operator=(const FrameLoop&) = delete;  // it would keep a fast path into another x
 
   /// All that Filter::Process does. The report is in f.
   void Process(const Frame& frame);
@@ -52,10 +48,8 @@ class FrameLoop {
   FilterState f;
   Indirect<Method> method;
   std::optional<LandmarkMap> landmarks;  ///< where the system has any
-  bool took_fast_path = false;           ///< the last frame; for tests
 
  private:
-  void MakeFastPath();
   void Run(const Frame& frame);
   void StepTo(Timestamp timestamp);
   void UpdateInGroups(std::span<Row> rows);
@@ -64,11 +58,6 @@ class FrameLoop {
   bool Correct(std::span<Row* const> rows);
   void Spent(FramePart part);
 
-  /// The fast path, as long as the blocks are those that it was made for.
-  struct CurrentPath {
-    std::unique_ptr<FastPath> path;
-    int made_at = -1;  ///< FilterState::blocks.activations
-  };
   /// One group of rows, and what becomes of it.
   struct Groups {
     std::vector<Row*> group, passed, agreed, rest;
@@ -82,7 +71,6 @@ class FrameLoop {
   std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
   Scratch<Rows> rows_;
   Scratch<Groups> groups_;
-  Scratch<CurrentPath> fast_;
 };
 
 }  // namespace alidade::internal

@@ -8,7 +8,6 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
-#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -36,35 +35,42 @@ Gate::Gate(const System& system, const EkfOptions& options)
   }
 }
 
-Outcome Gate::Pass(FilterState& f, Row& row) {
-  MeasurementReport& entry = *row.report;
-  if (!AllFinite(entry.s) || !AllFinite(row.H) || !AllFinite(entry.innovation)) {
-    entry.s.clear();
-    Note(f, "not_finite",
-         "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
-    return Outcome::kNotFinite;
+Outcome Gate::Test(FilterState& f, Row& row, double nis) {
+  if (!std::isfinite(nis)) {
+    const Outcome outcome = Defect(f, row);
+    if (outcome != Outcome::kAccepted) return outcome;
   }
   CheckConditioning(f, row);
-  const auto m = static_cast<std::size_t>(entry.dof);
-  memory_.resize(m * (m + 1));
-  entry.nis =
-      SquaredMahalanobis(entry.s.data(), entry.innovation.data(), entry.dof, memory_.data());
-  if (std::isnan(entry.nis)) {
-    entry.nis = 0.0;
+  row.report->nis = nis;
+  if (std::isnan(nis)) {
+    row.report->nis = 0.0;
     Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
     return Outcome::kNotPd;
   }
-  if (!(entry.nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
-  row.weight = Weight(row.binding->loss, std::sqrt(entry.nis));
+  if (!(nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
+  row.weight = Weight(row.binding->loss, std::sqrt(nis));
+  if (row.weight == 1.0) return Outcome::kAccepted;
   const double widest = *std::ranges::max_element(row.R) / row.weight;
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
-void Gate::Weigh(Row& row) {
+/// kNotFinite where a number of the row is not finite, else kAccepted.
+Outcome Gate::Defect(FilterState& f, Row& row) {
+  MeasurementReport& entry = *row.report;
+  if (AllFinite(entry.s) && AllFinite(row.H) && AllFinite(entry.innovation)) {
+    return Outcome::kAccepted;
+  }
+  entry.s = {};
+  Note(f, "not_finite",
+       "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
+  return Outcome::kNotFinite;
+}
+
+void Gate::ApplyRobustWeight(Row& row) {
   if (row.weight == 1.0) return;
   for (std::size_t i = 0; i < row.R.size(); ++i) {
     const double widened = row.R[i] / row.weight;
-    row.report->s[i] += widened - row.R[i];
+    row.s[i] += widened - row.R[i];
     row.R[i] = widened;
   }
 }
@@ -88,7 +94,7 @@ void Gate::CheckConditioning(FilterState& f, const Row& row) {
   for (std::size_t i = 0; i < m && !tiny; ++i) {
     noise = row.R[i * m + i];
     total = row.report->s[i * m + i];
-    tiny = Vanishes(noise, total);
+    tiny = !(noise > 1e-13 * total) || noise <= 0.0;
   }
   if (!tiny) return;
   warned_[sensor] = true;

@@ -16,15 +16,11 @@ class Gate {
  public:
   Gate(const System& system, const EkfOptions& options);
 
-  /// NIS and w of a row with r, R and S, and whether it passes: kAccepted, or why not. What lies so
-  /// far out that its R / w is not finite does not.
-  Outcome Pass(FilterState& f, Row& row);
-  /// Whether noise, of the variance `total` on the diagonal of S, vanishes compared with H P H'.
-  static bool Vanishes(double noise, double total) {
-    return !(noise > 1e-13 * total) || noise <= 0.0;
-  }
+  /// Takes the NIS of a row with r, R and S, finds w, and returns whether it passes: kAccepted, or
+  /// why not. What lies so far out that its R / w is not finite does not.
+  Outcome Test(FilterState& f, Row& row, double nis);
   /// R <- R / w in R and in S.
-  static void Weigh(Row& row);
+  static void ApplyRobustWeight(Row& row);
 
   /// Counts what became of one measurement. Whether its sensor was rejected so often in a row that
   /// it has to recover; from there it counts anew.
@@ -37,16 +33,9 @@ class Gate {
     f.health.out_of_domain[sensor] = f.health.inflated[sensor] = 0;
     return false;
   }
-  /// Whether one more rejection of the sensor is one too many.
-  bool IsDueNext(std::size_t sensor) const {
-    return most_rejections_ > 0 && rejections_[sensor] + 1 >= most_rejections_;
-  }
-
-  double threshold(std::size_t sensor) const { return thresholds_[sensor]; }
-  /// Whether it was said that the noise of a sensor vanishes compared with H P H'.
-  bool warned(std::size_t sensor) const { return warned_[sensor]; }
 
  private:
+  static Outcome Defect(FilterState& f, Row& row);
   void CheckConditioning(FilterState& f, const Row& row);
   bool CountRejection(const MeasurementReport& entry);
 
@@ -54,7 +43,6 @@ class Gate {
   std::vector<bool> warned_;        ///< by sensor
   std::vector<int> rejections_;     ///< consecutive, by sensor
   int most_rejections_;             ///< in a row; 0: without bound
-  Scratch<std::vector<double>> memory_;
 };
 
 }  // namespace alidade::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/iekf.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -29,7 +30,9 @@ class Iterated : public Method {
 
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Iterated>(*this); }
   Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
+  void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  double ComputeS(FilterState& f, Row& row) override { return linear_.ComputeS(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
@@ -54,21 +57,23 @@ class Iterated : public Method {
   Linear linear_;
   int max_iterations_;
   double tolerance_;
-  std::vector<double> iterate_;                   ///< values on the way; the state is the prior
-  std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
+  std::vector<double> iterate_;        ///< values on the way; the state is the prior
+  std::vector<double> at_prediction_;  ///< h, innovations and S of its rows
 };
 
 Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
   const Workspace::Use use(f.work);
-  if (at_prediction_.size() < rows.size()) at_prediction_.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) at_prediction_[i] = *rows[i]->report;
+  at_prediction_.clear();
+  for (const Row* row : rows) {
+    at_prediction_.insert(at_prediction_.end(), row->h, row->s + row->report->s.size());
+  }
   const std::optional<Minimum> minimum = Minimise(f, rows);
   const Outcome outcome = linear_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    MeasurementReport& entry = *rows[i]->report;
-    entry.h.swap(at_prediction_[i].h);
-    entry.innovation.swap(at_prediction_[i].innovation);
-    entry.s.swap(at_prediction_[i].s);
+  const double* at = at_prediction_.data();
+  for (const Row* row : rows) {
+    const auto count = row->s + row->report->s.size() - row->h;
+    std::copy_n(at, count, row->h);
+    at += count;
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
     Note(f, "not_converged",
@@ -86,6 +91,7 @@ Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
 /// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
 std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Row* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
+  linear_.Stack(f, rows);
   Minimum minimum{f.work.Take(n)};
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
@@ -98,9 +104,10 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
   for (bool defined = true;; defined = Relinearise(f, rows, dx.data())) {
     const Workspace::Use use(f.work);
     const Stacked at = Stack(f, rows);
-    const Panels pht = ProjectionOf(f, rows);
+    Workspace::Matrix pht = f.work.Take(n, m);
+    f.update.CopyColumns(0, pht);
     s = r = at.noise;
-    AddProjected(f, pht, s);
+    AddProduct(s, at.h, pht);
     if (!defined || !Factorise(s) || !Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
       MoveTo(f, linearised.data());
@@ -114,8 +121,8 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
     y.noalias() += at.h * dx;
     s.triangularView<Eigen::Lower>().solveInPlace(y);
     s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
-    Multiply(pht, y, step);
-    step -= dx;
+    step = -dx;
+    step.noalias() += pht * y;
     step_v = -v;
     step_v.noalias() += at.h.transpose() * y;
     residual.noalias() = at.h * step;
@@ -168,11 +175,10 @@ bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
                            Workspace::Vector& innovations) {
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    MeasurementReport& entry = *row->report;
     const SensorModel& model = *row->model;
-    if (PredictAt(f, *row, iterate_, entry.h.data()) != Outcome::kAccepted) return false;
-    model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
-    at += entry.dof;
+    if (PredictAt(f, *row, iterate_, row->h) != Outcome::kAccepted) return false;
+    model.measurement().geometry.Minus(row->z, row->h, innovations.data() + at);
+    at += row->report->dof;
   }
   return innovations.allFinite();
 }
@@ -188,7 +194,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       return false;
     }
     for (double& r : row->R) r /= row->weight;
-    TakeInnovation(*row);
+    ComputeInnovation(*row);
     const double* const* const at = RolesAt(f, *row, f.state.values());
     std::size_t part = 0;
     for (std::size_t i = 0; i < place.values.size(); ++i) {
@@ -201,7 +207,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       PlusJacobian(geometry, at[i], dx + offset, j.data());
       ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
     }
-    Linear::TakeS(f, *row);
+    linear_.ComputeS(f, *row);
   }
   return true;
 }

@@ -56,18 +56,22 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
 /// J P J' of the blocks of a landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
                              const LandmarkPoint& point) {
-  std::array<JacobianPart, 3> parts{};  // a landmark with a place has as many blocks at most
-  std::size_t used = 0;
-  int column = 0;
+  constexpr int kWidest = 6;
+  std::array<int, kWidest> rows;  // of P
+  auto jacobian = point.jacobian;
+  int used = 0, column = 0;
   for (const BlockId id : landmark.blocks) {
     const Block& block = state.layout()[id];
-    const int size = block.geometry().tangent;
-    if (block.has_covariance()) parts[used++] = {block.tangent_offset, size, column};
-    column += size;
+    for (int k = 0; k < block.geometry().tangent; ++k, ++column) {
+      if (!block.has_covariance()) continue;
+      rows[static_cast<std::size_t>(used)] = block.tangent_offset + k;
+      jacobian.col(used++) = point.jacobian.col(column);
+    }
   }
+  jacobian.conservativeResize(Eigen::NoChange, used);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  const std::span present(parts.data(), used);
-  AddProjection(state.covariance(), {point.jacobian.data(), 3, column, present}, covariance.data());
+  const std::span present(rows.data(), static_cast<std::size_t>(used));
+  AddProjection(state.covariance(), {jacobian.data(), 3, present}, covariance.data());
   return covariance;
 }
 

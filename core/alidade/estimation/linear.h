@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "alidade/estimation/method.h"
-#include "alidade/state/panels.h"
 
 namespace alidade::internal {
 
@@ -15,35 +14,35 @@ class Linear : public Method {
  public:
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Linear>(*this); }
   Trouble Step(FilterState& f, double dt_s) override;
+  void BeginUpdate(FilterState& f, int capacity) override;
   Outcome Predict(FilterState& f, Row& row) override;
+  double ComputeS(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override {
     return CorrectBy(f, rows, nullptr);
   }
 
-  /// The first part of Predict: h, H, R and the innovation at x.
-  Outcome Linearise(FilterState& f, Row& row);
-  /// The second: S = H P H' + R of a row that has H and R.
-  static void TakeS(const FilterState& f, Row& row);
   /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
   Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
+  /// Puts the rows one after the other in the update: others that passed the gate may be left out.
+  void Stack(FilterState& f, std::span<Row* const> rows);
 
  private:
-  bool FindLinearisation(const FilterState& f, const Row& row);
-  Outcome LineariseElsewhere(FilterState& f, Row& row);
-  Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);
-  Outcome CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* dx);
-  /// Of the rows in lost_: K, and E = (K - K*) L.
-  struct Lost {
+  /// Of considered rows of P: K, and E = (K - K*) L, K* = P H' S^-1 and S = L L'.
+  struct Considered {
     Workspace::Matrix gain, e;
   };
-  Lost FindLost(FilterState& f, std::span<Row* const> rows, const Panels& w,
-                const Workspace::Matrix& l);
+  bool FindLinearisation(const FilterState& f, const Row& row);
+  Outcome LineariseElsewhere(FilterState& f, Row& row);
+  void FindConsidered(const FilterState& f, std::span<Row* const> rows);
+  Considered ConsiderCorrection(FilterState& f, std::span<Row* const> rows, bool recorded);
+  bool Joseph(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix* considered);
 
   // Memory that is kept from row to row.
   Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken
   Scratch<std::vector<double>> implied_;    ///< of the role that is linearised at what z implies
   Scratch<std::vector<double>> h_there_;    ///< h where H is taken
-  Scratch<std::vector<int>> lost_;          ///< rows of P whose gain is not the optimal one
+  Scratch<std::vector<MeasurementRows>> stacked_;  ///< the rows of the update
+  Scratch<std::vector<int>> considered_;           ///< rows of P whose gain is not the optimal one
 };
 
 }  // namespace alidade::internal

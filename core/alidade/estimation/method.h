@@ -20,13 +20,18 @@ class Method {
   virtual void Begin(FilterState& /*f*/) {}
   /// Moves x and P by dt_s: all of it or nothing, and why.
   virtual Trouble Step(FilterState& f, double dt_s) = 0;
-  /// h, the innovation, R and S of a row by itself, and what Correct needs besides; kAccepted, or
-  /// why they cannot be had, which it notes.
+  /// Starts an update by at most `capacity` rows.
+  virtual void BeginUpdate(FilterState& /*f*/, int /*capacity*/) {}
+  /// h, the innovation, R and what else the others need of a row by itself; kAccepted, or why they
+  /// cannot be had, which it notes.
   virtual Outcome Predict(FilterState& f, Row& row) = 0;
-  /// One update with all rows, as Predict left them, R and S weighed since: all of it happens, or
-  /// nothing. kAccepted, and the gain is in the reports by RecordGain; or why not, which it notes
-  /// but for kNotPd and kNotFinite. A row that is the reason may have an outcome of its own, in its
-  /// report.
+  /// S of a row that Predict left, in its report. Returns its NIS: not a number unless S is finite
+  /// and positive definite. Those before it that are part of the update take row.column columns.
+  virtual double ComputeS(FilterState& f, Row& row) = 0;
+  /// One update with all rows, in the order in which ComputeS had them, R and S weighed since: all
+  /// of it happens, or nothing. kAccepted, and the gain is in the reports by RecordGain; or why
+  /// not, which it notes but for kNotPd and kNotFinite. A row that is the reason may have an
+  /// outcome of its own, in its report.
   virtual Outcome Correct(FilterState& f, std::span<Row* const> rows) = 0;
 };
 

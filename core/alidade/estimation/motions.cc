@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -20,6 +19,22 @@ std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const do
   std::array<const double*, kMaxRoles> blocks;
   std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
   return blocks;
+}
+
+/// gl = G L, n x w, and the lower triangle of q = G L L' G', n x n, for G n x w and L w x w.
+void SpreadNoise(const double* g, const double* l, int n, int w, double* gl, double* q) {
+  for (int i = 0; i < n; ++i) {
+    for (int c = 0; c < w; ++c) {
+      double sum = 0.0;
+      for (int k = 0; k < w; ++k) sum += g[i * w + k] * l[k * w + c];
+      gl[i * w + c] = sum;
+    }
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (int c = 0; c < w; ++c) sum += gl[i * w + c] * gl[j * w + c];
+      q[i * n + j] = sum;
+    }
+  }
 }
 
 }  // namespace
@@ -98,11 +113,13 @@ Motions::Motions(const Binding& binding)
 
 void Motions::Activate(const StateLayout& layout) {
   holds_ = false;
+  active_ = 0;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const MotionBinding& motion = binding_->system.motions[i];
     steps_[i].active =
         !motion.model->stationary() &&
         std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
+    active_ += steps_[i].active ? 1 : 0;
     holds_ = holds_ || (steps_[i].active && binding_->motion_places[i].holds);
   }
 }
@@ -120,8 +137,6 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   const MotionPlace& place = binding_->motion_places[i];
   Step& step = steps_[i];
   const bool goes_on = place.holds && in_interval();
-  // The first step may have been the fast path's, which keeps no M.
-  if (goes_on && interval_steps_ == 1) step.m = step.gl;
   const double* const x = state.values().data();
   Outcome outcome =
       StepAt(motion, place, x, step.u.data(), nullptr, dt_s, next_.data(),
@@ -160,12 +175,13 @@ void Motions::CarryHeld(const MotionModel& model, const MotionPlace& place, Step
 
 bool Motions::Apply(State& state) {
   Covariance& p = state.covariance();
-  if (IsBounded(p)) {
+  if (active_ <= 1) {  // all of it, or nothing
+    if (!Propagate(p)) return false;
+  } else if (IsBounded(p)) {
     Propagate(p);
   } else {
     const Covariance before = p;
-    Propagate(p);
-    if (!p.Dense().allFinite()) {
+    if (!Propagate(p)) {
       p = before;
       return false;
     }
@@ -192,19 +208,19 @@ bool Motions::IsBounded(const Covariance& covariance) const {
   return sum * sum * p + q <= kSafe;
 }
 
-void Motions::Propagate(Covariance& p) {
+bool Motions::Propagate(Covariance& p) {
   const Workspace::Use use(memory_);
+  bool finite = true;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
-    if (!step.active || place.parts.empty()) continue;
-    const auto fixed = std::ranges::count(place.at, -1);  // rows that are not in P
-    if (fixed == 0) {
-      p.Propagate(place.parts, step.f.data(), step.q.data());
+    if (!step.active || place.rows.empty()) continue;
+    const std::size_t n = place.at.size();
+    const Eigen::Index k = std::ssize(place.rows);
+    if (place.rows.size() == n) {
+      finite = p.Propagate(place.rows, step.f.data(), step.q.data()) && finite;
       continue;
     }
-    const std::size_t n = place.at.size();
-    const auto k = static_cast<Eigen::Index>(n) - fixed;
     Workspace::Vector f = memory_.Take(k * k), q = memory_.Take(k * k);
     Eigen::Index at = 0;
     for (std::size_t element = 0; element < n * n; ++element) {
@@ -212,8 +228,9 @@ void Motions::Propagate(Covariance& p) {
       f[at] = step.f[element];
       q[at++] = step.q[element];
     }
-    p.Propagate(place.parts, f.data(), q.data());
+    finite = p.Propagate(place.rows, f.data(), q.data()) && finite;
   }
+  return finite;
 }
 
 int Motions::noise_size() const {

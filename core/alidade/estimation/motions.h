@@ -80,11 +80,12 @@ class Motions {
   Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
   void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
   bool IsBounded(const Covariance& p) const;
-  void Propagate(Covariance& p);
+  bool Propagate(Covariance& p);
 
   const Binding* binding_;
   std::vector<Step> steps_;  ///< as in System::motions
   std::vector<double> next_;
+  int active_ = 0;  ///< steps that are
   bool holds_ = false;
   Scratch<Workspace> memory_;
   Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else

@@ -2,6 +2,8 @@
 #include "alidade/estimation/recovery.h"
 
 #include <algorithm>
+#include <numeric>
+#include <vector>
 
 #include "alidade/base/number_text.h"
 #include "alidade/estimation/first_values.h"
@@ -51,8 +53,9 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;
     const RowMajor inflation = kInflation * RowMajor::Identity(n, n);
-    const JacobianPart part{block.tangent_offset, n, 0};
-    f.state.covariance().Propagate({&part, 1}, inflation.data(), nullptr);
+    std::vector<int> rows(static_cast<std::size_t>(n));
+    std::iota(rows.begin(), rows.end(), block.tangent_offset);
+    f.state.covariance().Propagate(rows, inflation.data(), nullptr);
     any = true;
   }
   if (any) f.motions.EndInterval();

@@ -2,13 +2,12 @@
 #include "alidade/estimation/rows.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/state/dense_algebra.h"
-#include "alidade/state/projection.h"
-#include "alidade/state/tiles.h"
-#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -20,6 +19,22 @@ void ForEachPlace(std::span<Row* const> rows, const Take& take) {
   for (const Row* row : rows) {
     take(*row, at);
     at += row->report->dof;
+  }
+}
+
+/// Makes room for `count` numbers.
+void Fit(std::vector<double>& numbers, int count) {
+  if (std::ssize(numbers) != count) numbers.resize(static_cast<std::size_t>(count));
+}
+
+/// R = L L', m x m, row-major.
+void Square(const double* l, int m, double* r) {
+  for (int i = 0; i < m; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
+      r[i * m + j] = r[j * m + i] = sum;
+    }
   }
 }
 
@@ -51,72 +66,87 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
                UpdateReport& report) {
   const auto index = static_cast<std::size_t>(sensor);
   const SensorBinding& bound = binding.system.sensors[index];
-  const Geometry& geometry = bound.model->measurement().geometry;
-  ALIDADE_EXPECTS(std::ssize(measurement.values) == geometry.ambient);
+  const SensorPlace& place = binding.sensor_places[index];
+  ALIDADE_EXPECTS(std::ssize(measurement.values) == place.ambient);
   ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model->known_size());
   ALIDADE_EXPECTS(measurement.covariance.empty() ||
-                  std::ssize(measurement.covariance) == geometry.tangent * geometry.tangent);
+                  std::ssize(measurement.covariance) == place.dof * place.dof);
   if (count_ == rows_.size()) rows_.emplace_back();
   Row& row = rows_[count_++];
   row.measurement = &measurement;
   row.sensor = sensor;
   row.binding = &bound;
   row.model = bound.model.get();
-  row.place = &binding.sensor_places[index];
+  row.place = &place;
+  const auto ambient = static_cast<std::size_t>(place.ambient),
+             m = static_cast<std::size_t>(place.dof);
+  row.z = report.Allocate(2 * ambient + m + m * m);
+  row.h = row.z + ambient;
+  row.innovation = row.h + ambient;
+  row.s = row.innovation + m;
+  for (std::size_t i = 0; i < ambient; ++i) row.z[i] = measurement.values[i];
   MeasurementReport& entry = report.Add();
-  entry.Reset(sensor, measurement.landmark, geometry.tangent);
-  entry.z.assign(measurement.values.begin(), measurement.values.end());
+  entry.sensor = sensor;
+  entry.landmark = measurement.landmark;
+  entry.dof = place.dof;
+  entry.z = {row.z, ambient};
   row.report = &entry;
   return row;
 }
 
-/// What speaks against the measurement of a row, by itself.
+/// The outcome of a measurement by itself: kAccepted, or why it is of no use.
 Outcome Rows::Check(const Row& row) {
-  constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
   const Measurement& m = *row.measurement;
-  if (!AllFinite(m.values) || !AllFinite(m.covariance) || !AllFinite(m.known)) {
-    return Outcome::kNotFinite;
-  }
+  if (!AllFinite(m.values) || !AllFinite(m.known)) return Outcome::kNotFinite;
   if (!m.covariance.empty()) {
-    const int size = row.model->measurement().geometry.tangent;
-    const Eigen::Map<const Eigen::MatrixXd> r(m.covariance.data(), size, size);
-    if (!r.isApprox(r.transpose(), kSymmetric) || SquareRootOf(r, ldlt_, root_) < -kRounding) {
-      return Outcome::kInvalid;
-    }
+    const Outcome outcome = CheckCovariance(row);
+    if (outcome != Outcome::kAccepted) return outcome;
   }
   return OutcomeOf(row.model->Valid({m.values.data(), m.known.data()}));
 }
 
+Outcome Rows::CheckCovariance(const Row& row) {
+  constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
+  const std::vector<double>& covariance = row.measurement->covariance;
+  if (!AllFinite(covariance)) return Outcome::kNotFinite;
+  const int size = row.report->dof;
+  const Eigen::Map<const Eigen::MatrixXd> r(covariance.data(), size, size);
+  const bool valid =
+      r.isApprox(r.transpose(), kSymmetric) && SquareRootOf(r, ldlt_, root_) >= -kRounding;
+  return valid ? Outcome::kAccepted : Outcome::kInvalid;
+}
+
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
              const std::vector<double>& known_roles, std::vector<const double*>& roles) {
-  roles.clear();
-  for (std::size_t i = 0; i < place.values.size(); ++i) {
+  if (roles.size() != place.values.size()) roles.resize(place.values.size());
+  for (std::size_t i = 0; i < roles.size(); ++i) {
     const int at = place.values[i];
     const bool knows = i < sensor.roles.size() && sensor.roles[i].mode == RoleMode::kKnown;
-    roles.push_back(at < 0 ? nullptr : (knows ? known_roles : x).data() + at);
+    roles[i] = at < 0 ? nullptr : (knows ? known_roles : x).data() + at;
   }
 }
 
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
-                   const Measurement& measurement, const double* const* roles,
-                   std::vector<double*>& columns, std::vector<double>& h,
-                   std::vector<double>* jacobian) {
+                   const Measurement& measurement, const double* const* roles, double* h,
+                   double* jacobian) {
   const double* const known = measurement.known.data();
-  const Geometry& geometry = model.measurement().geometry;
-  h.assign(static_cast<std::size_t>(geometry.ambient), kNotWritten);
-  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h.data(), known));
-  const int m = geometry.tangent;
-  jacobian->assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
-  for (const JacobianPart& part : place.parts) {
-    for (int i = 0; i < m; ++i) {
-      std::fill_n(jacobian->data() + i * place.width + part.column, part.size, kNotWritten);
-    }
+  for (int i = 0; i < place.ambient; ++i) h[i] = kNotWritten;
+  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h, known));
+  for (int i = 0; i < place.dof * place.width; ++i) jacobian[i] = kNotWritten;
+  std::array<double*, kMaxRoles> columns;
+  for (std::size_t i = 0; i < place.columns.size(); ++i) {
+    columns[i] = place.columns[i] < 0 ? nullptr : jacobian + place.columns[i];
   }
-  columns.clear();
-  for (const int column : place.columns) {
-    columns.push_back(column < 0 ? nullptr : jacobian->data() + column);
-  }
-  return OutcomeOf(model.Linearise(roles, h.data(), columns.data(), place.strides.data(), known));
+  return OutcomeOf(model.Linearise(roles, h, columns.data(), place.strides.data(), known));
+}
+
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles,
+                   std::vector<double>& h, std::vector<double>* jacobian) {
+  Fit(h, place.ambient);
+  if (jacobian != nullptr) Fit(*jacobian, place.dof * place.width);
+  return EvaluateAt(model, place, measurement, roles, h.data(),
+                    jacobian == nullptr ? nullptr : jacobian->data());
 }
 
 Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
@@ -125,18 +155,13 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
     r.assign(measurement.covariance.begin(), measurement.covariance.end());
     return Outcome::kAccepted;
   }
-  const auto m = static_cast<std::size_t>(model.measurement().geometry.tangent);
-  r.resize(m * m);
-  l.assign(m * m, kNotWritten);
+  const int m = model.measurement().geometry.tangent;
+  Fit(r, m * m);
+  Fit(l, m * m);
+  for (double& number : l) number = kNotWritten;
   const Outcome outcome = OutcomeOf(
       model.SqrtNoise(roles, measurement.values.data(), l.data(), measurement.known.data()));
-  for (std::size_t i = 0; i < m; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
-      r[i * m + j] = r[j * m + i] = sum;
-    }
-  }
+  Square(l.data(), m, r.data());
   return outcome;
 }
 
@@ -151,18 +176,44 @@ Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, 
 }
 
 Outcome LineariseAt(Row& row, const double* const* roles) {
-  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.memory.columns,
-                    row.report->h, &row.H);
+  const SensorPlace& place = *row.place;
+  Fit(row.H, place.dof * place.width);
+  row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
+  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.h, row.H.data());
 }
 
 Outcome NoiseAt(Row& row, const double* const* roles) {
-  return NoiseAt(*row.model, *row.measurement, roles, row.memory.l, row.R);
+  return NoiseAt(*row.model, *row.measurement, roles, row.l, row.R);
 }
 
-void TakeInnovation(Row& row) {
-  MeasurementReport& entry = *row.report;
-  entry.innovation.resize(static_cast<std::size_t>(entry.dof));
-  row.model->measurement().geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+void ComputeInnovation(Row& row) {
+  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.report->dof)};
+  row.model->measurement().geometry.Minus(row.z, row.h, row.innovation);
+}
+
+double ComputeNis(const Row& row, Workspace& work) {
+  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, work);
+}
+
+double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work) {
+  const Workspace::Use use(work);
+  const Eigen::Map<const RowMajor> given(s, m, m);
+  Workspace::Matrix l = work.Take(m, m);  // L D, D on the diagonal
+  Workspace::Vector y = work.Take(m);     // L^-1 r
+  double sum = 0.0;
+  for (int i = 0; i < m; ++i) {
+    l(i, i) = given(i, i);
+    y[i] = r[i];
+    for (int j = 0; j < i; ++j) {
+      l(i, j) = given(i, j);
+      for (int k = 0; k < j; ++k) l(i, j) -= l(i, k) * l(j, k) / l(k, k);
+      l(i, i) -= l(i, j) * l(i, j) / l(j, j);
+      y[i] -= l(i, j) / l(j, j) * y[j];
+    }
+    if (!(l(i, i) > 0.0)) return std::nan("");
+    sum += y[i] * y[i] / l(i, i);
+  }
+  return sum;
 }
 
 void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work) {
@@ -174,21 +225,10 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
   own = chained;
 }
 
-Eigen::Index TotalDof(std::span<Row* const> rows) {
-  Eigen::Index m = 0;
+int TotalDof(std::span<Row* const> rows) {
+  int m = 0;
   for (const Row* row : rows) m += row->report->dof;
   return m;
-}
-
-void RecordGain(const FilterState& f, std::span<Row* const> rows, const double* gain) {
-  const int n = f.size();
-  for (const Row* row : rows) {
-    const double* const end = gain + n * row->report->dof;
-    for (; gain != end; gain += n) {
-      if (!GainIsRecorded(*row)) continue;
-      for (const int i : f.blocks.gain_rows) row->report->gain.push_back(gain[i]);
-    }
-  }
 }
 
 Stacked Stack(FilterState& f, std::span<Row* const> rows) {
@@ -200,9 +240,9 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
   h.setZero();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     const JacobianRows own = row.jacobian();
-    const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.stride);
-    for (const JacobianPart& part : own.parts) {
-      h.block(at, part.offset, own.rows, part.size) += compact.middleCols(part.column, part.size);
+    const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.width());
+    for (int c = 0; c < own.width(); ++c) {
+      h.col(own.columns[static_cast<std::size_t>(c)]).segment(at, own.rows) += compact.col(c);
     }
   });
   return h;
@@ -224,18 +264,6 @@ Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
     std::ranges::copy(row.report->innovation, innovation.data() + at);
   });
   return innovation;
-}
-
-Panels ProjectionOf(FilterState& f, std::span<Row* const> rows) {
-  const Panels pht = TakePanels(f.work, f.size(), TotalDof(rows));
-  f.jacobians.clear();
-  for (const Row* const row : rows) f.jacobians.push_back(row->jacobian());
-  Project(f.state.covariance(), f.jacobians, pht);
-  return pht;
-}
-
-void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s) {
-  BestVectorKernels().add_projected(pht.rows, f.jacobians, pht.data, s.data(), s.outerStride());
 }
 
 }  // namespace alidade::internal

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/estimation/filter_state.h"
-#include "alidade/state/panels.h"
+#include "alidade/state/kernels.h"
 #include "alidade/state/workspace.h"
 
 /// Measurements on their way into an update: what a frame has of them, what their sensor models say
@@ -23,20 +23,19 @@ struct Row {
   const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
   const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
-  std::vector<double> H;               ///< H, m rows of the place's width
-  std::vector<double> R;               ///< R, m x m, row-major
-  std::vector<const double*> roles;    ///< what fills its roles, as RolesAt last had it
-  double weight = 1.0;                 ///< w of the robust loss; R is divided by it
-  struct {
-    std::vector<double*> columns;
-    std::vector<double> l;  ///< factor of R
-  } memory;
+  // Memory of the numbers of the report, one after the other.
+  double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;
+  std::vector<double> H;             ///< H, m rows of the place's width
+  std::vector<double> R;             ///< R, m x m, row-major
+  std::vector<const double*> roles;  ///< what fills its roles, as RolesAt last had it
+  double weight = 1.0;               ///< w of the robust loss; R is divided by it
+  int column = 0;                    ///< its first one in the update, if it passes the gate
+  std::vector<double> l;             ///< memory: factor of R
 
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
-  JacobianRows jacobian() const {
-    return {H.data(), report->dof, place->width, place->parts, place->whole};
-  }
+  JacobianRows jacobian() const { return {H.data(), report->dof, place->rows}; }
+  MeasurementRows linearised() const { return {jacobian(), innovation, s, column}; }
 };
 
 /// The rows of a frame, in memory that is kept from one to the next.
@@ -56,6 +55,7 @@ class Rows {
   Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
            UpdateReport& report);
   Outcome Check(const Row& row);
+  Outcome CheckCovariance(const Row& row);
 
   std::vector<Row> rows_;  ///< the first count_ are in use
   std::size_t count_ = 0;
@@ -73,11 +73,13 @@ void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::v
              const std::vector<double>& known_roles, std::vector<const double*>& roles);
 
 /// h of a measurement at the roles, ambient, and unless null H, m rows of the place's width.
-/// `columns` is memory.
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles, double* h,
+                   double* jacobian);
+/// The same, in memory that is made to fit.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
-                   std::vector<double*>& columns, std::vector<double>& h,
-                   std::vector<double>* jacobian);
+                   std::vector<double>& h, std::vector<double>* jacobian);
 
 /// R at the roles, or as the measurement itself says, m x m. `l` is memory.
 Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
@@ -95,20 +97,40 @@ Outcome LineariseAt(Row& row, const double* const* roles);
 /// R at the roles, or as the measurement itself says, in the row.
 Outcome NoiseAt(Row& row, const double* const* roles);
 /// z (-) h of the h in the report, in the report.
-void TakeInnovation(Row& row);
+void ComputeInnovation(Row& row);
+/// r' S^-1 r of the S and the innovation in the report; not a number unless S is positive definite.
+double ComputeNis(const Row& row, Workspace& work);
 /// H <- H J in the columns of one role, J size x size, row-major.
 void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work);
+
+/// r' S^-1 r by S = L D L', m x m, row-major; not a number unless S is positive definite.
+double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
 // The rows of an update below one another: m rows in all, n = size of P.
 
 /// m, of all rows of an update.
-Eigen::Index TotalDof(std::span<Row* const> rows);
+int TotalDof(std::span<Row* const> rows);
 
 /// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
-inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
-/// Puts the gain of all rows of an update into their reports: n x m by columns, its rows as they
-/// lie in P.
-void RecordGain(const FilterState& f, std::span<Row* const> rows, const double* gain);
+inline bool GainIsRecorded(const Row& row) { return !row.place->has_landmark; }
+/// Puts gain(i, j), row i of P and column j of the update, into the reports of its rows.
+template <class Gain>
+void RecordGain(FilterState& f, std::span<Row* const> rows, const Gain& gain) {
+  const std::vector<int>& kept = f.blocks.gain_rows;
+  int column = 0;
+  for (const Row* row : rows) {
+    const int end = column + row->report->dof;
+    if (GainIsRecorded(*row)) {
+      const std::size_t count = kept.size() * static_cast<std::size_t>(row->report->dof);
+      double* at = f.report.Allocate(count);
+      row->report->gain = {at, count};
+      for (int j = column; j < end; ++j) {
+        for (const int i : kept) *at++ = gain(i, j);
+      }
+    }
+    column = end;
+  }
+}
 
 struct Stacked {
   Workspace::Matrix h, noise;    ///< H (m x n), R (m x m)
@@ -117,13 +139,10 @@ struct Stacked {
 
 /// The rows as they are, in f.work.
 Stacked Stack(FilterState& f, std::span<Row* const> rows);
-/// H, R, the innovation and P H' (n x m, as the kernels take it) of all rows, in f.work.
+/// H, R and the innovation of all rows, in f.work.
 Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
-Panels ProjectionOf(FilterState& f, std::span<Row* const> rows);
-/// The lower triangle of s += H P H', m x m, from the P H' that ProjectionOf returned last.
-void AddProjected(const FilterState& f, const Panels& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
 /// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
 template <class Zero>
@@ -134,10 +153,10 @@ void ForEachConsidered(const FilterState& f, std::span<Row* const> rows, const Z
     if (!block.present || block.status != BlockStatus::kConsider) continue;
     zero(block.tangent_offset, block.geometry().tangent, 0, TotalDof(rows));
   }
-  Eigen::Index at = 0;
+  int at = 0;
   for (const Row* row : rows) {
     const SensorPlace& place = *row->place;
-    for (std::size_t i = 0; i < place.parts.size(); ++i) {
+    for (std::size_t i = 0; place.considers && i < place.parts.size(); ++i) {
       if (place.consider[i]) zero(place.parts[i].offset, place.parts[i].size, at, row->report->dof);
     }
     at += row->report->dof;

@@ -28,14 +28,14 @@ struct Adjoint {
   }
 };
 
-namespace {
-
 /// Linear, that takes its steps and updates down as an adjoint.
 class Taped : public Method {
  public:
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Taped>(*this); }
   Trouble Step(FilterState& f, double dt_s) override;
+  void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  double ComputeS(FilterState& f, Row& row) override { return linear_.ComputeS(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
   /// From here on is another frame.
@@ -64,25 +64,31 @@ Trouble Taped::Step(FilterState& f, double dt_s) {
 }
 
 Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
-  const Workspace::Use use(f.work);
-  const Stacked all = Stack(f, rows);
-  const Eigen::MatrixXd p = f.state.covariance().Dense();
   const std::vector<double> before = f.state.values();
   const Outcome outcome = linear_.Correct(f, rows);
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
-  // The filter has factorised the same S.
-  const Eigen::MatrixXd h = all.h, weighted = SolvePositive(Congruence(h, p) + all.noise, h);
-  Eigen::MatrixXd a = -Product(ProductTransposed(p, h), weighted);  // I - P H' S^-1 H
+  const Workspace::Use use(f.work);
+  const Eigen::Index n = f.size(), m = f.update.rows();
+  // With S = l l', w = P H' l^-T, g = l^-1 H: K H = w g, H' S^-1 H = g' g, H' S^-1 r = g' y.
+  Eigen::MatrixXd l(m, m), w(n, m), g = JacobianOf(f, rows);
+  Eigen::VectorXd y(m);
+  f.update.CopyFactor(l);
+  f.update.CopyColumns(0, w);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    w.col(k) /= l(k, k);
+    y[k] = f.update.y()[static_cast<std::size_t>(k)] / l(k, k);
+  }
+  l.triangularView<Eigen::Lower>().solveInPlace(g);
+  Eigen::MatrixXd a = -Product(w, g);  // I - K H
   a.diagonal().array() += 1.0;
   const Workspace::Matrix back = TransportTo(f.state, before, f.work);
-  frame_.b += frame_.a.transpose() * (weighted.transpose() * all.innovation);
-  frame_.information +=
-      Product(TransposedProduct(frame_.a, TransposedProduct(h, weighted)), frame_.a);
+  frame_.b += frame_.a.transpose() * (g.transpose() * y);
+  const Eigen::MatrixXd weighted = Product(g, frame_.a);
+  frame_.information += TransposedProduct(weighted, weighted);
   frame_.a = Product(TransposedProduct(back, a), frame_.a);
   return outcome;
 }
 
-}  // namespace
 }  // namespace internal
 
 /// One frame, and the filter's estimate after it.
@@ -96,9 +102,14 @@ struct RtsSmoother::Passed {
 
 RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
-    : loop_(std::make_unique<internal::FrameLoop>(std::move(system),
-                                                  internal::WithoutRecovery(options), streams,
-                                                  std::make_unique<internal::Taped>())) {
+    : RtsSmoother(std::move(system), options, streams, std::make_unique<internal::Taped>()) {}
+
+RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+                         const std::vector<StreamInfo>& streams,
+                         std::unique_ptr<internal::Taped> tape)
+    : tape_(tape.get()),
+      loop_(std::make_unique<internal::FrameLoop>(
+          std::move(system), internal::WithoutRecovery(options), streams, std::move(tape))) {
   ALIDADE_EXPECTS(!FindUnsupported(loop_->f.binding->system, kSupport));
 }
 
@@ -111,15 +122,14 @@ bool RtsSmoother::diverged() const { return loop_->f.health.diverged; }
 bool RtsSmoother::failed() const { return loop_->f.health.ended; }
 
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  auto& tape = dynamic_cast<internal::Taped&>(*loop_->method);
   const internal::FilterState& f = loop_->f;
-  tape.StartFrame(f);
+  tape_->StartFrame(f);
   loop_->Process(frame);
   Workspace work;
   Eigen::MatrixXd held(f.size(), 0);
   if (f.motions.in_interval()) held = f.motions.Held(&internal::Motions::Step::m, f.size(), work);
   passed_frames_.push_back(
-      {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
+      {tape_->frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
   passed_frames_.back().report.events.clear();  // told already
   return f.report;
 }

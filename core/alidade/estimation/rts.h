@@ -10,6 +10,10 @@
 
 namespace alidade {
 
+namespace internal {
+class Taped;
+}
+
 /// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
 /// Kalman filter goes forward; the way back is that of Rauch, Tung and Striebel in the adjoint form
 /// of Bryson and Frazier, which inverts no covariance: P may be singular. n = size of P.
@@ -53,7 +57,10 @@ class RtsSmoother : public Estimator {
 
  private:
   struct Passed;
+  RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+              std::unique_ptr<internal::Taped> tape);
 
+  internal::Taped* tape_;  ///< the method of the loop
   std::unique_ptr<internal::FrameLoop> loop_;
   std::vector<Passed> passed_frames_;
 };

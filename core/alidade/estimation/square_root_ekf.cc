@@ -46,13 +46,13 @@ class SquareRoot : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<SquareRoot>(*this); }
   void Begin(FilterState& f) override;
   Trouble Step(FilterState& f, double dt_s) override;
-  Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  double ComputeS(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
   const Eigen::MatrixXd& root() const { return root_; }
 
  private:
-  void Project(FilterState& f, Row& row) const;
   void SetCovariance(FilterState& f) const;
 
   /// Of a sensor's R.
@@ -106,24 +106,19 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
   return {};
 }
 
-Outcome SquareRoot::Predict(FilterState& f, Row& row) {
-  const Outcome outcome = linear_.Linearise(f, row);
-  if (outcome == Outcome::kAccepted) Project(f, row);
-  return outcome;
-}
-
 /// S = (H L) (H L)' + R, which rounding does not turn negative.
-void SquareRoot::Project(FilterState& f, Row& row) const {
+double SquareRoot::ComputeS(FilterState& f, Row& row) {
   const Workspace::Use use(f.work);
   Row* const one[] = {&row};
   const Stacked all = Stack(f, one);
   const Eigen::Index m = all.h.rows();
-  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s = f.work.Take(m, m);
+  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s(row.s, m, m);
   hl.setZero();
   AddProduct(hl, all.h, root_);
   s = all.noise;
   AddProductWithTransposed(s, hl, hl);
-  row.report->s.assign(s.data(), s.data() + s.size());
+  row.report->s = {row.s, row.R.size()};
+  return ComputeNis(row, f.work);
 }
 
 Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
@@ -160,7 +155,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   root_.setZero();
   AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));
   SetCovariance(f);
-  RecordGain(f, rows, gain.data());
+  RecordGain(f, rows, gain);
   return Outcome::kAccepted;
 }
 

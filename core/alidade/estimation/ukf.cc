@@ -77,6 +77,7 @@ class Unscented : public Method {
   }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override;
+  double ComputeS(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
@@ -103,7 +104,6 @@ class Unscented : public Method {
   Outcome StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
                     double* to);
   Outcome PredictPoints(FilterState& f, Row& row, int halvings);
-  void Project(FilterState& f, Row& row, Predicted& predicted);
   Predicted& PredictedOf(const FilterState& f, const Row& row);
   Outcome StackPoints(FilterState& f, std::span<Row* const> rows, int halvings, Stacked& all,
                       Workspace::Vector& mean);
@@ -318,7 +318,7 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
               predicted.f(), predicted.m())) {
     return Outcome::kOutOfDomain;
   }
-  geometry.Minus(row.report->z.data(), predicted.h.data(), predicted.innovation.data());
+  geometry.Minus(row.z, predicted.h.data(), predicted.innovation.data());
   return Outcome::kAccepted;
 }
 
@@ -339,23 +339,25 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
     outcome = NoiseAt(row, RolesAt(f, row, f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
-    Project(f, row, predicted);
-    return outcome;
+    std::ranges::copy(predicted.h, row.h);
+    std::ranges::copy(predicted.innovation, row.innovation);
+    row.report->h = {row.h, predicted.h.size()};
+    row.report->innovation = {row.innovation, predicted.innovation.size()};
+  } else if (!too_wide) {
+    NoteRefusal(f, row, outcome);
   }
-  if (!too_wide) NoteRefusal(f, row, outcome);
   return outcome;
 }
 
-/// Reports the mean, the innovation and S = Cov(h) + R.
-void Unscented::Project(FilterState& f, Row& row, Predicted& predicted) {
-  const Workspace::Use use(f.work);
-  row.report->h = predicted.h;
-  row.report->innovation = predicted.innovation;
+/// S = Cov(h) + R.
+double Unscented::ComputeS(FilterState& f, Row& row) {
+  Predicted& predicted = PredictedOf(f, row);
   const Eigen::Index m = row.report->dof;
-  Workspace::Matrix s = f.work.Take(m, m);
+  Workspace::Matrix s(row.s, m, m);
   MomentsOf(TransformOf(Root(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
   s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
-  row.report->s.assign(s.data(), s.data() + s.size());
+  row.report->s = {row.s, row.R.size()};
+  return ComputeNis(row, f.work);
 }
 
 /// All rows at one spread, also those that the gate saw at a wider one: f in place of H, R,
@@ -423,7 +425,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   f.state.covariance().SetBlock(0, 0, p);
   f.state.MoveTo(f.moved);
   root_is_current_ = false;
-  RecordGain(f, rows, gain.data());
+  RecordGain(f, rows, gain);
   return Outcome::kAccepted;
 }
 

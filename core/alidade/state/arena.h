@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
 #include <new>
 #include <numeric>
-#include <span>
 #include <vector>
 
-namespace alidade::internal {
+namespace alidade {
 
 /// Allocates whole cache lines.
 template <class T>
@@ -76,4 +74,4 @@ class Arena {
   std::size_t used_ = 0;  ///< of the last chunk
 };
 
-}  // namespace alidade::internal
+}  // namespace alidade

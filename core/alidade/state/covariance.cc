@@ -2,9 +2,9 @@
 #include "alidade/state/covariance.h"
 
 #include <algorithm>
+#include <numeric>
 
-#include "alidade/state/projection.h"
-#include "alidade/state/small_kernels.h"
+#include "alidade/state/kernels.h"
 
 namespace alidade {
 
@@ -17,16 +17,20 @@ int Covariance::Add(int rows) {
 }
 
 void Covariance::Reserve(int rows) {
-  if (size_ + rows <= p_.rows()) return;
+  const int needed = size_ + rows;
+  if (needed <= capacity_) return;
   // An eighth more than asked for: a landmark that takes another form is there twice for a while.
-  const Eigen::Index needed = size_ + rows, capacity = std::max(2 * p_.rows(), needed + needed / 8);
-  Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(capacity, capacity);
-  larger.topLeftCorner(size_, size_) = p_.topLeftCorner(size_, size_);
+  const int capacity = internal::PaddedSize(std::max(2 * capacity_, needed + needed / 8));
+  const auto side = static_cast<std::size_t>(capacity);
+  AlignedNumbers larger(side * side, 0.0);
+  Eigen::Map<Eigen::MatrixXd>(larger.data(), capacity, capacity).topLeftCorner(size_, size_) =
+      p().topLeftCorner(size_, size_);
   p_.swap(larger);
+  capacity_ = capacity;
 }
 
 void Covariance::Clear() {
-  p_.topLeftCorner(size_, size_).setZero();
+  p().topLeftCorner(size_, size_).setZero();
   size_ = 0;
   gaps_.clear();
 }
@@ -46,8 +50,8 @@ int Covariance::TakeGap(int rows) {
 }
 
 void Covariance::Clear(int offset, int rows) {
-  p_.block(offset, 0, rows, offset).setZero();
-  p_.block(offset, offset, size_ - offset, rows).setZero();
+  p().block(offset, 0, rows, offset).setZero();
+  p().block(offset, offset, size_ - offset, rows).setZero();
 }
 
 void Covariance::Release(int offset, int rows) {
@@ -75,37 +79,29 @@ int Covariance::MoveToGap(int from, int rows) {
   if (to < 0) return to;
   const Workspace::Use use(memory_);
   Workspace::Matrix cross = memory_.Take(size_, rows);
-  cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
-  cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
-  SetRows(to, cross.middleRows(from, rows), cross);
+  cross.topRows(from) = p().block(from, 0, rows, from).transpose();
+  cross.bottomRows(size_ - from) = p().block(from, from, size_ - from, rows);
+  moved_.resize(static_cast<std::size_t>(rows));
+  std::iota(moved_.begin(), moved_.end(), to);
+  SetRows(moved_, cross.middleRows(from, rows), cross);
   Release(from, rows);
   return to;
 }
 
 Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
-  if (a == b) return p_.block(a, a, rows, rows).selfadjointView<Eigen::Lower>();
-  if (a > b) return p_.block(a, b, rows, columns);
-  return p_.block(b, a, columns, rows).transpose();
+  if (a == b) return p().block(a, a, rows, rows).selfadjointView<Eigen::Lower>();
+  if (a > b) return p().block(a, b, rows, columns);
+  return p().block(b, a, columns, rows).transpose();
 }
 
 void Covariance::SetBlock(int a, int b, const ConstMatrix& value) {
   if (a == b) {
-    p_.block(a, a, value.rows(), value.rows()).triangularView<Eigen::Lower>() = value;
+    p().block(a, a, value.rows(), value.rows()).triangularView<Eigen::Lower>() = value;
   } else if (a > b) {
-    p_.block(a, b, value.rows(), value.cols()) = value;
+    p().block(a, b, value.rows(), value.cols()) = value;
   } else {
-    p_.block(b, a, value.cols(), value.rows()) = value.transpose();
+    p().block(b, a, value.cols(), value.rows()) = value.transpose();
   }
-}
-
-/// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k) elsewhere; its
-/// rows [offset, offset + k) are not read.
-void Covariance::SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross) {
-  const Eigen::Index k = own.rows();
-  const Eigen::Index below = size_ - offset - k;
-  p_.block(offset, 0, k, offset) = cross.topRows(offset).transpose();
-  p_.block(offset + k, offset, below, k) = cross.middleRows(offset + k, below);
-  SetBlock(offset, offset, own);
 }
 
 void Covariance::SetRows(int offset, const ConstMatrix& own) {
@@ -113,44 +109,40 @@ void Covariance::SetRows(int offset, const ConstMatrix& own) {
   SetBlock(offset, offset, own);
 }
 
-void Covariance::SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
-                          const ConstMatrix& cross) {
-  for (const JacobianPart& a : parts) {
-    SetRows(a.offset, own.block(a.column, a.column, a.size, a.size),
-            cross.middleCols(a.column, a.size));
+void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& own,
+                         const ConstMatrix& cross) {
+  auto p = this->p();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Eigen::Index row = rows[k], below = size_ - row;
+    const auto column = cross.col(static_cast<Eigen::Index>(k));
+    p.row(row).head(row) = column.head(row).transpose();
+    p.col(row).segment(row, below) = column.tail(below);
   }
-  // Between parts that wrote `cross`.
-  for (const JacobianPart& a : parts) {
-    for (const JacobianPart& b : parts) {
-      if (b.column < a.column) {
-        SetBlock(a.offset, b.offset, own.block(a.column, b.column, a.size, b.size));
-      }
+  for (std::size_t i = 0; i < rows.size(); ++i) {  // between rows that wrote `cross`
+    for (std::size_t j = 0; j <= i; ++j) {
+      p(std::max(rows[i], rows[j]), std::min(rows[i], rows[j])) =
+          own(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
 }
 
-void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f, const double* q) {
-  int k = 0;
-  for (const JacobianPart& part : parts) k += part.size;
+internal::SymmetricView Covariance::view() { return {p_.data(), size_, capacity_}; }
+
+bool Covariance::Propagate(std::span<const int> rows, const double* f, const double* q) {
+  const internal::SymmetricView p = view();
+  const Eigen::Index k = std::ssize(rows);
   const Workspace::Use use(memory_);
+  Workspace::Vector memory = memory_.Take(2 * k * internal::PaddedSize(size_));
   if (q == nullptr) {
-    Workspace::Matrix zero = memory_.Take(k, k);
+    Workspace::Vector zero = memory_.Take(k * k);
     zero.setZero();
     q = zero.data();
   }
-  if (internal::IsSmall(*this) && parts.size() == 1) {
-    const int ld = static_cast<int>(p_.rows());
-    return internal::SmallKernelsFor(size_).propagate(p_.data(), ld, parts[0].offset, k, f, q);
-  }
-  Workspace::Matrix cross = memory_.Take(size_, k), own = memory_.Take(k, k);
-  own.setZero();
-  Project(*this, {f, k, k, parts}, cross.data(), own.data());
-  own += Eigen::Map<const RowMajor>(q, k, k);
-  SetParts(parts, own, cross);
+  return internal::KernelsFor(p).propagate(p, {rows, f, q, memory.data()});
 }
 
 Eigen::MatrixXd Covariance::Dense() const {
-  return p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>();
+  return p().topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace alidade

@@ -6,11 +6,16 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/state/arena.h"
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/jacobian_rows.h"
 #include "alidade/state/workspace.h"
 
 namespace alidade {
+
+namespace internal {
+struct SymmetricView;
+}
 
 /// A symmetric matrix where it lies: the lower triangle counts.
 using LowerTriangle = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
@@ -18,7 +23,7 @@ using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStri
 
 /// The covariance P of a state in its tangent, behind block queries: who uses it names rows by
 /// (offset, size). Dense: one symmetric matrix, the lower triangle authoritative, with spare
-/// capacity; what corrects all of it takes it from where it lies. Offsets and sizes lie in
+/// capacity in whole cache lines; what corrects all of it takes it from where it lies. Offsets and sizes lie in
 /// [0, size()], as Add gave them; they are not checked, but where said.
 /// Nothing allocates memory in the steady state but what returns a matrix.
 /// P H' and H P H' are made in projection.h.
@@ -44,23 +49,23 @@ class Covariance {
   /// Sets P(a, b) and P(b, a) = P(a, b)', as above; of a diagonal block the lower triangle counts.
   void SetBlock(int a, int b, const ConstMatrix& value);
   /// P(i, i), 0 <= i < size().
-  double Variance(int i) const { return p_(i, i); }
+  double Variance(int i) const { return p()(i, i); }
   /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, zero elsewhere.
   void SetRows(int offset, const ConstMatrix& own);
-  /// Sets the rows of all `parts`, of k columns together: `own` (k x k) among them, `cross` (n x k,
-  /// n = size()) elsewhere.
-  void SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
-                const ConstMatrix& cross);
+  /// Sets k rows: `own` (k x k) among them, `cross` (n x k, n = size()) elsewhere.
+  void SetRows(std::span<const int> rows, const ConstMatrix& own, const ConstMatrix& cross);
 
-  /// x' = F x + w of the k rows in `parts`, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai,
-  /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k).
-  void Propagate(std::span<const JacobianPart> parts, const double* f, const double* q);
+  /// x' = F x + w of k rows, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai, F and Q k x k,
+  /// row-major, of Q the lower triangle; null: zero. O(n k). False, and nothing has changed, if a
+  /// variance would not be finite.
+  bool Propagate(std::span<const int> rows, const double* f, const double* q);
 
   /// P where it lies.
-  LowerTriangle lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
+  LowerTriangle lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(capacity_)}; }
   ConstLowerTriangle lower() const {
-    return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())};
+    return {p_.data(), size_, size_, Eigen::OuterStride<>(capacity_)};
   }
+  internal::SymmetricView view();
   /// The whole matrix, mirrored.
   Eigen::MatrixXd Dense() const;
 
@@ -69,13 +74,15 @@ class Covariance {
 
  private:
   int TakeGap(int rows);
-  void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
   void Clear(int offset, int rows);
+  Eigen::Map<Eigen::MatrixXd> p() { return {p_.data(), capacity_, capacity_}; }
+  Eigen::Map<const Eigen::MatrixXd> p() const { return {p_.data(), capacity_, capacity_}; }
 
-  Eigen::MatrixXd p_;  ///< capacity x capacity
-  int size_ = 0;
+  AlignedNumbers p_;  ///< capacity x capacity; zero beyond size_
+  int size_ = 0, capacity_ = 0;
   std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)
   Scratch<Workspace> memory_;
+  Scratch<std::vector<int>> moved_;  ///< rows
 };
 
 }  // namespace alidade

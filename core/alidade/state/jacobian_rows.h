@@ -21,13 +21,13 @@ struct JacobianPart {
   int column;
 };
 
-/// m rows of a Jacobian H, row-major in the caller's memory, that is zero but for its parts.
+/// m rows of a Jacobian of n columns that is zero but in some; one that is named twice has the sum.
 struct JacobianRows {
-  const double* data;
+  const double* data;  ///< m x width, row-major
   int rows;
-  int stride;  ///< numbers in a row
-  std::span<const JacobianPart> parts;
-  bool whole = false;  ///< rows are as wide as the covariance, zeros included
+  std::span<const int> columns;  ///< rows of P, `width` of them
+
+  int width() const { return static_cast<int>(columns.size()); }
 };
 
 }  // namespace alidade

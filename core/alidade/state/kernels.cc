@@ -90,15 +90,56 @@ struct Arithmetic {
     }
     ALIDADE_UNROLL for (; i < n; ++i) y[i] += k * x[i];
   }
-  /// S = L D L' in place, m x m by columns; false unless positive definite.
+  /// S = L D L' in place, m x m by columns; false unless positive definite. Reads the lower triangle.
   ALIDADE_KERNEL bool Factorise(int m, double* s, double* inverse_d) {
     const int stride = PaddedSize(m);
+    int at = 0;
+    for (; kStates == 0 && at + kRows <= m; at += kRows) {  // rows [at, at + kRows) of L
+      Divide(at, s, s + at, stride, stride);
+      double* const own = s + std::ptrdiff_t{at} * stride + at;
+      Column x[kRows];
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(own + c * stride);
+      for (int k = 0; k < at; ++k) {
+        double* const l = s + std::ptrdiff_t{k} * stride + at;
+        Column before, scaled{};
+        before.Load(l);
+        scaled.Add(inverse_d[k], before);
+        scaled.Store(l);
+        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(l[c], before);
+      }
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Store(own + c * stride);
+      if (!FactoriseOwn(kRows, own, stride, inverse_d + at)) return false;
+    }
+    for (int i = at; kStates == 0 && i < m; ++i) {  // the last rows, one by one
+      for (int j = 0; j < i; ++j) {
+        double sum = s[std::ptrdiff_t{j} * stride + i];
+        for (int k = 0; k < j; ++k) {
+          sum -= s[std::ptrdiff_t{k} * stride + i] * s[std::ptrdiff_t{k} * stride + j];
+        }
+        s[std::ptrdiff_t{j} * stride + i] = sum;
+      }
+      double* const pivot = s + std::ptrdiff_t{i} * (stride + 1);
+      for (int k = 0; k < i; ++k) {
+        double& l = s[std::ptrdiff_t{k} * stride + i];
+        const double before = l;
+        l *= inverse_d[k];
+        *pivot -= l * before;
+      }
+      if (!IsPositive(*pivot)) return false;
+      inverse_d[i] = 1.0 / *pivot;
+    }
+    return kStates == 0 || FactoriseOwn(m, s, stride, inverse_d);
+  }
+  /// The same of few rows, by columns.
+  ALIDADE_KERNEL bool FactoriseOwn(int m, double* s, int stride, double* inverse_d) {
     ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
       double* const l = s + std::ptrdiff_t{k} * stride;
       if (!IsPositive(l[k])) return false;
       inverse_d[k] = 1.0 / l[k];
       ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {  // to the right, while l is still L D
-        AddScaled(m - j, -l[j] * inverse_d[k], l + j, s + std::ptrdiff_t{j} * stride + j);
+        const double factor = -l[j] * inverse_d[k];
+        ALIDADE_UNROLL for (int i = j; i < m; ++i) s[std::ptrdiff_t{j} * stride + i] +=
+            factor * l[i];
       }
       ALIDADE_UNROLL for (int i = k + 1; i < m; ++i) l[i] *= inverse_d[k];
     }
@@ -119,14 +160,19 @@ struct Arithmetic {
       column.Load(p.data + std::ptrdiff_t{c} * p.stride + i);
     } else {
       double rows[kRows];
-      ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = p(i + r, c);
+      const double* const from = p.data + std::ptrdiff_t{i} * p.stride + c;
+      if (kStates == 0 && c >= i + kRows) {
+        ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = from[std::ptrdiff_t{r} * p.stride];
+      } else {
+        ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = p(i + r, c);
+      }
       column.Load(rows);
     }
     return column;
   }
   /// P H' of `rows` rows of H, a multiple of kAtOnce, in the columns of w from `at` on.
   template <int kAtOnce>
-  ALIDADE_KERNEL void Project(const Update& u, const SparseRows& rows, int m, int at) {
+  ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int at) {
     const SymmetricView p = Sized(u.p);
     const int width = rows.width();
     const int* const columns = rows.columns.data();
@@ -177,31 +223,46 @@ struct Arithmetic {
   ALIDADE_KERNEL void Stack(const Update& u, int m) {
     const int stride = PaddedSize(m);
     for (const MeasurementRows& one : u.measurements) {
-      const int at = one.column, rows = one.h.rows, width = one.h.width();
-      const int* const columns = one.h.columns.data();
-      const double* h = one.h.data;
-      for (int r = 0; r < rows; ++r, h += width) {
-        double* const s = u.s + at + r;
-        for (int j = 0; j < at; ++j) {
-          double sum = 0.0;
-          for (int c = 0; c < width; ++c) sum += h[c] * At(u, u.w, columns[c], j);
-          s[std::ptrdiff_t{j} * stride] = sum;
+      const int at = one.column, rows = one.h.rows;
+      StackBefore(u, one, stride);
+      for (int r = 0; r < rows; ++r) {
+        for (int j = 0; j <= r; ++j) {
+          u.s[std::ptrdiff_t{at + j} * stride + at + r] = one.s[r * rows + j];
         }
-        for (int j = 0; j <= r; ++j) s[std::ptrdiff_t{at + j} * stride] = one.s[r * rows + j];
         u.y[at + r] = one.innovation[r];
       }
     }
   }
-  /// A panel of P H' to one of W, kRows columns at a time.
-  ALIDADE_KERNEL void Divide(int m, const double* l, double* panel) {
-    const int stride = PaddedSize(m);
+  /// H of a measurement times P H' of those before it, some columns of H at a time.
+  ALIDADE_KERNEL void StackBefore(const Update& u, const MeasurementRows& one, int stride) {
+    constexpr int kAtOnce = 16;
+    const int at = one.column, rows = one.h.rows, width = one.h.width();
+    for (int first = 0; first < width && at > 0; first += kAtOnce) {
+      const int count = std::min(kAtOnce, width - first);
+      const double* from[kAtOnce];
+      for (int c = 0; c < count; ++c) {
+        from[c] = &At(u, u.w, one.h.columns[static_cast<std::size_t>(first + c)], 0);
+      }
+      for (int r = 0; r < rows; ++r) {
+        const double* const h = one.h.data + r * width + first;
+        double* const s = u.s + at + r;
+        for (int j = 0; j < at; ++j) {
+          double sum = first == 0 ? 0.0 : s[std::ptrdiff_t{j} * stride];
+          for (int c = 0; c < count; ++c) sum += h[c] * from[c][j * kRows];
+          s[std::ptrdiff_t{j} * stride] = sum;
+        }
+      }
+    }
+  }
+  /// Rows of P H' to those of W, kRows columns at a time; columns lie `step` apart.
+  ALIDADE_KERNEL void Divide(int m, const double* l, double* panel, int step, int stride) {
     int j = 0;
     for (; kStates == 0 && j + kRows <= m; j += kRows) {
       Column x[kRows];
-      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(panel + (j + c) * kRows);
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(panel + (j + c) * step);
       for (int k = 0; k < j; ++k) {
         Column done;
-        done.Load(panel + k * kRows);
+        done.Load(panel + k * step);
         const double* const row = l + std::ptrdiff_t{k} * stride + j;
         ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(row[c], done);
       }
@@ -209,18 +270,18 @@ struct Arithmetic {
         ALIDADE_UNROLL for (int k = 0; k < c; ++k) {
           x[c].Subtract(l[std::ptrdiff_t{j + k} * stride + j + c], x[k]);
         }
-        x[c].Store(panel + (j + c) * kRows);
+        x[c].Store(panel + (j + c) * step);
       }
     }
     ALIDADE_UNROLL for (; j < m; ++j) {
       Column x;
-      x.Load(panel + j * kRows);
+      x.Load(panel + j * step);
       ALIDADE_UNROLL for (int k = 0; k < j; ++k) {
         Column done;
-        done.Load(panel + k * kRows);
+        done.Load(panel + k * step);
         x.Subtract(l[std::ptrdiff_t{k} * stride + j], done);
       }
-      x.Store(panel + j * kRows);
+      x.Store(panel + j * step);
     }
   }
   /// dx and the variances of P' in the rows of a panel from i on.
@@ -270,17 +331,18 @@ struct Arithmetic {
     Solution worst = Solution::kFine;
     for (int i = 0; i < n; i += kRows) {
       double* const panel = &At(u, u.w, i, 0);
-      Divide(m, u.s, panel);
+      Divide(m, u.s, panel, kRows, PaddedSize(m));
       worst = std::max(worst, Correct(u, m, i, panel));
       if (u.gain != nullptr) Gain(u, m, panel, &At(u, u.gain, i, 0));
     }
     return worst;
   }
 
-  /// P'(i, j) of kTile panels of rows from i and one of columns from j; `scaled`: D^-1 times the
-  /// panel of W at j.
+  /// P'(i, j) of kTile panels of rows from i and one of columns from j, by columns [first, last) of
+  /// W; `scaled`: D^-1 times those of the panel at j.
   template <int kTile>
-  ALIDADE_KERNEL void Tile(const Update& u, int m, int i, int j, const double* scaled) {
+  ALIDADE_KERNEL void Tile(const Update& u, int first, int last, int i, int j,
+                           const double* scaled) {
     const std::ptrdiff_t stride = Sized(u.p).stride;
     double* const p = u.p.data + j * stride + i;
     const double* const w = &At(u, u.w, i, 0);
@@ -288,14 +350,14 @@ struct Arithmetic {
     ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Load(p + c * stride + t * kRows);
     }
-    for (int k = 0; k < m; ++k) {
+    ALIDADE_UNROLL for (int k = first; k < last; ++k) {
       Column left[kTile];
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
         left[t].Load(w + (std::ptrdiff_t{t} * u.capacity + k) * kRows);
       }
       ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
         ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
-          sum[c][t].Subtract(scaled[k * kRows + c], left[t]);
+          sum[c][t].Subtract(scaled[(k - first) * kRows + c], left[t]);
         }
       }
     }
@@ -303,20 +365,29 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Store(p + c * stride + t * kRows);
     }
   }
+  /// P' in blocks of rows and columns of W that stay in the second cache.
   ALIDADE_KERNEL void Downdate(const Update& u) {
+    constexpr int kDepth = 256, kHeight = kStates > 0 ? kRows : 24 * kHigh * kRows;
     const int n = Sized(u.p).size, m = Rows(u.m);
-    double few[M > 0 ? M * kRows : 1];
-    double* const scaled = M > 0 ? few : u.scaled;
-    for (int j = 0; j < n; j += kRows) {
-      ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
-        Column w, column{};
-        w.Load(&At(u, u.w, j, k));
-        column.Add(u.inverse_d[k], w);
-        column.Store(scaled + k * kRows);
+    double scaled[(M > 0 ? M : kDepth) * kRows];
+    for (int first = 0; first < m; first += kDepth) {
+      const int last = M > 0 ? M : std::min(first + kDepth, m);
+      for (int block = 0; block < n; block += kHeight) {
+        const int end = std::min(block + kHeight, n);
+        for (int j = 0; j < end; j += kRows) {
+          ALIDADE_UNROLL for (int k = first; k < last; ++k) {
+            Column w, column{};
+            w.Load(&At(u, u.w, j, k));
+            column.Add(u.inverse_d[k], w);
+            column.Store(scaled + (k - first) * kRows);
+          }
+          int i = std::max(block, j);
+          for (; i + kHigh * kRows <= end; i += kHigh * kRows) {
+            Tile<kHigh>(u, first, last, i, j, scaled);
+          }
+          for (; i < end; i += kRows) Tile<1>(u, first, last, i, j, scaled);
+        }
       }
-      int i = j;
-      for (; i + kHigh * kRows <= n; i += kHigh * kRows) Tile<kHigh>(u, m, i, j, scaled);
-      for (; i < n; i += kRows) Tile<1>(u, m, i, j, scaled);
     }
   }
 
@@ -377,34 +448,34 @@ struct Arithmetic {
 };
 
 /// The table of one Column, compiled for an instruction set.
-#define ALIDADE_KERNEL_TABLE(table, target, text)                                  \
-  template <class Column>                                                          \
-  struct table {                                                                   \
-    template <int M>                                                               \
-    target static double Gate(const Update& u, const MeasurementRows& one) {       \
-      return Arithmetic<Column, M>::Gate(u, one);                                  \
-    }                                                                              \
-    template <int M>                                                               \
-    target static Solution Solve(const Update& u) {                                \
-      return Arithmetic<Column, M>::Solve(u);                                      \
-    }                                                                              \
-    template <int M>                                                               \
-    target static void Downdate(const Update& u) {                                 \
-      Arithmetic<Column, M>::Downdate(u);                                          \
-    }                                                                              \
-    target static void Project(const Update& u, const SparseRows& h, int column) { \
-      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);            \
-    }                                                                              \
-    target static bool Propagate(const SymmetricView& p, const Transition& step) { \
-      return Arithmetic<Column, 0>::Propagate(p, step);                            \
-    }                                                                              \
-    static constexpr Kernels kTable{text,                                          \
-                                    Column::kRows,                                 \
-                                    {Gate<1>, Gate<2>, Gate<0>},                   \
-                                    {Solve<1>, Solve<2>, Solve<0>},                \
-                                    {Downdate<1>, Downdate<2>, Downdate<0>},       \
-                                    Project,                                       \
-                                    Propagate};                                    \
+#define ALIDADE_KERNEL_TABLE(table, target, text)                                    \
+  template <class Column>                                                            \
+  struct table {                                                                     \
+    template <int M>                                                                 \
+    target static double Gate(const Update& u, const MeasurementRows& one) {         \
+      return Arithmetic<Column, M>::Gate(u, one);                                    \
+    }                                                                                \
+    template <int M>                                                                 \
+    target static Solution Solve(const Update& u) {                                  \
+      return Arithmetic<Column, M>::Solve(u);                                        \
+    }                                                                                \
+    template <int M>                                                                 \
+    target static void Downdate(const Update& u) {                                   \
+      Arithmetic<Column, M>::Downdate(u);                                            \
+    }                                                                                \
+    target static void Project(const Update& u, const JacobianRows& h, int column) { \
+      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);              \
+    }                                                                                \
+    target static bool Propagate(const SymmetricView& p, const Transition& step) {   \
+      return Arithmetic<Column, 0>::Propagate(p, step);                              \
+    }                                                                                \
+    static constexpr Kernels kTable{text,                                            \
+                                    Column::kRows,                                   \
+                                    {Gate<1>, Gate<2>, Gate<0>},                     \
+                                    {Solve<1>, Solve<2>, Solve<0>},                  \
+                                    {Downdate<1>, Downdate<2>, Downdate<0>},         \
+                                    Project,                                         \
+                                    Propagate};                                      \
   };
 ALIDADE_KERNEL_TABLE(Baseline, , "baseline")
 #if defined(__x86_64__)
@@ -421,12 +492,12 @@ constexpr std::array<const Kernels*, kSmall + 1> SmallKernels(std::integer_seque
 
 const Kernels& KernelsFor(const SymmetricView& p) {
   static constexpr auto kTables = SmallKernels(std::make_integer_sequence<int, kSmall>());
-  static const Kernels& vectors = VectorKernelsOf(BestInstructionSet());
+  static const Kernels& vectors = KernelsOf(BestInstructionSet());
   const bool small = p.stride == kSmall && p.size > 0;
   return small ? *kTables[static_cast<std::size_t>(p.size)] : vectors;
 }
 
-const Kernels& VectorKernelsOf([[maybe_unused]] InstructionSet set) {
+const Kernels& KernelsOf([[maybe_unused]] InstructionSet set) {
 #if defined(__x86_64__)
   if (set == InstructionSet::kAvx512) return Avx512<Vector<8>>::kTable;
   if (set == InstructionSet::kAvx2) return Avx2<Vector<4>>::kTable;

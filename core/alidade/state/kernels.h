@@ -5,6 +5,7 @@
 #include <span>
 
 #include "alidade/state/instruction_set.h"
+#include "alidade/state/jacobian_rows.h"
 
 /// The arithmetic of a Kalman filter on raw memory. Each kernel is written once, over columns of a
 /// few rows (kernels.cc): compiled for 1 to 8 states, with loops that unroll, and for any number of
@@ -26,18 +27,9 @@ struct SymmetricView {
   }
 };
 
-/// m rows of a matrix of n columns, zero but in those named; one that is named twice has the sum.
-struct SparseRows {
-  const double* data;  ///< m x width, by rows
-  int rows;
-  std::span<const int> columns;
-
-  int width() const { return static_cast<int>(columns.size()); }
-};
-
 /// One measurement of an update, linearised at the state.
 struct MeasurementRows {
-  SparseRows h;
+  JacobianRows h;
   const double* innovation;  ///< m
   double* s;                 ///< m x m: R, after Kernels::gate S = H P H' + R
   int column = 0;            ///< its first one in the update
@@ -61,11 +53,11 @@ struct Update {
   double* y;          ///< capacity: L^-1 r
   double* dx;         ///< PaddedSize(n)
   double* lost;       ///< PaddedSize(n): the diagonal of W D^-1 W'
-  double* scaled;     ///< 8 capacity
   double* gain;       ///< as w: K; null: not wanted
 
   /// Element (i, j) of a matrix in panels.
   double& At(double* panels, int i, int j) const {
+    if (i < panel_rows) return panels[std::ptrdiff_t{j} * panel_rows + i];
     const int row = i % panel_rows;
     return panels[std::ptrdiff_t{i - row} * capacity + std::ptrdiff_t{j} * panel_rows + row];
   }
@@ -99,7 +91,7 @@ struct Kernels {
   /// P' in place of P.
   void (*downdate[3])(const Update& update);
   /// P H' of H alone, in columns of w.
-  void (*project)(const Update& update, const SparseRows& h, int column);
+  void (*project)(const Update& update, const JacobianRows& h, int column);
   /// P of x' in place of P. False, and P is as it was, if it would not be finite.
   bool (*propagate)(const SymmetricView& p, const Transition& step);
 
@@ -114,6 +106,6 @@ struct Kernels {
 /// BestInstructionSet().
 const Kernels& KernelsFor(const SymmetricView& p);
 /// For any number of states, by the vectors of an instruction set.
-const Kernels& VectorKernelsOf(InstructionSet set);
+const Kernels& KernelsOf(InstructionSet set);
 
 }  // namespace alidade::internal

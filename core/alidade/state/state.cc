@@ -77,8 +77,13 @@ void State::Reserve(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   if (block.value_offset >= 0) return;
   block.value_offset = TakeValues(values_, value_gaps_, block.geometry().ambient);
-  if (block.status == BlockStatus::kConstant) return;
+  if (block.status == BlockStatus::kConstant) {
+    flat_ = false;
+    return;
+  }
   block.tangent_offset = covariance_.Add(block.geometry().tangent);
+  flat_ = flat_ && block.geometry().kind == GeometryKind::kVector &&
+          block.value_offset == block.tangent_offset;
   placed_.insert(std::ranges::lower_bound(placed_, id), id);
 }
 
@@ -104,28 +109,33 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
     PlaceValue(id, values);
     values += layout_[id].geometry().ambient;
   }
-  ALIDADE_EXPECTS(jacobian.cols() == FindParts(from));
+  ALIDADE_EXPECTS(jacobian.cols() == FindRows(from));
   const Workspace::Use use(memory_);
-  const Eigen::Index rows = jacobian.rows();
-  Workspace::Matrix cross = memory_.Take(covariance_.size(), rows), p = memory_.Take(rows, rows);
+  const Eigen::Index count = jacobian.rows(), width = std::ssize(columns_);
+  Workspace::Matrix cross = memory_.Take(covariance_.size(), count), p = memory_.Take(count, count);
+  Eigen::Map<RowMajor> present(memory_.Take(count * width).data(), count, width);
+  for (Eigen::Index c = 0; c < width; ++c) {
+    present.col(c) = jacobian.col(columns_[static_cast<std::size_t>(c)]);
+  }
   p.setZero();
-  const JacobianRows j{jacobian.data(), static_cast<int>(rows),
-                       static_cast<int>(jacobian.outerStride()), parts_};
-  Project(covariance_, j, cross.data(), p.data());
+  Project(covariance_, {present.data(), static_cast<int>(count), rows_}, cross.data(), p.data());
   p += own;
-  FindParts(ids);
-  covariance_.SetParts(parts_, p, cross);
+  ALIDADE_EXPECTS(FindRows(ids) == std::ssize(rows_));
+  covariance_.SetRows(rows_, p, cross);
 }
 
-/// Puts the rows of the blocks in P into parts_, and returns the size of their tangents.
-int State::FindParts(std::span<const BlockId> blocks) {
-  parts_.clear();
+/// Fills rows_ and columns_, and returns the size of the blocks' tangents.
+int State::FindRows(std::span<const BlockId> blocks) {
+  rows_.clear();
+  columns_.clear();
   int column = 0;
   for (const BlockId id : blocks) {
     const Block& block = layout_[id];
-    const int size = block.geometry().tangent;
-    if (block.has_covariance()) parts_.push_back({block.tangent_offset, size, column});
-    column += size;
+    for (int k = 0; k < block.geometry().tangent; ++k, ++column) {
+      if (!block.has_covariance()) continue;
+      rows_.push_back(block.tangent_offset + k);
+      columns_.push_back(column);
+    }
   }
   return column;
 }
@@ -154,6 +164,7 @@ void State::FillGaps() {
     const int gap = covariance_.MoveToGap(last.tangent_offset, rows);
     if (gap < 0) return;
     last.tangent_offset = gap;
+    flat_ = false;
   }
 }
 
@@ -166,6 +177,13 @@ void State::Drop(BlockId id) {
 }
 
 void State::Retract(const double* dx, std::vector<double>& moved) const {
+  if (flat_) {
+    moved.resize(values_.size());
+    const auto n = static_cast<std::size_t>(covariance_.size());
+    for (std::size_t i = 0; i < n; ++i) moved[i] = values_[i] + dx[i];
+    for (std::size_t i = n; i < moved.size(); ++i) moved[i] = values_[i];
+    return;
+  }
   moved.assign(values_.begin(), values_.end());
   for (const BlockId id : placed_) {
     const Block& block = layout_[id];
@@ -177,14 +195,14 @@ void State::Retract(const double* dx, std::vector<double>& moved) const {
 
 void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
-  for (const BlockId id : placed_) {
-    const Block& block = layout_[id];
+  for (std::size_t i = 0; !flat_ && i < placed_.size(); ++i) {
+    const Block& block = layout_[placed_[i]];
     if (!block.present || block.geometry().kind != GeometryKind::kUnitVector) continue;
     std::array<double, 4> j;  // a unit vector's tangent has two elements
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    const JacobianPart part{block.tangent_offset, 2, 0};
-    covariance_.Propagate({&part, 1}, j.data(), nullptr);
+    const std::array rows{block.tangent_offset, block.tangent_offset + 1};
+    covariance_.Propagate(rows, j.data(), nullptr);
   }
   std::copy(values.begin(), values.end(), values_.begin());
 }

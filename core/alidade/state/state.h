@@ -106,7 +106,7 @@ class State {
 
  private:
   void PlaceValue(BlockId id, const double* value);
-  int FindParts(std::span<const BlockId> blocks);
+  int FindRows(std::span<const BlockId> blocks);
   void Release(BlockId id);
   void FillGaps();
   Block& At(BlockId id) { return layout_.blocks_[static_cast<std::size_t>(id)]; }
@@ -116,8 +116,11 @@ class State {
   std::vector<std::pair<int, int>> value_gaps_;  ///< (offset, size)
   Covariance covariance_;
   std::vector<BlockId> placed_;  ///< that have rows of P, ascending
+  bool flat_ = true;  ///< x (+) dx is x + dx: vectors alone, at the same places in x and P
   Scratch<Workspace> memory_;
-  Scratch<std::vector<JacobianPart>> parts_;
+  // Of the blocks that FindRows was asked for.
+  Scratch<std::vector<int>> rows_;     ///< of P
+  Scratch<std::vector<int>> columns_;  ///< of a Jacobian that has one for each element of them
 };
 
 /// J (n x n, in `work`) of state.MoveTo(values): dx there = J dx here.

@@ -57,31 +57,6 @@ void DivideByTransposed(const ConstMatrix& l, MutableMatrix b) {
                                            b.outerStride());
 }
 
-void DivideByTransposed(const ConstMatrix& l, const Panels& b) {
-  BestVectorKernels().divide_panels(b.rows, b.columns, l.data(), l.outerStride(), b.data);
-}
-
-void SubtractOuterProduct(MutableMatrix c, const Panels& w) {
-  BestVectorKernels().subtract_outer_product(w.rows, w.columns, w.data, c.data(), c.outerStride());
-}
-
-void Multiply(const Panels& a, const ConstVector& x, MutableVector product, double* squares) {
-  BestVectorKernels().multiply_panels(a.rows, a.columns, a.data, x.data(), product.data(), squares);
-}
-
-void Copy(const Panels& a, MutableMatrix to) {
-  for (Eigen::Index at = 0; at < a.rows; at += a.height) {
-    const Eigen::Map<const Eigen::MatrixXd> panel(a.data + at * a.columns, a.height, a.columns);
-    const Eigen::Index count = std::min<Eigen::Index>(a.height, a.rows - at);
-    to.middleRows(at, count) = panel.topRows(count);
-  }
-}
-
-Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m) {
-  const long height = BestVectorKernels().panel_rows;
-  return {work.Take((n + height - 1) / height * height, m).data(), n, m, height};
-}
-
 void Divide(const ConstMatrix& l, MutableMatrix b) {
   ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
     const Eigen::Index j = l.rows() - from_end - columns;

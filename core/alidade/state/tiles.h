@@ -5,7 +5,6 @@
 #include <span>
 
 #include "alidade/state/jacobian_rows.h"
-#include "alidade/state/panels.h"
 #include "alidade/state/workspace.h"
 
 /// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen
@@ -13,8 +12,6 @@
 namespace alidade::internal {
 
 using MutableMatrix = Eigen::Ref<Eigen::MatrixXd>;
-using MutableVector = Eigen::Ref<Eigen::VectorXd>;
-using ConstVector = Eigen::Ref<const Eigen::VectorXd>;
 
 constexpr Eigen::Index kTile = 32;  // what the kernels leave to Eigen is small then
 
@@ -31,16 +28,6 @@ void AddSymmetricProduct(MutableMatrix c, const ConstMatrix& a, const ConstMatri
 void AddOuterProduct(MutableMatrix c, std::span<const int> rows, const ConstMatrix& a);
 /// B <- B L^-T, L the lower triangle of `l`.
 void DivideByTransposed(const ConstMatrix& l, MutableMatrix b);
-/// B <- B L^-T of panels, and the lower triangle of C <- C - W W'.
-void DivideByTransposed(const ConstMatrix& l, const Panels& b);
-void SubtractOuterProduct(MutableMatrix c, const Panels& w);
-/// A x and, unless null, the squared norm of each row of A.
-void Multiply(const Panels& a, const ConstVector& x, MutableVector product,
-              double* squares = nullptr);
-/// to <- A.
-void Copy(const Panels& a, MutableMatrix to);
-/// n x m numbers of any value, as the kernels of this processor take them.
-Panels TakePanels(Workspace& work, Eigen::Index n, Eigen::Index m);
 /// B <- B L^-1, L the lower triangle of `l`.
 void Divide(const ConstMatrix& l, MutableMatrix b);
 /// The lower triangle of P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m,

@@ -507,13 +507,13 @@ void CondensedRun::Report(std::size_t k, const std::vector<double>& values,
     if (of_landmark) {
       x = WithLandmark(x, landmarks_[static_cast<std::size_t>(factor.landmark)].y);
     }
-    if (See(factor, x, entry.h, nullptr) != Outcome::kAccepted) {
-      entry.h.clear();
-      continue;
-    }
-    WrapAngles(geometry, entry.h.data());
-    entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
-    geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+    std::vector<double>& h = memory_.h;
+    if (See(factor, x, h, nullptr) != Outcome::kAccepted) continue;
+    WrapAngles(geometry, h.data());
+    std::vector<double> innovation(static_cast<std::size_t>(geometry.tangent));
+    geometry.Minus(entry.z.data(), h.data(), innovation.data());
+    entry.h = report.Copy(h);
+    entry.innovation = report.Copy(innovation);
   }
 }
 

@@ -416,7 +416,6 @@ class CondensedRun {
   struct Memory {
     std::vector<double> x, h, jacobian;
     std::vector<const double*> roles;
-    std::vector<double*> columns;
     RowMajor j_r_h;
   };
   mutable Memory memory_;        ///< of Residual and what it calls

@@ -163,7 +163,7 @@ const double* const* CondensedRun::RolesOf(const Factor& factor,
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
   return internal::EvaluateAt(ModelOf(factor), PlaceOf(factor), factor.measurement,
-                              RolesOf(factor, x), memory_.columns, h, jacobian);
+                              RolesOf(factor, x), h, jacobian);
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.

@@ -100,8 +100,8 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   return kinds;
 }
 
-/// The system with a fixed block next to it, which keeps it from the fast path.
-System OnTheGeneralPath(System system) {
+/// The system with a constant block next to it.
+System WithConstantBlock(System system) {
   const BlockId id =
       system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);
   system.priors.push_back({id, {1.0}, Eigen::MatrixXd::Zero(1, 1), ""});
@@ -110,7 +110,7 @@ System OnTheGeneralPath(System system) {
 
 TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
   const std::vector<std::string> first = {"input_stale"};  // none yet from 0 s to 0.5 s
-  for (const System& system : {Car(), OnTheGeneralPath(Car())}) {
+  for (const System& system : {Car(), WithConstantBlock(Car())}) {
     Ekf ekf(system, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, kInfinity, 1e-12), first);
     Iekf iekf(system, {}, kStreams);
@@ -123,7 +123,7 @@ TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
 }
 
 TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
-  for (const System& system : {Car(0.4), OnTheGeneralPath(Car(0.4))}) {
+  for (const System& system : {Car(0.4), WithConstantBlock(Car(0.4))}) {
     Ekf ekf(system, {}, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, 0.4, 1e-12);
     // Before the first, and after each but the last, for the next comes 0.5 s later or more.

@@ -231,7 +231,7 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
   Ekf ekf(system, {}, {{"tracks", 3}});
   const double z = 1.5 * 1.5 * 1.5;  // r = 0.5, where H = -3 1.5^2
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {z, z, z}}}));
-  EXPECT_NEAR(report.measurements()[0].s.at(0), 6.75 * 6.75 + 1e-6, 1e-9);
+  EXPECT_NEAR(report.measurements()[0].s[0], 6.75 * 6.75 + 1e-6, 1e-9);
 }
 
 TEST(Landmarks, ToKeepAreCountedOnceWhereTwoSensorsSeeThem) {

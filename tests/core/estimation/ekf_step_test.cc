@@ -172,8 +172,8 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
     const UpdateReport& report = one->Process(FrameAt(0.0, {{0, -0.4}}));
     const MeasurementReport& entry = report.measurements().front();
-    EXPECT_NEAR(entry.h.at(0), 6.0 - 2.0 * kPi, 1e-12);
-    EXPECT_NEAR(entry.innovation.at(0), -0.4 - (6.0 - 2.0 * kPi), 1e-12);
+    EXPECT_NEAR(entry.h[0], 6.0 - 2.0 * kPi, 1e-12);
+    EXPECT_NEAR(entry.innovation[0], -0.4 - (6.0 - 2.0 * kPi), 1e-12);
   }
 }
 
@@ -190,7 +190,7 @@ TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
       const MeasurementReport& entry = report.measurements().front();
       EXPECT_EQ(entry.outcome, Outcome::kAccepted);
       const double short_way = 2.0 * kPi - 6.0;
-      EXPECT_NEAR(entry.innovation.at(0), short_way, 1e-12);
+      EXPECT_NEAR(entry.innovation[0], short_way, 1e-12);
       // P = 1, R = 0.01
       EXPECT_NEAR(ValueOf(one->state(), "t.a"), 3.0 - kPi + short_way / 1.01, 1e-9);
     }

@@ -238,7 +238,7 @@ class HeldNoiseSnapshot : public ::testing::Test {};
 using Recursive = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf>;
 TYPED_TEST_SUITE(HeldNoiseSnapshot, Recursive);
 
-// Saved inside a gap, after one part (of the fast path) and after several.
+// Saved inside a gap, after one part and after several.
 TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
   const System system = DepthFilter();
   for (const int parts : {1, 3}) {

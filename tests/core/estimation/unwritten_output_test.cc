@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin writes every element of its outputs. What it leaves out is not finite, in the fast path
-// of a small filter as in the general one, at the first measurement as at any other.
+// A plugin writes every element of its outputs. What it leaves out is not finite, at the first
+// measurement as at any other.
 #include <gtest/gtest.h>
 
 #include "alidade/estimation/time_offset.h"
@@ -95,7 +95,7 @@ struct HandWritten {
   AlidadeMotion motion{};
 };
 
-/// `a.x`, measured by `direct`; `aside`: with a fixed block, which keeps it from the fast path.
+/// `a.x`, measured by `direct`; `aside`: with a constant block.
 System Direct(HandWritten& hand, bool aside) {
   System system;
   const auto model = std::make_shared<PluginMotion>(hand.Make(ALIDADE_KIND_MOTION));
@@ -179,8 +179,8 @@ TEST(UnwrittenUnderATimeOffset, IsNotFiniteAtEveryMeasurement) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Paths, Unwritten, ::testing::Bool(),
-                         [](const auto& one) { return one.param ? "general" : "fast"; });
+INSTANTIATE_TEST_SUITE_P(Blocks, Unwritten, ::testing::Bool(),
+                         [](const auto& one) { return one.param ? "constant_too" : "estimated"; });
 
 }  // namespace
 }  // namespace alidade

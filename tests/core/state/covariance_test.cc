@@ -34,9 +34,8 @@ TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
   const RowMajor f = RandomMatrix(3, 3, random);
   const Eigen::MatrixXd root = RandomMatrix(3, 1, random);
   const RowMajor q = root * root.transpose();
-  p.Propagate(std::vector<JacobianPart>{{6, 2, 0}, {5, 1, 2}}, f.data(), q.data());
-  // Gathered rows 6, 7, 5 in this order.
   const std::vector<int> rows = {6, 7, 5};
+  EXPECT_TRUE(p.Propagate(rows, f.data(), q.data()));
   Eigen::MatrixXd whole_f = Eigen::MatrixXd::Identity(8, 8);
   Eigen::MatrixXd whole_q = Eigen::MatrixXd::Zero(8, 8);
   whole_f(rows, rows) = f;

@@ -51,8 +51,7 @@ struct KernelProblem {
   Update Begin(const Kernels& kernels) {
     const auto number = [](int count) { return static_cast<std::size_t>(count); };
     const int rows = PaddedSize(capacity);
-    memory.assign(
-        number(stride * (stride + 2 * capacity + 2) + rows * (capacity + 2) + 8 * capacity), 0.0);
+    memory.assign(number(stride * (stride + 2 * capacity + 2) + rows * (capacity + 2)), 0.0);
     double* next = memory.data();
     const auto take = [&](int count) { return std::exchange(next, next + count); };
     update = {};
@@ -70,7 +69,6 @@ struct KernelProblem {
     update.y = take(rows);
     update.dx = take(stride);
     update.lost = take(stride);
-    update.scaled = take(8 * capacity);
     measurements.clear();
     int at = 0;
     for (One& one : ones) {
@@ -117,7 +115,7 @@ void ForAllKernels(const Test& test) {
     test(kernels, n);
   }
   for (const InstructionSet set : AllInstructionSets()) {
-    const Kernels& kernels = VectorKernelsOf(set);
+    const Kernels& kernels = KernelsOf(set);
     ASSERT_STREQ(kernels.name, ToString(set));
     for (const int n : {1, 2, 7, 8, 9, 15, 16, 17, 31, 100, 203}) {
       SCOPED_TRACE(std::string(kernels.name) + ", n = " + std::to_string(n));
@@ -128,8 +126,14 @@ void ForAllKernels(const Test& test) {
 
 TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
   Random random(1);
-  const std::vector<std::vector<int>> updates = {
-      {1}, {2}, {1, 1}, {3}, {2, 1, 3}, {1, 6, 2}, std::vector<int>(20, 2)};
+  const std::vector<std::vector<int>> updates = {{1},
+                                                 {2},
+                                                 {1, 1},
+                                                 {3},
+                                                 {2, 1, 3},
+                                                 {1, 6, 2},
+                                                 std::vector<int>(20, 2),
+                                                 std::vector<int>(90, 3)};
   ForAllKernels([&](const Kernels& kernels, int n) {
     for (const std::vector<int>& rows : updates) {
       KernelProblem problem(n, rows, random);

@@ -72,22 +72,5 @@ TEST(Tiles, WhatHasNoFactorIsRefusedInEveryTile) {
   }
 }
 
-TEST(Tiles, PanelsAreReadAsTheMatrixThatTheyAre) {
-  Random random(7);
-  for (const Eigen::Index n : {0, 1, 23, 24, 50}) {
-    const MatrixXd a = RandomMatrix(n, 11, random), x = RandomMatrix(11, 1, random);
-    Workspace work;
-    const Panels panels = TakePanels(work, n, 11);
-    for (Eigen::Index i = 0; i < a.size(); ++i) panels(i % n, i / n) = a.data()[i];
-    MatrixXd copied(n, 11);
-    Copy(panels, copied);
-    EXPECT_EQ(copied, a);
-    Eigen::VectorXd product(n), squares(n);
-    Multiply(panels, x.col(0), product, squares.data());
-    EXPECT_LE((product - a * x).norm(), 1e-12) << n;
-    EXPECT_LE((squares - a.rowwise().squaredNorm()).norm(), 1e-12) << n;
-  }
-}
-
 }  // namespace
 }  // namespace alidade::internal

@@ -151,17 +151,17 @@ struct HandMade {
     accepted.sensor = 0;
     accepted.dof = 1;
     accepted.nis = 0.5;
-    accepted.z = {80.0};
-    accepted.h = {79.0};
-    accepted.innovation = {1.0};
-    accepted.s = {2.25};
-    accepted.gain = {0.1, 0.0, -0.3};
+    accepted.z = report.Copy(std::vector{80.0});
+    accepted.h = report.Copy(std::vector{79.0});
+    accepted.innovation = report.Copy(std::vector{1.0});
+    accepted.s = report.Copy(std::vector{2.25});
+    accepted.gain = report.Copy(std::vector{0.1, 0.0, -0.3});
     MeasurementReport invalid;
     invalid.sensor = 0;
     invalid.dof = 1;
     invalid.landmark = 17;
     invalid.outcome = Outcome::kInvalid;
-    invalid.z = {-1.0};
+    invalid.z = report.Copy(std::vector{-1.0});
     report.Add() = accepted;
     report.Add() = invalid;
   }

@@ -27,7 +27,9 @@ Frame PixelsOf(const std::vector<std::pair<std::int64_t, std::vector<double>>>& 
 
 void AddReport(UpdateReport& report, std::int64_t landmark, Outcome outcome) {
   MeasurementReport& one = report.Add();
-  one.Reset(0, landmark, 2);
+  one.sensor = 0;
+  one.landmark = landmark;
+  one.dof = 2;
   one.outcome = outcome;
 }
 
@@ -79,8 +81,8 @@ TEST(FeatureTrails, ThePredictionIsHAndTheFirstTwoOfS) {
   AddReport(report, 4, Outcome::kAccepted);
   MeasurementReport& one = report.measurements()[0];
   one.dof = 3;  // u, v and a depth
-  one.h = {11, 21, 5};
-  one.s = {4, 1, 0.1, 1, 9, 0.2, 0.1, 0.2, 0.3};
+  one.h = report.Copy(std::vector{11.0, 21.0, 5.0});
+  one.s = report.Copy(std::vector{4.0, 1.0, 0.1, 1.0, 9.0, 0.2, 0.1, 0.2, 0.3});
   FeatureTrails trails;
   const auto predicted = trails.Take(PixelsOf({{4, {10, 20, 5}}}), &report)[0].predicted;
   ASSERT_TRUE(predicted);

@@ -12,7 +12,7 @@
 
 #include "alidade/io/sha256.h"
 #include "alidade/plugin/instruction_sets.h"
-#include "alidade/state/vector_kernels.h"
+#include "alidade/state/instruction_set.h"
 
 namespace alidade::internal {
 namespace {
@@ -74,7 +74,7 @@ std::map<std::string, std::string> BuildIds() {
   };
   dl_iterate_phdr(add, &ids);
   ids["processor"] = InstructionSetNames(InstructionSetsOfProcessor());
-  ids["kernels"] = BestVectorKernels().name;
+  ids["kernels"] = ToString(BestInstructionSet());
   return ids;
 }
 

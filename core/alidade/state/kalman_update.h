@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "alidade/state/arena.h"
+#include "alidade/state/covariance.h"
+#include "alidade/state/kernels.h"
+
+namespace alidade::internal {
+
+/// One update of a covariance by the kernels for its size, in memory that is kept from one update
+/// to the next: Begin, Gate of each measurement, Solve with those that passed, Downdate. See Update
+/// for the equations.
+class KalmanUpdate {
+ public:
+  /// Starts an update of P by at most `capacity` rows; P has to stay where it is.
+  void Begin(Covariance& p, int capacity);
+  /// Makes P H' of a measurement, in its columns, and its S; returns its NIS, which is not a number
+  /// unless S is finite and positive definite.
+  double Gate(const MeasurementRows& one) {
+    return Kernels::For(kernels_->gate, one.h.rows)(update_, one);
+  }
+  /// Moves P H' of a measurement to columns before those it has.
+  void MoveColumns(int from, int to, int count);
+  /// L, D, W, dx and, if wanted, K of the update by `measurements`, whose columns follow one
+  /// another.
+  Solution Solve(std::span<const MeasurementRows> measurements, bool wants_gain);
+  /// P - W D^-1 W' in place of P.
+  void Downdate() { Kernels::For(kernels_->downdate, update_.m)(update_); }
+
+  int rows() const { return update_.m; }  ///< m of Solve
+  double* dx() { return update_.dx; }
+  /// y = L^-1 r and D^-1.
+  std::span<const double> y() const { return {update_.y, static_cast<std::size_t>(update_.m)}; }
+  std::span<const double> inverse_d() const {
+    return {update_.inverse_d, static_cast<std::size_t>(update_.m)};
+  }
+  /// K, if it was wanted.
+  double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
+  /// Columns of P H' before Solve, of W after it: n x their number.
+  void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const;
+  double w(int i, int j) const { return update_.At(update_.w, i, j); }
+  /// L sqrt(D) in the lower triangle of an m x m matrix: S = L D L' = l l'.
+  void CopyFactor(Eigen::Ref<Eigen::MatrixXd> l) const;
+
+ private:
+  void Allocate();
+
+  const Kernels* kernels_ = nullptr;
+  Update update_{};
+  double* gain_ = nullptr;
+  AlignedNumbers memory_;
+};
+
+}  // namespace alidade::internal

@@ -6,11 +6,12 @@
 namespace alidade::internal {
 namespace {
 
-/// Adds a role: a block's place, with a Jacobian or without.
-void AddRole(SensorPlace& place, const Block& block, bool jacobian, bool considered) {
+/// Adds a role: a block's place, in H unless it is known.
+void AddRole(SensorPlace& place, const Block& block, bool known, bool considered) {
   place.values.push_back(block.value_offset);
+  place.known.push_back(known ? 1 : 0);
   place.columns.push_back(-1);
-  if (!jacobian || block.tangent_offset < 0) return;
+  if (known || block.tangent_offset < 0) return;
   const int size = block.geometry().tangent;
   place.columns.back() = place.width;
   place.parts.push_back({block.tangent_offset, size, place.width});
@@ -28,7 +29,7 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   for (const RoleBinding& role : sensor.roles) {
     place.elsewhere |= role.block >= 0 && role.jacobian_at == JacobianAt::kMeasurement;
     const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
-    AddRole(place, block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
+    AddRole(place, block, role.mode == RoleMode::kKnown, role.mode == RoleMode::kConsider);
   }
   place.strides.assign(sensor.roles.size(), place.width);
   return place;
@@ -41,6 +42,8 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
     const Block& block = layout[id];
     const int size = block.geometry().tangent, offset = block.tangent_offset;
     place.values.push_back(block.value_offset);
+    place.sizes.push_back(block.geometry().ambient);
+    place.constant.push_back(block.status == BlockStatus::kConstant ? 1 : 0);
     for (int k = 0; k < size; ++k) {
       place.at.push_back(offset < 0 ? -1 : offset + k);
       if (offset >= 0) place.rows.push_back(offset + k);
@@ -54,8 +57,9 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
 void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
                               const std::vector<BlockId>& blocks) {
   values.resize(first);
+  known.resize(first);
   columns.resize(first);
-  for (const BlockId id : blocks) AddRole(*this, layout[id], true, false);
+  for (const BlockId id : blocks) AddRole(*this, layout[id], false, false);
   strides.assign(values.size(), width);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "alidade/estimation/frame.h"
@@ -9,10 +10,14 @@
 
 namespace alidade::internal {
 
+/// The values that fill the roles of a sensor.
+using Roles = std::array<const double*, kMaxRoles>;
+
 /// How a sensor touches the state, by places in x and P. The roles of a landmark, which come last,
 /// have theirs where a measurement names it.
 struct SensorPlace {
   std::vector<int> values;          ///< by role: of its value in x; -1: it has none
+  std::vector<char> known;          ///< by role: at its value in the filter, wherever h is taken
   std::vector<int> columns;         ///< by role: in a row of H; -1: no Jacobian
   std::vector<int> strides;         ///< for the model: `width` for each role
   std::vector<JacobianPart> parts;  ///< of a row of H
@@ -31,10 +36,12 @@ struct SensorPlace {
 
 /// How a motion model moves the state, by places in x and P.
 struct MotionPlace {
-  std::vector<int> values;  ///< by block: in x
-  std::vector<int> at;      ///< in P, of each row of F; -1: not in P
-  std::vector<int> rows;    ///< those that are in P
-  bool holds = false;       ///< its noise is discrete
+  std::vector<int> values;     ///< by block: in x
+  std::vector<int> sizes;      ///< by block: of its value
+  std::vector<char> constant;  ///< by block
+  std::vector<int> at;         ///< in P, of each row of F; -1: not in P
+  std::vector<int> rows;       ///< those that are in P
+  bool holds = false;          ///< its noise is discrete
 };
 
 /// A system on its layout: which stream each sensor reads, and where its blocks and those of the

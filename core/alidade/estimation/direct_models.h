@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -186,6 +187,12 @@ class DirectMotion final : public MotionModel {
     return detail::Guarded(this, [&] {
       Status status = Status::kOk;
       if (out.next != nullptr) {
+        if constexpr (!detail::Blocks<Model>::kStatic) {  // of a size that the author might miss
+          for (std::size_t k = 0; k < this->blocks().size(); ++k) {
+            std::fill_n(out.next[k], this->blocks()[k].geometry.ambient,
+                        std::numeric_limits<double>::quiet_NaN());
+          }
+        }
         status = alidade::Step(model_, blocks, input, w, dt_s, out.next,
                                MatrixRef{out.f, tangent_size()}, MatrixRef{out.g, noise_size()});
       }

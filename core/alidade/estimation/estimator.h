@@ -75,6 +75,7 @@ class MeasurementReports {
   std::span<const MeasurementReport> entries() const { return entries_; }
   std::span<MeasurementReport> entries() { return entries_; }
   MeasurementReport& Add() { return entries_.emplace_back(); }
+  void Reserve(std::size_t count) { entries_.reserve(count); }
   /// Memory for `count` numbers, of any value.
   double* Allocate(std::size_t count) { return numbers_.Take(count); }
   /// A copy of the values in that memory.
@@ -108,6 +109,8 @@ class UpdateReport {
   std::span<MeasurementReport> measurements() { return measurements_.entries(); }
   /// One more; references to the others end.
   MeasurementReport& Add() { return measurements_.Add(); }
+  /// Memory for that many: references stay as long as there are no more.
+  void Reserve(std::size_t count) { measurements_.Reserve(count); }
   /// Memory for `count` numbers of the entries, of any value.
   double* Allocate(std::size_t count) { return measurements_.Allocate(count); }
   /// A copy of the values in that memory.

@@ -29,8 +29,8 @@ bool IsAwaited(const FilterState& f, const Row& row) {
 }  // namespace
 
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
-                 const Measurement& measurement, const double* prior,
-                 std::vector<const double*>& roles, Inverse& inverse) {
+                 const Measurement& measurement, const double* prior, Roles& roles,
+                 Inverse& inverse) {
   const SensorModel& model = *sensor.model;
   const auto first = static_cast<std::size_t>(model.inverse().role);
   const auto count = static_cast<std::size_t>(model.inverse().count);
@@ -43,18 +43,17 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   for (const Space& role : model.roles()) most += role.geometry.tangent;
   std::fill_n(roles.begin() + model.inverse().role, count, nullptr);
   inverse.from.clear();
-  inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most),
-                         kNotWritten);
-  inverse.of_role.assign(roles.size(), nullptr);
-  for (std::size_t i = 0; i < roles.size(); ++i) {
+  inverse.by_role.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most));
+  inverse.of_role.assign(place.values.size(), nullptr);
+  for (std::size_t i = 0; i < place.values.size(); ++i) {
     if (roles[i] == nullptr || place.columns[i] < 0) continue;
     inverse.from.push_back(sensor.roles[i].block);
     inverse.of_role[i] = inverse.by_role.data() + rows * columns;
     columns += model.roles()[i].geometry.tangent;
   }
-  inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
-  inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
-  inverse.by_prior.setConstant(rows, model.inverse().prior_size, kNotWritten);
+  inverse.y.resize(static_cast<std::size_t>(size));
+  inverse.by_z.resize(rows, model.measurement().geometry.tangent);
+  inverse.by_prior.resize(rows, model.inverse().prior_size);
   const Status status =
       model.Initialise(roles.data(), {measurement.values.data(), measurement.known.data()}, prior,
                        {.y = inverse.y.data(),
@@ -64,7 +63,7 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   if (status != Status::kOk) return OutcomeOf(status);
   inverse.by_x.resize(rows, columns);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < roles.size(); ++i) {
+  for (std::size_t i = 0; i < place.values.size(); ++i) {
     if (inverse.of_role[i] == nullptr) continue;
     const int width = model.roles()[i].geometry.tangent;
     inverse.by_x.middleCols(column, width) =

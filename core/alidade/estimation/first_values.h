@@ -25,8 +25,8 @@ struct Inverse {
 /// y and its Jacobians. Of `roles` those that the sensor initialises are y afterwards. `prior` may
 /// be null where the model needs none.
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
-                 const Measurement& measurement, const double* prior,
-                 std::vector<const double*>& roles, Inverse& inverse);
+                 const Measurement& measurement, const double* prior, Roles& roles,
+                 Inverse& inverse);
 
 /// Whether all blocks that a row's sensor is bound to have a value.
 bool IsReady(const FilterState& f, const Row& row);

@@ -33,7 +33,7 @@ void FrameLoop::Process(const Frame& frame) {
 }
 
 /// What a frame goes through.
-void FrameLoop::Run(const Frame& frame) {
+[[gnu::flatten]] void FrameLoop::Run(const Frame& frame) {
   if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
@@ -85,7 +85,7 @@ void FrameLoop::StepTo(Timestamp timestamp) {
       f.motions.CountStep();
       f.timestamp = piece.EndOf(i);
     }
-    if (trouble) return End(f, trouble.kind, trouble.text);
+    if (trouble) return End(f, trouble.kind(), trouble.text());
   }
 }
 

@@ -41,28 +41,31 @@ Outcome Gate::Test(FilterState& f, Row& row, double nis) {
     if (outcome != Outcome::kAccepted) return outcome;
   }
   CheckConditioning(f, row);
-  row.report->nis = nis;
+  row.report->nis = std::isnan(nis) ? 0.0 : nis;
   if (std::isnan(nis)) {
-    row.report->nis = 0.0;
     Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
     return Outcome::kNotPd;
   }
   if (!(nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
-  row.weight = Weight(row.binding->loss, std::sqrt(nis));
+  const RobustLoss& loss = row.binding->loss;
+  row.weight = loss.kind == LossKind::kNone ? 1.0 : Weight(loss, std::sqrt(nis));
   if (row.weight == 1.0) return Outcome::kAccepted;
   const double widest = *std::ranges::max_element(row.R) / row.weight;
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
-/// kNotFinite where a number of the row is not finite, else kAccepted.
+/// kNotFinite if a number of the row is not finite, else kAccepted.
 Outcome Gate::Defect(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
-  if (AllFinite(entry.s) && AllFinite(row.H) && AllFinite(entry.innovation)) {
-    return Outcome::kAccepted;
-  }
+  const char* const what = !AllFinite(entry.h)            ? "h"
+                           : !AllFinite(row.H)            ? "H"
+                           : !AllFinite(row.R)            ? "R"
+                           : !AllFinite(entry.innovation) ? "the innovation"
+                           : !AllFinite(entry.s)          ? "S = H P H' + R"
+                                                          : nullptr;
+  if (what == nullptr) return Outcome::kAccepted;
   entry.s = {};
-  Note(f, "not_finite",
-       "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
+  Note(f, "not_finite", "sensor '" + row.binding->name + "': " + what + " is not finite");
   return Outcome::kNotFinite;
 }
 
@@ -86,21 +89,16 @@ bool Gate::CountRejection(const MeasurementReport& entry) {
 
 /// Warns once for each sensor whose noise vanishes compared with H P H'.
 void Gate::CheckConditioning(FilterState& f, const Row& row) {
+  const auto m = static_cast<std::size_t>(row.place->dof);
+  std::size_t i = 0;  // on the diagonals of R and S
+  while (i < m * m && row.R[i] > 1e-13 * row.s[i] && row.R[i] > 0.0) i += m + 1;
+  if (i >= m * m) return;
   const auto sensor = static_cast<std::size_t>(row.sensor);
   if (warned_[sensor]) return;
-  const auto m = static_cast<std::size_t>(row.report->dof);
-  double noise = 0.0, total = 0.0;
-  bool tiny = false;
-  for (std::size_t i = 0; i < m && !tiny; ++i) {
-    noise = row.R[i * m + i];
-    total = row.report->s[i * m + i];
-    tiny = !(noise > 1e-13 * total) || noise <= 0.0;
-  }
-  if (!tiny) return;
   warned_[sensor] = true;
   Note(f, "conditioning",
-       "sensor '" + row.binding->name + "': noise variance " + RoundedText(noise, 3) +
-           " vanishes compared with H P H' = " + RoundedText(total - noise, 3) +
+       "sensor '" + row.binding->name + "': noise variance " + RoundedText(row.R[i], 3) +
+           " vanishes compared with H P H' = " + RoundedText(row.s[i] - row.R[i], 3) +
            "; S is badly conditioned");
 }
 

@@ -10,7 +10,7 @@
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
-Trouble Linear::Step(FilterState& f, double dt_s) {
+[[gnu::flatten]] Trouble Linear::Step(FilterState& f, double dt_s) {
   if (Trouble trouble = f.motions.Evaluate(f.state, dt_s)) return trouble;
   if (f.motions.Apply(f.state)) return {};
   return {"not_finite", "the covariance steps to what is not finite"};
@@ -20,14 +20,13 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
   f.update.Begin(f.state.covariance(), capacity);
 }
 
-Outcome Linear::Predict(FilterState& f, Row& row) {
+[[gnu::flatten]] Outcome Linear::Predict(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
   RolesAt(f, row, f.state.values());
   const bool elsewhere =
       (row.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, row);
-  Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
+  Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(f, row, row.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h = {};
-  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
   if (outcome != Outcome::kAccepted) {
     NoteRefusal(f, row, outcome);
     return outcome;
@@ -41,10 +40,10 @@ Outcome Linear::Predict(FilterState& f, Row& row) {
 /// measurement implies for the role that asks for it. Whether that is elsewhere than h.
 bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
   const std::vector<RoleBinding>& bound = row.binding->roles;
-  at_.assign(row.roles.begin(), row.roles.end());
+  at_ = row.roles;
   implied_.clear();
   bool elsewhere = false;
-  for (std::size_t i = 0; i < std::min(at_.size(), bound.size()); ++i) {
+  for (std::size_t i = 0; i < bound.size(); ++i) {
     const BlockId block = bound[i].block;
     if (block < 0 || at_[i] == nullptr) continue;
     const auto index = static_cast<std::size_t>(block);
@@ -62,7 +61,7 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
 /// h at row.roles, H at at_.
 Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
-  row.report->h = {row.h, static_cast<std::size_t>(model.measurement().geometry.ambient)};
+  row.report->h = {row.h, static_cast<std::size_t>(row.place->ambient)};
   Outcome outcome = PredictAt(f, row, f.state.values(), row.h);
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
@@ -72,17 +71,21 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  outcome = EvaluateAt(model, *row.place, *row.measurement, at_.data(), h_there_, &row.H);
+  const SensorPlace& place = *row.place;
+  h_there_.resize(static_cast<std::size_t>(place.ambient));
+  AllocateJacobian(f, row);
+  outcome = EvaluateAt(model, place, *row.measurement, at_.data(), {h_there_.data(), row.H.data()});
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
   if (outcome != Outcome::kAccepted) return outcome;
-  for (std::size_t i = 0; i < at_.size(); ++i) {
+  for (std::size_t i = 0; i < place.values.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (row.place->columns[i] < 0 || at_[i] == row.roles[i] ||
+    if (place.columns[i] < 0 || at_[i] == row.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
     std::array<double, 4> j;  // a unit vector's tangent has two elements
     geometry.Transport(row.roles[i], at_[i], j.data());
-    ChainJacobian(row, row.place->columns[i], geometry.tangent, j.data(), f.work);
+    ChainJacobian(row, place.columns[i], geometry.tangent, j.data(), f.work);
   }
   return outcome;
 }
@@ -167,7 +170,8 @@ bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
                           f.work);
 }
 
-Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const double* correction) {
+[[gnu::flatten]] Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows,
+                                           const double* correction) {
   const Workspace::Use use(f.work);
   KalmanUpdate& update = f.update;
   Stack(f, rows);

@@ -38,9 +38,9 @@ class Linear : public Method {
   bool Joseph(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix* considered);
 
   // Memory that is kept from row to row.
-  Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken
-  Scratch<std::vector<double>> implied_;    ///< of the role that is linearised at what z implies
-  Scratch<std::vector<double>> h_there_;    ///< h where H is taken
+  Roles at_{};                            ///< where H is taken
+  Scratch<std::vector<double>> implied_;  ///< of the role that is linearised at what z implies
+  Scratch<std::vector<double>> h_there_;  ///< h where H is taken
   Scratch<std::vector<MeasurementRows>> stacked_;  ///< the rows of the update
   Scratch<std::vector<int>> considered_;           ///< rows of P whose gain is not the optimal one
 };

@@ -10,29 +10,23 @@
 namespace alidade::internal {
 namespace {
 
-bool AreFinite(const double* values, Eigen::Index size) {
-  return AllFinite({values, static_cast<std::size_t>(size)});
-}
-
-/// The values of the model's blocks in x.
-std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
-  std::array<const double*, kMaxRoles> blocks;
-  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
-  return blocks;
-}
-
-/// gl = G L, n x w, and the lower triangle of q = G L L' G', n x n, for G n x w and L w x w.
+/// gl = G L, n x w, and the lower triangle of q = G L L' G', n x n, for G n x w and L w x w. W: w,
+/// if the compiler is to know it.
+template <int W>
 void SpreadNoise(const double* g, const double* l, int n, int w, double* gl, double* q) {
-  for (int i = 0; i < n; ++i) {
+  if (W > 0) w = W;
+  for (int i = 0; i < n; ++i, g += w, q += n) {
+    double* const own = gl + i * w;
     for (int c = 0; c < w; ++c) {
       double sum = 0.0;
-      for (int k = 0; k < w; ++k) sum += g[i * w + k] * l[k * w + c];
-      gl[i * w + c] = sum;
+      for (int k = 0; k < w; ++k) sum += g[k] * l[k * w + c];
+      own[c] = sum;
     }
-    for (int j = 0; j <= i; ++j) {
+    const double* other = gl;
+    for (int j = 0; j <= i; ++j, other += w) {
       double sum = 0.0;
-      for (int c = 0; c < w; ++c) sum += gl[i * w + c] * gl[j * w + c];
-      q[i * n + j] = sum;
+      for (int c = 0; c < w; ++c) sum += own[c] * other[c];
+      q[j] = sum;
     }
   }
 }
@@ -40,34 +34,26 @@ void SpreadNoise(const double* g, const double* l, int n, int w, double* gl, dou
 }  // namespace
 
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
+               const double* u, const double* w, double dt_s, const StepOutput& to) {
   const MotionModel& model = *motion.model;
-  const Eigen::Index n = model.tangent_size();
-  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
-                     of_g = g == nullptr ? 0 : n * model.noise_size();
-  std::array<double*, kMaxRoles> to;
-  for (std::size_t k = 0; k < place.values.size(); ++k) {
-    to[k] = next + place.values[k];
-    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
+  const std::size_t n = place.at.size(), blocks = place.values.size();
+  const auto n_w = static_cast<std::size_t>(model.noise_size());
+  const std::span<double> f(to.f, to.f == nullptr ? 0 : n * n),
+      g(to.g, to.g == nullptr ? 0 : n * n_w), l(to.l, to.l == nullptr ? 0 : n_w * n_w);
+  std::array<const double*, kMaxRoles> from;
+  std::array<double*, kMaxRoles> next;
+  for (std::size_t k = 0; k < blocks; ++k) {
+    from[k] = x + place.values[k];
+    next[k] = to.next + place.values[k];
   }
-  std::fill_n(f, of_f, kNotWritten);
-  std::fill_n(g, of_g, kNotWritten);
-  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, {to.data(), f, g});
+  double* const* const x_next = to.next == nullptr ? nullptr : next.data();
+  const Status status = model.Step(from.data(), u, w, dt_s, {x_next, to.f, to.g, to.l});
   if (status != Status::kOk) return OutcomeOf(status);
-  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
-  for (std::size_t k = 0; k < place.values.size(); ++k) {
-    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
+  double defect = ZeroIfFinite(f) + ZeroIfFinite(g) + ZeroIfFinite(l);
+  for (std::size_t k = 0; k < blocks && to.next != nullptr; ++k) {
+    defect += ZeroIfFinite({next[k], static_cast<std::size_t>(place.sizes[k])});
   }
-  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
-}
-
-Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-                const double* u, double dt_s, double* l) {
-  const Eigen::Index size = Eigen::Index{motion.model->noise_size()} * motion.model->noise_size();
-  std::fill_n(l, size, kNotWritten);
-  const Status status = motion.model->SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
-  if (status != Status::kOk) return OutcomeOf(status);
-  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
+  return defect == 0.0 ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
 Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
@@ -81,15 +67,14 @@ Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
           who + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
 }
 
-void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+void TakeStep(const MotionBinding& motion, const MotionPlace& place, const double* next,
               double* x) {
-  for (const BlockId id : motion.blocks) {
-    const Block& block = layout[id];
-    if (block.status == BlockStatus::kConstant) continue;
-    const Geometry& geometry = block.geometry();
-    double* const value = x + block.value_offset;
-    std::copy_n(next + block.value_offset, geometry.ambient, value);
-    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
+  for (std::size_t k = 0, count = place.values.size(); k < count; ++k) {
+    if (place.constant[k] != 0) continue;
+    const int at = place.values[k];
+    for (int i = at; i < at + place.sizes[k]; ++i) x[i] = next[i];
+    const Geometry& geometry = motion.model->blocks()[k].geometry;
+    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(x + at);
   }
 }
 
@@ -97,7 +82,7 @@ Motions::Motions(const Binding& binding)
     : binding_(&binding),
       steps_(binding.system.motions.size()),
       next_(binding.initial.values().size()) {
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     const MotionModel& model = *binding.system.motions[i].model;
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
@@ -114,7 +99,7 @@ Motions::Motions(const Binding& binding)
 void Motions::Activate(const StateLayout& layout) {
   holds_ = false;
   active_ = 0;
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     const MotionBinding& motion = binding_->system.motions[i];
     steps_[i].active =
         !motion.model->stationary() &&
@@ -125,7 +110,7 @@ void Motions::Activate(const StateLayout& layout) {
 }
 
 Trouble Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     if (!steps_[i].active) continue;
     if (Trouble trouble = EvaluateOne(i, state, dt_s, derivatives)) return trouble;
   }
@@ -137,16 +122,19 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   const MotionPlace& place = binding_->motion_places[i];
   Step& step = steps_[i];
   const bool goes_on = place.holds && in_interval();
-  const double* const x = state.values().data();
-  Outcome outcome =
-      StepAt(motion, place, x, step.u.data(), nullptr, dt_s, next_.data(),
-             derivatives ? step.f.data() : nullptr, derivatives ? step.g.data() : nullptr);
-  if (outcome == Outcome::kAccepted && !goes_on) {
-    outcome = SqrtQAt(motion, place, x, step.u.data(), dt_s, step.l.data());
+  StepOutput to{next_.data()};
+  if (derivatives) {
+    to.f = step.f.data();
+    to.g = step.g.data();
   }
+  if (!goes_on) to.l = step.l.data();
+  const Outcome outcome =
+      StepAt(motion, place, state.values().data(), step.u.data(), nullptr, dt_s, to);
   if (outcome != Outcome::kAccepted || !derivatives) return TroubleOf(motion, outcome);
-  SpreadNoise(step.g.data(), step.l.data(), motion.model->tangent_size(),
-              motion.model->noise_size(), step.gl.data(), step.q.data());
+  const int w = motion.model->noise_size();
+  (w == 1 ? SpreadNoise<1> : SpreadNoise<0>)(step.g.data(), step.l.data(),
+                                             motion.model->tangent_size(), w, step.gl.data(),
+                                             step.q.data());
   if (goes_on) {
     CarryHeld(*motion.model, place, step);
   } else if (place.holds) {
@@ -186,9 +174,10 @@ bool Motions::Apply(State& state) {
       return false;
     }
   }
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     if (!steps_[i].active) continue;
-    TakeStep(binding_->system.motions[i], state.layout(), next_.data(), state.values().data());
+    TakeStep(binding_->system.motions[i], binding_->motion_places[i], next_.data(),
+             state.values().data());
   }
   return true;
 }
@@ -211,7 +200,7 @@ bool Motions::IsBounded(const Covariance& covariance) const {
 bool Motions::Propagate(Covariance& p) {
   const Workspace::Use use(memory_);
   bool finite = true;
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
     if (!step.active || place.rows.empty()) continue;
@@ -235,7 +224,7 @@ bool Motions::Propagate(Covariance& p) {
 
 int Motions::noise_size() const {
   int size = 0;
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     if (steps_[i].active) size += binding_->system.motions[i].model->noise_size();
   }
   return size;
@@ -244,7 +233,7 @@ int Motions::noise_size() const {
 Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   Workspace::Matrix transition = work.Take(n, n);
   transition.setIdentity();
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     if (!steps_[i].active) continue;
     const double* f = steps_[i].f.data();
     for (const int row : binding_->motion_places[i].at) {
@@ -262,7 +251,7 @@ Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Worksp
   Workspace::Matrix input = work.Take(n, noise_size());
   input.setZero();
   Eigen::Index columns = 0;
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
+  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
     if (!step.active) continue;

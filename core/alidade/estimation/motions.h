@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "alidade/estimation/binding.h"
@@ -13,25 +15,38 @@ namespace alidade::internal {
 // A motion model at any values x of the whole state: that of a filter, a sigma point, a point of a
 // batch. What it does not write is not a number. n_w: noise inputs.
 
-/// Why a step cannot be done; empty where it can.
-struct Trouble {
-  const char* kind = nullptr;  ///< of the event
-  std::string text;
-  explicit operator bool() const { return kind != nullptr; }
+/// Why a step cannot be done; empty: it can. As small as a pointer, for every step returns one.
+class Trouble {
+ public:
+  Trouble() = default;
+  Trouble(const char* kind, std::string text)
+      : detail_(std::make_unique<const Detail>(kind, std::move(text))) {}
+  explicit operator bool() const { return detail_ != nullptr; }
+  const char* kind() const { return detail_->kind; }  ///< of the event
+  const std::string& text() const { return detail_->text; }
+
+ private:
+  struct Detail {
+    const char* kind;
+    std::string text;
+  };
+  std::unique_ptr<const Detail> detail_;
 };
 
-/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state, at the places of its
-/// blocks in `next`, and unless null its F (n x n) and G (n x n_w), row-major. w may be null: zero.
+/// Destinations of a step, row-major; null: not wanted.
+struct StepOutput {
+  double* next = nullptr;  ///< x', at the places of the model's blocks
+  double* f = nullptr;     ///< F, n x n; G has to be wanted too
+  double* g = nullptr;     ///< G, n x n_w
+  double* l = nullptr;     ///< L of Qw = L L', n_w x n_w
+};
+/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state. w may be null: zero.
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-               const double* u, const double* w, double dt_s, double* next, double* f, double* g);
-/// L of its Qw = L L' there, n_w x n_w, row-major.
-Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-                const double* u, double dt_s, double* l);
-/// What one of these that is not kAccepted means.
+               const double* u, const double* w, double dt_s, const StepOutput& to);
+/// What an outcome of it that is not kAccepted means.
 Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
 /// x <- x' of its blocks that are not constant, brought back to their manifolds.
-void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
-              double* x);
+void TakeStep(const MotionBinding& motion, const MotionPlace& place, const double* next, double* x);
 
 /// What the motion models of a system make of the state over one step: x', F and G Lq.
 /// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,

@@ -122,8 +122,7 @@ bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
       next.push_back(t.values[static_cast<std::size_t>(id)]);
     }
     for (auto& value : next) y.push_back(value.data());
-    RowMajor f = RowMajor::Constant(n, n, internal::kNotWritten);
-    RowMajor g(n, std::max(1, motion.model->noise_size()));
+    RowMajor f(n, n), g(n, std::max(1, motion.model->noise_size()));
     const std::vector<double> u = GenericInput(*motion.model, random);
     if (motion.model->Step(x.data(), u.data(), nullptr, dt_s, {y.data(), f.data(), g.data()}) !=
             Status::kOk ||
@@ -183,9 +182,7 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
   for (const RoleBinding& role : sensor.roles) {
     roles.push_back(role.block < 0 ? nullptr
                                    : t.values[static_cast<std::size_t>(role.block)].data());
-    j.push_back(
-        RowMajor::Constant(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent,
-                           internal::kNotWritten));
+    j.emplace_back(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent);
   }
   std::vector<double*> data;
   std::vector<int> strides;

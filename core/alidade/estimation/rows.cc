@@ -22,13 +22,12 @@ void ForEachPlace(std::span<Row* const> rows, const Take& take) {
   }
 }
 
-/// Makes room for `count` numbers.
-void Fit(std::vector<double>& numbers, int count) {
-  if (std::ssize(numbers) != count) numbers.resize(static_cast<std::size_t>(count));
-}
-
 /// R = L L', m x m, row-major.
 void Square(const double* l, int m, double* r) {
+  if (m == 1) {
+    r[0] = l[0] * l[0];
+    return;
+  }
   for (int i = 0; i < m; ++i) {
     for (int j = 0; j <= i; ++j) {
       double sum = 0.0;
@@ -44,15 +43,14 @@ void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& rep
                    std::optional<Outcome> refused) {
   count_ = 0;
   report.ClearMeasurements();
-  for (std::size_t sensor = 0; sensor < binding.sensor_places.size(); ++sensor) {
+  report.Reserve(frame.measurements.size() * binding.sensor_places.size());  // rows point to them
+  for (std::size_t sensor = 0, sensors = binding.sensor_places.size(); sensor < sensors; ++sensor) {
     for (const Measurement& m : frame.measurements) {
       if (m.stream != binding.stream_of_sensor[sensor]) continue;
       const Row& row = Add(m, static_cast<int>(sensor), binding, report);
       row.report->outcome = refused ? *refused : Check(row);
     }
   }
-  // An entry moves where one is added.
-  for (std::size_t i = 0; i < count_; ++i) rows_[i].report = &report.measurements()[i];
 }
 
 Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
@@ -67,10 +65,11 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   const auto index = static_cast<std::size_t>(sensor);
   const SensorBinding& bound = binding.system.sensors[index];
   const SensorPlace& place = binding.sensor_places[index];
-  ALIDADE_EXPECTS(std::ssize(measurement.values) == place.ambient);
+  const auto ambient = static_cast<std::size_t>(place.ambient),
+             m = static_cast<std::size_t>(place.dof);
+  ALIDADE_EXPECTS(measurement.values.size() == ambient);
   ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model->known_size());
-  ALIDADE_EXPECTS(measurement.covariance.empty() ||
-                  std::ssize(measurement.covariance) == place.dof * place.dof);
+  ALIDADE_EXPECTS(measurement.covariance.empty() || measurement.covariance.size() == m * m);
   if (count_ == rows_.size()) rows_.emplace_back();
   Row& row = rows_[count_++];
   row.measurement = &measurement;
@@ -78,12 +77,13 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   row.binding = &bound;
   row.model = bound.model.get();
   row.place = &place;
-  const auto ambient = static_cast<std::size_t>(place.ambient),
-             m = static_cast<std::size_t>(place.dof);
-  row.z = report.Allocate(2 * ambient + m + m * m);
+  row.z = report.Allocate(2 * ambient + m + 3 * m * m);
   row.h = row.z + ambient;
   row.innovation = row.h + ambient;
   row.s = row.innovation + m;
+  row.R = {row.s + m * m, m * m};
+  row.root = row.s + 2 * m * m;
+  row.H = {};
   for (std::size_t i = 0; i < ambient; ++i) row.z[i] = measurement.values[i];
   MeasurementReport& entry = report.Add();
   entry.sensor = sensor;
@@ -97,97 +97,91 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
 /// The outcome of a measurement by itself: kAccepted, or why it is of no use.
 Outcome Rows::Check(const Row& row) {
   const Measurement& m = *row.measurement;
-  if (!AllFinite(m.values) || !AllFinite(m.known)) return Outcome::kNotFinite;
-  if (!m.covariance.empty()) {
-    const Outcome outcome = CheckCovariance(row);
-    if (outcome != Outcome::kAccepted) return outcome;
+  if (!AllFinite(m.values) || !AllFinite(m.known) || !AllFinite(m.covariance)) {
+    return Outcome::kNotFinite;
+  }
+  if (!m.covariance.empty() && !IsCovariance(m.covariance, row.place->dof)) {
+    return Outcome::kInvalid;
   }
   return OutcomeOf(row.model->Valid({m.values.data(), m.known.data()}));
 }
 
-Outcome Rows::CheckCovariance(const Row& row) {
+bool Rows::IsCovariance(const std::vector<double>& covariance, int size) {
   constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
-  const std::vector<double>& covariance = row.measurement->covariance;
-  if (!AllFinite(covariance)) return Outcome::kNotFinite;
-  const int size = row.report->dof;
   const Eigen::Map<const Eigen::MatrixXd> r(covariance.data(), size, size);
-  const bool valid =
-      r.isApprox(r.transpose(), kSymmetric) && SquareRootOf(r, ldlt_, root_) >= -kRounding;
-  return valid ? Outcome::kAccepted : Outcome::kInvalid;
+  return r.isApprox(r.transpose(), kSymmetric) && SquareRootOf(r, ldlt_, root_) >= -kRounding;
 }
 
-void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
-             const std::vector<double>& known_roles, std::vector<const double*>& roles) {
-  if (roles.size() != place.values.size()) roles.resize(place.values.size());
-  for (std::size_t i = 0; i < roles.size(); ++i) {
+void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles) {
+  for (std::size_t i = 0, count = place.values.size(); i < count; ++i) {
     const int at = place.values[i];
-    const bool knows = i < sensor.roles.size() && sensor.roles[i].mode == RoleMode::kKnown;
-    roles[i] = at < 0 ? nullptr : (knows ? known_roles : x).data() + at;
+    roles[i] = at < 0 ? nullptr : (place.known[i] != 0 ? known_roles : x) + at;
   }
-}
-
-Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
-                   const Measurement& measurement, const double* const* roles, double* h,
-                   double* jacobian) {
-  const double* const known = measurement.known.data();
-  for (int i = 0; i < place.ambient; ++i) h[i] = kNotWritten;
-  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h, known));
-  for (int i = 0; i < place.dof * place.width; ++i) jacobian[i] = kNotWritten;
-  std::array<double*, kMaxRoles> columns;
-  for (std::size_t i = 0; i < place.columns.size(); ++i) {
-    columns[i] = place.columns[i] < 0 ? nullptr : jacobian + place.columns[i];
-  }
-  return OutcomeOf(model.Linearise(roles, h, columns.data(), place.strides.data(), known));
 }
 
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
-                   std::vector<double>& h, std::vector<double>* jacobian) {
-  Fit(h, place.ambient);
-  if (jacobian != nullptr) Fit(*jacobian, place.dof * place.width);
-  return EvaluateAt(model, place, measurement, roles, h.data(),
-                    jacobian == nullptr ? nullptr : jacobian->data());
+                   const EvaluationOutput& to) {
+  std::array<double*, kMaxRoles> jacobians;
+  SensorModel::Output output{to.h, nullptr, nullptr, to.l};
+  if (to.jacobian != nullptr) {
+    for (std::size_t i = 0, count = place.columns.size(); i < count; ++i) {
+      jacobians[i] = place.columns[i] < 0 ? nullptr : to.jacobian + place.columns[i];
+    }
+    output.jacobians = jacobians.data();
+    output.strides = place.strides.data();
+  }
+  return OutcomeOf(
+      model.Evaluate({measurement.values.data(), measurement.known.data()}, roles, output));
 }
 
-Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
-                const double* const* roles, std::vector<double>& l, std::vector<double>& r) {
+Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
+                const double* const* roles, double* l, double* r) {
   if (!measurement.covariance.empty()) {
-    r.assign(measurement.covariance.begin(), measurement.covariance.end());
+    std::ranges::copy(measurement.covariance, r);
     return Outcome::kAccepted;
   }
-  const int m = model.measurement().geometry.tangent;
-  Fit(r, m * m);
-  Fit(l, m * m);
-  for (double& number : l) number = kNotWritten;
-  const Outcome outcome = OutcomeOf(
-      model.SqrtNoise(roles, measurement.values.data(), l.data(), measurement.known.data()));
-  Square(l.data(), m, r.data());
+  const Outcome outcome = EvaluateAt(model, place, measurement, roles, {.l = l});
+  Square(l, place.dof, r);
   return outcome;
 }
 
 const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x) {
-  RolesAt(*row.binding, *row.place, x, f.state.values(), row.roles);
+  RolesAt(*row.place, x.data(), f.state.values().data(), row.roles);
   return row.roles.data();
 }
 
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h) {
-  std::fill_n(h, row.model->measurement().geometry.ambient, kNotWritten);
-  return OutcomeOf(row.model->Predict(RolesAt(f, row, x), h, row.measurement->known.data()));
+  return EvaluateAt(*row.model, *row.place, *row.measurement, RolesAt(f, row, x), {.h = h});
 }
 
-Outcome LineariseAt(Row& row, const double* const* roles) {
+void AllocateJacobian(FilterState& f, Row& row) {
+  if (!row.H.empty()) return;
+  const auto size = static_cast<std::size_t>(row.place->dof * row.place->width);
+  row.H = {f.report.Allocate(size), size};
+}
+
+Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
   const SensorPlace& place = *row.place;
-  Fit(row.H, place.dof * place.width);
+  const Measurement& measurement = *row.measurement;
+  AllocateJacobian(f, row);
   row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
-  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.h, row.H.data());
+  if (!measurement.covariance.empty()) {
+    std::ranges::copy(measurement.covariance, row.R.begin());
+    return EvaluateAt(*row.model, place, measurement, roles, {row.h, row.H.data()});
+  }
+  const Outcome outcome =
+      EvaluateAt(*row.model, place, measurement, roles, {row.h, row.H.data(), row.root});
+  Square(row.root, place.dof, row.R.data());
+  return outcome;
 }
 
 Outcome NoiseAt(Row& row, const double* const* roles) {
-  return NoiseAt(*row.model, *row.measurement, roles, row.l, row.R);
+  return NoiseAt(*row.model, *row.place, *row.measurement, roles, row.root, row.R.data());
 }
 
 void ComputeInnovation(Row& row) {
-  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.report->dof)};
+  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.place->dof)};
   row.model->measurement().geometry.Minus(row.z, row.h, row.innovation);
 }
 

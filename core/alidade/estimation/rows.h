@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,18 +24,18 @@ struct Row {
   const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
   const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
-  // Memory of the numbers of the report, one after the other.
+  // Numbers in the memory of the report; m x m, row-major.
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;
-  std::vector<double> H;             ///< H, m rows of the place's width
-  std::vector<double> R;             ///< R, m x m, row-major
-  std::vector<const double*> roles;  ///< what fills its roles, as RolesAt last had it
-  double weight = 1.0;               ///< w of the robust loss; R is divided by it
-  int column = 0;                    ///< its first one in the update, if it passes the gate
-  std::vector<double> l;             ///< memory: factor of R
+  std::span<double> R;     ///< R
+  std::span<double> H;     ///< H, m rows of the place's width; empty: not evaluated
+  double* root = nullptr;  ///< L of R = L L'
+  Roles roles{};           ///< as RolesAt last had them
+  double weight = 1.0;     ///< w of the robust loss; R is divided by it
+  int column = 0;          ///< its first one in the update, if it passes the gate
 
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
-  JacobianRows jacobian() const { return {H.data(), report->dof, place->rows}; }
+  JacobianRows jacobian() const { return {H.data(), place->dof, place->rows}; }
   MeasurementRows linearised() const { return {jacobian(), innovation, s, column}; }
 };
 
@@ -55,7 +56,7 @@ class Rows {
   Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
            UpdateReport& report);
   Outcome Check(const Row& row);
-  Outcome CheckCovariance(const Row& row);
+  bool IsCovariance(const std::vector<double>& covariance, int size);
 
   std::vector<Row> rows_;  ///< the first count_ are in use
   std::size_t count_ = 0;
@@ -69,21 +70,22 @@ class Rows {
 
 /// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
 /// Null: the role has no place.
-void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
-             const std::vector<double>& known_roles, std::vector<const double*>& roles);
+void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
 
-/// h of a measurement at the roles, ambient, and unless null H, m rows of the place's width.
-Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
-                   const Measurement& measurement, const double* const* roles, double* h,
-                   double* jacobian);
-/// The same, in memory that is made to fit.
+/// Destinations of an evaluation, row-major; null: not wanted.
+struct EvaluationOutput {
+  double* h = nullptr;         ///< ambient
+  double* jacobian = nullptr;  ///< H, m rows of the place's width; h has to be wanted too
+  double* l = nullptr;         ///< of R = L L', m x m
+};
+/// A sensor model at the roles.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
-                   std::vector<double>& h, std::vector<double>* jacobian);
+                   const EvaluationOutput& to);
 
-/// R at the roles, or as the measurement itself says, m x m. `l` is memory.
-Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
-                const double* const* roles, std::vector<double>& l, std::vector<double>& r);
+/// R at the roles, or as the measurement itself says, m x m, row-major. `l` is memory, m x m.
+Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
+                const double* const* roles, double* l, double* r);
 
 // The same of a row.
 
@@ -92,8 +94,10 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
 const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x);
 /// h at x, ambient, in `h`.
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h);
-/// h at the roles, in the report, and H, in the row.
-Outcome LineariseAt(Row& row, const double* const* roles);
+/// Memory for H, unless it has some.
+void AllocateJacobian(FilterState& f, Row& row);
+/// h at the roles, in the report; H and R, in the row.
+Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles);
 /// R at the roles, or as the measurement itself says, in the row.
 Outcome NoiseAt(Row& row, const double* const* roles);
 /// z (-) h of the h in the report, in the report.

@@ -81,10 +81,9 @@ class OffsetSensor final : public SensorModel {
     double* at = next;
     for (std::size_t b = 0; b < mover.model->blocks().size(); ++b) {
       to[b] = at;
-      at = std::fill_n(at, mover.model->blocks()[b].geometry.ambient, kNotWritten);
+      at += mover.model->blocks()[b].geometry.ambient;
     }
     const int n = mover.model->tangent_size();
-    if (f != nullptr) std::fill_n(f, n * n, kNotWritten);
     const Status status = mover.model->Step(
         x, nullptr, nullptr, dt_s, {to.data(), f, f == nullptr ? nullptr : memory.g.data()});
     int row = 0;
@@ -174,7 +173,7 @@ class OffsetSensor final : public SensorModel {
     std::size_t size = 0;
     for (const Space& role : sensor_->roles())
       size += static_cast<std::size_t>(m * role.geometry.tangent);
-    memory.jacobian.assign(std::max(memory.jacobian.size(), size), kNotWritten);
+    memory.jacobian.resize(std::max(memory.jacobian.size(), size));
     memory.jacobians.assign(place_.size(), nullptr);
     memory.strides.assign(place_.size(), 0);
     double* next = memory.jacobian.data();

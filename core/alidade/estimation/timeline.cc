@@ -27,20 +27,17 @@ std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
   return {};
 }
 
-/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to
-/// whole ns, and at least 1 ns.
-Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
+/// max_dt_s in whole nanoseconds, at least one.
+Timestamp LongestStep(double max_dt_s) {
   constexpr double kBeyond = 9.2e18;  // what a Timestamp cannot hold
   const double ns = std::round(1e9 * max_dt_s);
-  const Timestamp longest =
-      ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns)) : kForever;
-  return (elapsed - 1) / longest + 1;
+  return ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns)) : kForever;
 }
 
 }  // namespace
 
 Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams, double max_dt_s)
-    : max_dt_s_(max_dt_s) {
+    : max_dt_s_(max_dt_s), longest_(LongestStep(max_dt_s)) {
   if (system.initial_time_s) start_ = TimestampFromSeconds(*system.initial_time_s);
   for (std::size_t i = 0; i < system.motions.size(); ++i) {
     const MotionBinding& motion = system.motions[i];
@@ -71,7 +68,7 @@ Trouble Timeline::First(Timestamp from, Timestamp to, std::vector<Event>& events
   }
   Timestamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(piece.end, from, &elapsed);
-  piece.steps = overflow ? 0 : StepParts(elapsed, max_dt_s_);
+  piece.steps = overflow ? 0 : (elapsed <= longest_ ? 1 : (elapsed - 1) / longest_ + 1);
   if (overflow || piece.steps > kMostSteps) {
     return {"too_many_substeps", "a gap of " + RoundedText(Seconds(piece.end) - Seconds(from)) +
                                      " s would need more than " +

@@ -85,6 +85,7 @@ class Timeline {
   std::vector<Held> held_;  ///< of the models that take an input
   std::optional<Timestamp> start_;
   double max_dt_s_;
+  Timestamp longest_;         ///< max_dt_s, in whole ns and at least one
   Timestamp most_steps_ = 1;  ///< of a piece, as far as they were noted
 };
 

@@ -210,14 +210,15 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const Outcome outcome = StepAt(motion, f.binding->motion_places[i], from, step.u.data(),
-                                   w.data(), dt_s, next.data(), nullptr, nullptr);
+    const MotionPlace& place = f.binding->motion_places[i];
+    const Outcome outcome =
+        StepAt(motion, place, from, step.u.data(), w.data(), dt_s, {.next = next.data()});
     if (outcome == Outcome::kFailed) {
       failed_ = &motion;
       return outcome;
     }
     if (outcome != Outcome::kAccepted) return Outcome::kOutOfDomain;
-    TakeStep(motion, f.state.layout(), next.data(), to);
+    TakeStep(motion, place, next.data(), to);
     noise += inputs;
   }
   return Outcome::kAccepted;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "alidade/estimation/models.h"
 #include "alidade/plugin/model_instance.h"
@@ -26,6 +27,7 @@ class PluginSensor final : public SensorModel {
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* calls_;
   const void* self_;
+  std::vector<int> tangents_;  ///< of the roles
 };
 
 /// A motion model by the calls of plugin_abi.h. An exception of a call is an error of the model.
@@ -42,6 +44,7 @@ class PluginMotion final : public MotionModel {
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeMotion* calls_;
   const void* self_;
+  std::vector<int> sizes_;  ///< of the blocks, ambient
 };
 
 }  // namespace alidade

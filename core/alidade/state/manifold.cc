@@ -145,7 +145,7 @@ void Geometry::Plus(const double* x, const double* d, double* y) const {
   }
 }
 
-void Geometry::Minus(const double* y, const double* x, double* d) const {
+void Geometry::MinusCurved(const double* y, const double* x, double* d) const {
   switch (kind) {
     case GeometryKind::kVector:
       return Vec<kDynamic>::Minus(y, x, d, ambient);

@@ -52,7 +52,10 @@ struct Geometry {
   /// y = x (+) d; x and y may be the same. The result lies on the manifold to rounding.
   void Plus(const double* x, const double* d, double* y) const;
   /// d = y (-) x
-  void Minus(const double* y, const double* x, double* d) const;
+  void Minus(const double* y, const double* x, double* d) const {
+    if (kind != GeometryKind::kVector) return MinusCurved(y, x, d);
+    for (int i = 0; i < ambient; ++i) d[i] = y[i] - x[i];
+  }
   /// j (tangent x tangent, row-major): carries a tangent vector at `from` to the tangent space of
   /// `to` along the geodesic. The identity but for unit vectors, whose basis turns with the point.
   void Transport(const double* from, const double* to, double* j) const;
@@ -62,6 +65,9 @@ struct Geometry {
   void Identity(double* x) const;
 
   friend bool operator==(const Geometry&, const Geometry&) = default;
+
+ private:
+  void MinusCurved(const double* y, const double* x, double* d) const;
 };
 
 /// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the

@@ -415,7 +415,7 @@ class CondensedRun {
   mutable std::string problem_;
   struct Memory {
     std::vector<double> x, h, jacobian;
-    std::vector<const double*> roles;
+    internal::Roles roles;
     RowMajor j_r_h;
   };
   mutable Memory memory_;        ///< of Residual and what it calls

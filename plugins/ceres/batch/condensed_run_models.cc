@@ -67,11 +67,11 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const bool sensitivity = point.s.rows() > 0;
   RowMajor f(n, n), g(n, n_w);
   std::vector<double> next(point.x.size());
-  const Outcome outcome = internal::StepAt(motion, place, point.x.data(), step.u.data(), w.data(),
-                                           step.dt_s, next.data(), sensitivity ? f.data() : nullptr,
-                                           sensitivity ? g.data() : nullptr);
-  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
-  internal::TakeStep(motion, initial_.layout(), next.data(), point.x.data());
+  const Outcome outcome = internal::StepAt(
+      motion, place, point.x.data(), step.u.data(), w.data(), step.dt_s,
+      {next.data(), sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr});
+  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text());
+  internal::TakeStep(motion, place, next.data(), point.x.data());
   if (!sensitivity) return true;
 
   std::vector<int> own, rows;  // of F and of S: those of blocks that are not constant
@@ -102,8 +102,8 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
   RowMajor j_plus(measured.tangent, measured.tangent);
   PlusJacobian(measured, z, d.data(), j_plus.data());
   measured.Plus(z, d.data(), z);
-  std::vector<const double*> roles;
-  internal::RolesAt(sensor, place, point.x, point.x, roles);
+  internal::Roles roles;
+  internal::RolesAt(place, point.x.data(), point.x.data(), roles);
   internal::Inverse at;
   const Outcome outcome = internal::InvertAt(sensor, place, measurement, prior, roles, at);
   if (outcome != Outcome::kAccepted) {
@@ -155,15 +155,18 @@ const std::vector<double>& CondensedRun::Joined(const std::vector<double>& x,
 /// Until the next call.
 const double* const* CondensedRun::RolesOf(const Factor& factor,
                                            const std::vector<double>& x) const {
-  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, memory_.roles);
+  internal::RolesAt(PlaceOf(factor), x.data(), x.data(), memory_.roles);
   return memory_.roles.data();
 }
 
 /// h and, unless null, H in the columns of its place.
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
-  return internal::EvaluateAt(ModelOf(factor), PlaceOf(factor), factor.measurement,
-                              RolesOf(factor, x), h, jacobian);
+  const internal::SensorPlace& place = PlaceOf(factor);
+  h.resize(static_cast<std::size_t>(place.ambient));
+  if (jacobian != nullptr) jacobian->resize(static_cast<std::size_t>(place.dof * place.width));
+  return internal::EvaluateAt(ModelOf(factor), place, factor.measurement, RolesOf(factor, x),
+                              {h.data(), jacobian == nullptr ? nullptr : jacobian->data()});
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.
@@ -213,9 +216,9 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
   const MotionBinding& motion = binding_.system.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   RowMajor l(motion.model->noise_size(), motion.model->noise_size());
-  const Outcome outcome =
-      internal::SqrtQAt(motion, place, point.x.data(), step.u.data(), step.dt_s, l.data());
-  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
+  const Outcome outcome = internal::StepAt(motion, place, point.x.data(), step.u.data(), nullptr,
+                                           step.dt_s, {.l = l.data()});
+  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text());
   NoteChange(step.l, l);
   step.l = std::move(l);
   if (place.holds) held_l_[step.motion] = step.l;
@@ -224,11 +227,12 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
 
 bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
   const SensorModel& model = ModelOf(factor);
-  std::vector<double> root, r;
-  const Outcome outcome = internal::NoiseAt(model, factor.measurement, RolesOf(factor, x), root, r);
+  const int m = model.measurement().geometry.tangent;
+  std::vector<double> root(static_cast<std::size_t>(m * m)), r(root.size());
+  const Outcome outcome = internal::NoiseAt(model, PlaceOf(factor), factor.measurement,
+                                            RolesOf(factor, x), root.data(), r.data());
   const std::string noise = "the noise of " + TextOf(SensorOf(factor), factor.measurement);
   if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, model));
-  const int m = model.measurement().geometry.tangent;
   const Eigen::Map<const RowMajor> covariance(r.data(), m, m);
   if (!internal::AllFinite(r)) return Fail(noise + " is not finite");
   Eigen::MatrixXd l;

@@ -4,9 +4,21 @@
 #include <algorithm>
 #include <utility>
 
+#include "alidade/base/number_text.h"
 #include "alidade/estimation/first_values.h"
 
 namespace alidade::internal {
+namespace {
+
+Event StaleEvent(const Frame& frame, Timestamp state) {
+  return {frame.timestamp, "stale",
+          "the frame at " + SecondsText(frame.timestamp) + " is older than the state at " +
+              SecondsText(state) +
+              ": its measurements are not used; if it came late, set `out_of_sequence: {policy: "
+              "rollback, ...}` or, in C++, process frames by alidade::Rollback"};
+}
+
+}  // namespace
 
 FrameLoop::FrameLoop(System system, const EkfOptions& options,
                      const std::vector<StreamInfo>& streams, std::unique_ptr<Method> equations)
@@ -29,6 +41,8 @@ void FrameLoop::Process(const Frame& frame) {
   f.report.Clear();
   Run(frame);
   if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
+  if (f.report.stale && !stale_noted_) f.report.events.push_back(StaleEvent(frame, f.timestamp));
+  stale_noted_ = f.report.stale;
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 

@@ -68,6 +68,7 @@ class FrameLoop {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
+  bool stale_noted_ = false;                     ///< the last frame was stale
   std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
   Scratch<Rows> rows_;
   Scratch<Groups> groups_;

@@ -337,6 +337,28 @@ TEST(Ekf, FramesOfThePastAreStale) {
   EXPECT_EQ(ekf.state().values(), x);
 }
 
+TEST(Ekf, StaleFramesInARowAreOneEvent) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  const auto stale = [&](double t_s) {
+    std::vector<std::string> texts;
+    for (const Event& event : ekf.Process(FrameAt(t_s, {{0, 80.0}})).events) {
+      if (event.kind == "stale") texts.push_back(event.text);
+    }
+    return texts;
+  };
+  const std::vector<std::string> none;
+  EXPECT_EQ(stale(1.0), none);
+  EXPECT_EQ(stale(0.5),
+            std::vector<std::string>{
+                "the frame at 0.500000 s is older than the state at 1.000000 s: its measurements "
+                "are not used; if it came late, set `out_of_sequence: {policy: rollback, ...}` or, "
+                "in C++, process frames by alidade::Rollback"});
+  EXPECT_EQ(stale(0.6), none);  // of the same run
+  EXPECT_EQ(stale(1.1), none);
+  EXPECT_EQ(stale(1.0).size(), 1u);
+}
+
 // FAULTS 38
 TEST(Ekf, AGapIsSteppedInEqualParts) {
   EkfOptions options;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// All of alidade::estimation: problems, filters and the smoother.
+/// All of alidade::estimation: problems, filters, late measurements and the smoother.
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
 #include "alidade/estimation/iekf.h"
+#include "alidade/estimation/rollback.h"
 #include "alidade/estimation/rts.h"
 #include "alidade/estimation/square_root_ekf.h"
 #include "alidade/estimation/system.h"

@@ -4,8 +4,8 @@
 # tests/install/estimation_test.sh CMAKE BUILD COMPILER OPTIONS [CXXFLAG...] INCLUDE...
 #
 # Installs the component `estimation` of BUILD into an empty folder, which then has no header of another
-# room, and builds the C++ examples against it and Eigen (INCLUDE) alone. They must give what they
-# estimate.
+# room, and builds the C++ examples, and the program of late measurements, against it and Eigen (INCLUDE)
+# alone. They must give what they estimate.
 set -euo pipefail
 cmake=$1 build=$2 compiler=$3
 IFS=',' read -ra options <<<"$4"
@@ -33,18 +33,18 @@ flags=(-std=c++20 -O1 -I"$include")
 for argument in "$@"; do
   [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
 done
-# run EXAMPLE: what it prints.
+# run FOLDER: what the program there prints.
 run() {
-  "$compiler" "${flags[@]}" "${options[@]}" "examples/$1/main.cc" -o "$work/$1" \
+  "$compiler" "${flags[@]}" "${options[@]}" "$1/main.cc" -o "$work/program" \
     "$library" -Wl,-rpath,"$(dirname "$library")"
-  "$work/$1"
+  "$work/program"
 }
 
 # The last depth is within 4 sigma of the truth.
-run 31_depth_cpp | tee "$work/depth" | tail -1 |
+run examples/31_depth_cpp | tee "$work/depth" | tail -1 |
   awk '{ d = $3 - $8; if (d * d > 16 * $5 * $5 || $5 > 0.01) exit 1 }' ||
   fail "examples/31_depth_cpp says: $(cat "$work/depth")"
-run 32_landmarks_cpp >"$work/landmarks"
+run examples/32_landmarks_cpp >"$work/landmarks"
 found=$(grep -c '^landmark' "$work/landmarks")
 ((found >= 8)) || fail "examples/32_landmarks_cpp maps $found landmarks: $(cat "$work/landmarks")"
 awk -F'[(,)]' '/^robot/ {
@@ -53,4 +53,7 @@ awk -F'[(,)]' '/^robot/ {
       if (d * d > 16 * s * s || s > 0.5) exit 1
     }
   }' "$work/landmarks" || fail "examples/32_landmarks_cpp says: $(cat "$work/landmarks")"
-echo "both examples build and run on the component alone"
+run tests/install/late >"$work/late"
+awk '{ d = $4 - $9; if (d * d > 16 * $6 * $6 || $6 > 0.01 || $1 < 400) exit 1 }' "$work/late" ||
+  fail "tests/install/late says: $(cat "$work/late")"
+echo "the programs build and run on the component alone"

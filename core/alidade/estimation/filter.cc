@@ -105,7 +105,7 @@ BlockId Filter::block(std::string_view name) const {
   return id;
 }
 
-const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>& readings) {
+Frame Filter::MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const {
   Frame frame;
   frame.timestamp = timestamp;
   for (const Reading& one : readings) {
@@ -113,7 +113,11 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
     frame.measurements.push_back(
         {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
   }
-  return Process(frame);
+  return frame;
+}
+
+const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>& readings) {
+  return Process(MakeFrame(timestamp, readings));
 }
 
 BlockEstimate Filter::Estimate(BlockId id) const { return state().Estimate(id); }

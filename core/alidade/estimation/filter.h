@@ -108,6 +108,8 @@ struct Prediction {
 /// Live use: Push measurements by the names of their streams as they come, ask At for the estimate
 /// at any later time, and Expect for what a sensor will see then; neither changes the filter.
 ///
+/// Frames come in the order of their timestamps; an older one is `stale`. Late ones: Rollback.
+///
 /// Threads: as a value of the standard library. Const members may be called from several threads at
 /// once, while none calls another one; a copy belongs to whoever has it. What copies share, the
 /// system and its models, does not change, and models may be called from several threads.
@@ -130,10 +132,12 @@ class Filter : public Estimator {
   int stream(std::string_view name) const;
   /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
   BlockId block(std::string_view name) const;
-  /// Process, of what came at one timestamp. The report is good until the next call. Errors, and
-  /// nothing has changed: kBadData for a stream that is not there, values, a covariance or known
-  /// numbers of another size than its sensors take, or a quaternion or direction whose length is
-  /// off by more than 1e-3.
+  /// The readings of one timestamp as a frame. Errors: kBadData for a stream that is not there,
+  /// values, a covariance or known numbers of another size than its sensors take, or a quaternion
+  /// or direction whose length is off by more than 1e-3.
+  Frame MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const;
+  /// Process of MakeFrame. The report is good until the next call. Errors: those of MakeFrame, and
+  /// nothing has changed.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
     return Push(timestamp, {Reading(sensor, {z})});

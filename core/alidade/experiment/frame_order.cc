@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <numeric>
 #include <tuple>
 #include <type_traits>
@@ -15,14 +14,6 @@
 
 namespace alidade::internal {
 namespace {
-
-/// How far `timestamp` is behind `newest`, which is not before it; the longest there is where that
-/// does not fit.
-Timestamp Lag(Timestamp newest, Timestamp timestamp) {
-  Timestamp lag = 0;
-  return __builtin_sub_overflow(newest, timestamp, &lag) ? std::numeric_limits<Timestamp>::max()
-                                                         : lag;
-}
 
 /// ` in FILE:LINE`, where the source knows.
 std::string In(const Place& place) {
@@ -36,17 +27,15 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
     : experiment_(experiment), check_(std::move(check)), guide_(experiment) {
   if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
   for (const NamedEstimator& named : experiment.estimators) {
-    Processed& before = released_.processed.emplace_back();
-    if (named.estimator->offline()) continue;
-    before.after = named.estimator->Clone();
-    ALIDADE_EXPECTS(before.after != nullptr);
+    std::optional<Snapshots>& snapshots = snapshots_.emplace_back();
+    if (!named.estimator->offline()) snapshots.emplace(*named.estimator);
   }
 }
 
 FrameOrder::~FrameOrder() {
-  for (std::size_t e = 0; e < released_.processed.size(); ++e) {
-    std::unique_ptr<Estimator>& after = released_.processed[e].after;
-    if (after != nullptr) experiment_.estimators[e].estimator = std::move(after);
+  for (std::size_t e = 0; e < snapshots_.size(); ++e) {
+    if (!snapshots_[e]) continue;
+    experiment_.estimators[e].estimator = std::move(*snapshots_[e]).ReleasedEstimator();
   }
 }
 
@@ -69,16 +58,17 @@ bool FrameOrder::Next(SourceFrame& frame) {
     if (failure_) std::rethrow_exception(failure_);
     return false;
   }
-  released_ = std::move(held_.front());
+  frame = std::move(held_.front().frame);
   held_.pop_front();
-  std::swap(frame, released_.frame);
+  for (std::optional<Snapshots>& snapshots : snapshots_) {
+    if (snapshots) snapshots->Release();
+  }
   return true;
 }
 
-const Processed* FrameOrder::processed(std::size_t estimator) const {
-  if (estimator >= released_.processed.size()) return nullptr;
-  const Processed& one = released_.processed[estimator];
-  return one.after != nullptr || one.failed ? &one : nullptr;
+const ProcessedFrame* FrameOrder::processed(std::size_t estimator) const {
+  if (estimator >= snapshots_.size() || !snapshots_[estimator]) return nullptr;
+  return &snapshots_[estimator]->released();
 }
 
 /// Whether a frame of this timestamp, were it to come now, would come too late.
@@ -122,12 +112,11 @@ void FrameOrder::Receive() {
   if (ended_) return;
   check_(received.frame);
   received.places.assign(received.frame.measurements.size(), experiment_.source->place());
-  const bool is_newest = received.frame.timestamp > newest_;
   if (!Accept(received.frame)) return;
   const std::size_t at = Insert(std::move(received));
   if (experiment_.out_of_sequence.policy != OutOfSequence::kRollback) return;
   try {
-    Replay(at, is_newest);
+    Replay(at);
   } catch (...) {
     held_.resize(at);  // what came before is as it was
     throw;
@@ -203,46 +192,24 @@ void FrameOrder::Merge(Held& held, Held&& received) const {
 }
 
 /// Gives the frames held from index `from` on to the estimators, after what came before them.
-void FrameOrder::Replay(std::size_t from, bool is_newest) {
-  for (std::size_t i = from; i < held_.size(); ++i) {
-    held_[i].processed.clear();
-    held_[i].processed.resize(experiment_.estimators.size());
-  }
+void FrameOrder::Replay(std::size_t from) {
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
-    std::unique_ptr<Estimator>& estimator = experiment_.estimators[e].estimator;
-    if (estimator->offline()) continue;
-    const Processed* before = &(from == 0 ? released_ : held_[from - 1]).processed[e];
-    if (!is_newest && !before->failed) estimator = before->after->Clone();
+    if (!snapshots_[e]) continue;
+    NamedEstimator& named = experiment_.estimators[e];
+    std::vector<Frame> frames;
     for (std::size_t i = from; i < held_.size(); ++i) {
-      Processed& processed = held_[i].processed[e];
-      if (before->failed) {
-        processed.failed = true;
-        processed.diverged = before->diverged;
-      } else {
-        const int by = experiment_.estimators[e].accepted_by;
-        processed = Process(*estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
-      }
-      before = &processed;
+      frames.push_back(named.accepted_by < 0 ? held_[i].frame : Accepted(i, named.accepted_by));
     }
+    snapshots_[e]->Replace(from, std::move(frames), named.estimator);
   }
 }
 
-/// The frame as an estimator sees it that uses what estimator `by` accepted.
-Frame FrameOrder::Accepted(const Held& held, int by) const {
-  const auto index = static_cast<std::size_t>(by);
-  const NamedEstimator& filter = experiment_.estimators[index];
-  const bool follows = filter.accepted_by >= 0;
-  return AcceptedOf(follows ? Accepted(held, filter.accepted_by) : Frame(held.frame),
-                    experiment_.source->streams(), filter.system, held.processed[index].report);
-}
-
-Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {
-  Processed processed;
-  processed.report = estimator.Process(frame);
-  processed.after = estimator.Clone();
-  processed.failed = estimator.failed();
-  processed.diverged = estimator.diverged();
-  return processed;
+/// The frame held at `index` as an estimator sees it that uses what estimator `by` accepted.
+Frame FrameOrder::Accepted(std::size_t index, int by) const {
+  const auto filter = static_cast<std::size_t>(by);
+  const ProcessedFrame& processed = snapshots_[filter]->frames()[index];
+  return AcceptedOf(processed.frame, experiment_.source->streams(),
+                    experiment_.estimators[filter].system, processed.report);
 }
 
 }  // namespace alidade::internal

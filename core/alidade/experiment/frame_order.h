@@ -4,23 +4,16 @@
 #include <deque>
 #include <exception>
 #include <functional>
-#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "alidade/estimation/rollback.h"
 #include "alidade/experiment/estimator_guide.h"
 #include "alidade/experiment/run.h"
 
 namespace alidade::internal {
-
-/// What an estimator made of a frame that may have to be taken again.
-struct Processed {
-  std::unique_ptr<Estimator> after;  ///< as it is then
-  UpdateReport report;
-  bool failed = false;
-  bool diverged = false;
-};
 
 /// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
 /// also steers the estimators: they take each frame as it comes, and what came after an
@@ -40,8 +33,8 @@ class FrameOrder {
   /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
   /// a stream, or another value of a truth, comes twice at one timestamp.
   bool Next(SourceFrame& frame);
-  /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
-  const Processed* processed(std::size_t estimator) const;
+  /// The frame that Next gave as the estimator processed it; null: it has not been given the frame.
+  const ProcessedFrame* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
   /// `out_of_sequence` of each frame dropped since the last call.
   std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }
@@ -49,8 +42,7 @@ class FrameOrder {
  private:
   struct Held {
     SourceFrame frame;
-    std::vector<Place> places;         ///< of the measurements
-    std::vector<Processed> processed;  ///< by estimator; empty but under kRollback
+    std::vector<Place> places;  ///< of the measurements
   };
 
   bool Accept(const Frame& frame);
@@ -58,9 +50,8 @@ class FrameOrder {
   std::size_t Insert(Held&& received);
   void CheckMerge(const Held& held, const SourceFrame& part) const;
   void Merge(Held& held, Held&& received) const;
-  void Replay(std::size_t from, bool is_newest);
-  Frame Accepted(const Held& held, int by) const;
-  Processed Process(Estimator& estimator, const Frame& frame) const;
+  void Replay(std::size_t from);
+  Frame Accepted(std::size_t index, int by) const;
   bool IsTooLate(Timestamp timestamp) const;
   std::string Names(const Frame& frame) const;
 
@@ -68,7 +59,8 @@ class FrameOrder {
   Check check_;
   EstimatorGuide guide_;
   std::deque<Held> held_;  ///< by timestamp
-  Held released_;          ///< the one that Next gave last, or what was before the first
+  /// By estimator, of the frames held; none if it is offline. Empty but under kRollback.
+  std::vector<std::optional<Snapshots>> snapshots_;
   Timestamp newest_ = kNoTimestamp;
   bool ended_ = false;
   std::exception_ptr failure_;

@@ -55,7 +55,7 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
 /// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
 /// where the whole run has to end.
 bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source& source,
-             const internal::Processed* passed, const RunOptions& options, RunResult& result) {
+             const ProcessedFrame* passed, const RunOptions& options, RunResult& result) {
   one.last = nullptr;
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
@@ -72,13 +72,13 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
     for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
   }
   one.last = &report;
-  one.ended = passed ? passed->failed : estimator.failed();
-  one.diverged = passed ? passed->diverged : estimator.diverged();
+  one.ended = (passed ? *passed->after : estimator).failed();
+  one.diverged = (passed ? *passed->after : estimator).diverged();
   one.Note(report.events);
   if (!one.ended && !estimator.offline()) {
     const auto takes_since = Clock::now();
     one.Take(static_cast<std::size_t>(result.frames), seen,
-             passed ? passed->after->state() : estimator.state(), report, options);
+             (passed ? *passed->after : estimator).state(), report, options);
     one.result.record_s += SecondsSince(takes_since);
   }
   if (const std::string why = one.TakeFailures(report); !why.empty()) {

@@ -176,8 +176,10 @@ void AddCheck(CLI::App& program, Action& action) {
       ->option_text("MB")
       ->check(IsInteger(16, 1 << 30));
   command
-      .add_option("--step-order", options.step_order,
-                  "let a Step that is additive in dt to this order only pass (2: Euler)")
+      .add_option(
+          "--step-order", options.step_order,
+          "let a Step that is additive in dt to this order only pass (2: Euler); default the "
+          "order that the model declares")
       ->option_text("N")
       ->check(IsInteger(1, 8));
   command.footer(kCheckFooter);

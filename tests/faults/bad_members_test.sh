@@ -44,4 +44,7 @@ refused 13 Seen 'a sensor needs template <class T> bool Predict(const T* role...
 refused 14 Seen 'a sensor needs template <class T> void SqrtNoise(const T* role..., [const double* known,] [const T* z,] T* L) const'
 refused 15 Moved 'a motion model needs template <class T> void Step(const T* block..., [const T* u,] const T* w, double dt_s, T* next...) const'
 refused 16 Moved 'a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const'
+for number in 17 18 19; do
+  refused "$number" Moved 'kStepOrder is a static constexpr int from 0 to 8'
+done
 echo "all are refused in words"

@@ -130,6 +130,8 @@ struct Sensor {
 ///                     MatrixRef G) const;      analytic, zeroed; only without control input
 ///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
 ///   NoiseKind noise_kind() const;              default kContinuous; `alidade check` compares
+///   static constexpr int kStepOrder = N;       1 to 8: a step is additive in dt but for an error of
+///                                              order dt^N, 2 by Euler's method; default 0, additive
 ///
 /// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
 ///
@@ -145,6 +147,7 @@ struct Motion {
   using Input = Vec<0>;
   static constexpr Quantity kInput{""};
   static constexpr int kNoise = NoiseSize;
+  static constexpr int kStepOrder = 0;
   NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
 };
 

@@ -162,6 +162,15 @@ constexpr bool CheckSensorMembers() {
   return true;
 }
 
+template <class Model>
+constexpr bool StepOrderFits() {
+  if constexpr (std::is_same_v<decltype(Model::kStepOrder), const int>) {
+    return Model::kStepOrder >= 0 && Model::kStepOrder <= 8;
+  } else {
+    return false;
+  }
+}
+
 /// Likewise.
 template <class Model>
 constexpr bool CheckMotionMembers() {
@@ -183,6 +192,9 @@ constexpr bool CheckMotionMembers() {
   static_assert(!DeclaresStationary<Model>::value || HasStationary<Model>::value,
                 "Stationary exists but cannot be called as bool Stationary() const: see "
                 "alidade/model/model.h");
+  static_assert(StepOrderFits<Model>(),
+                "kStepOrder is a static constexpr int from 0 to 8, the order in dt of the error of "
+                "a step, 2 by Euler's method: see docs/add_a_motion_model.md");
   static_assert(
       Blocks<Model>::kStatic || HasSize<Model>::value,
       "a block of size kDynamic needs int Size(int block) const: see alidade/model/model.h");

@@ -45,6 +45,7 @@ void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
 
 template <class Model>
 void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
+  static_assert(CheckMotionMembers<Model>());
   using U = typename Model::Input;
   constexpr auto blocks = Model::kBlocks;
   holder->DescribeRoles(blocks);
@@ -62,6 +63,8 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   if constexpr (HasStationary<Model>::value) {
     if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;
   }
+  holder->description.capabilities |= static_cast<unsigned>(Model::kStepOrder)
+                                      << ALIDADE_STEP_ORDER_SHIFT;
   const NoiseKind kind = holder->model.noise_kind();
   if (kind == NoiseKind::kDiscrete) holder->description.capabilities |= ALIDADE_DISCRETE_NOISE;
   holder->description.initialise_role = -1;

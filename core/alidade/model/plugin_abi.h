@@ -265,6 +265,9 @@ enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2 };
 enum {
   ALIDADE_ANALYTIC_JACOBIAN = 1, /* analytic Jacobians, else by automatic differentiation */
   ALIDADE_STATIONARY = 2,        /* motion: x' = x without noise; step need not be called */
+  /* motion: four bits from this one on hold N, if `step` without noise is additive in dt but for an
+   * error of order dt^N; 0: it is additive */
+  ALIDADE_STEP_ORDER_SHIFT = 4,
   ALIDADE_CAN_INITIALISE = 1 << 16,
   ALIDADE_HAS_VALIDITY = 1 << 17,
   ALIDADE_RESIDUAL_ONLY = 1 << 18, /* recursive estimators refuse it */

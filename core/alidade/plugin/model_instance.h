@@ -41,6 +41,10 @@ class ModelInstance {
   const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
+  /// Of a motion model whose step is additive in dt but for an error: its order in dt; else 0.
+  int step_order() const {
+    return static_cast<int>(capabilities_ >> ALIDADE_STEP_ORDER_SHIFT & 15u);
+  }
   /// Takes L, n x n row-major, in place of the model's noise: of a sensor R = L L', of a motion
   /// model Qw = L L'.
   void GiveNoise(std::vector<double> root);

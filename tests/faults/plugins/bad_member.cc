@@ -106,12 +106,19 @@ struct Moved : MotionBase {
     f(0, 0) = g(0, 0) = 1.0;
   }
   bool Stationary() const { return false; }
+  static constexpr int kStepOrder = 2;
 #elif BAD_MEMBER == 10
   void StepJacobian(const double*, double, MatrixRef, MatrixRef) const {}  // no noise
 #elif BAD_MEMBER == 12
   bool Stationary(double) const { return false; }
 #elif BAD_MEMBER == 16
   void SqrtQ(MatrixRef l) const { l(0, 0) = 1.0; }  // no dt
+#elif BAD_MEMBER == 17
+  static constexpr int kStepOrder = 9;
+#elif BAD_MEMBER == 18
+  static constexpr double kStepOrder = 2.0;
+#elif BAD_MEMBER == 19
+  int kStepOrder = 2;                 // not of the type
 #endif
 };
 

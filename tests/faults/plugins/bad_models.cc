@@ -434,6 +434,13 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   }
 };
 
+/// The step of Euler's method, with the order that it declares.
+template <int kOrder>
+struct Declared : Turning<2> {
+  using Turning<2>::Turning;
+  static constexpr int kStepOrder = kOrder;
+};
+
 /// A point whose noise is of one kind and declared as another, as kWhat says.
 enum class Noise { kHeld, kHeldUndeclared, kAddsUpUndeclared, kOfEachStep };
 template <Noise kWhat>
@@ -486,6 +493,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
                SENSOR(TwoCovers, "two_covers"), SENSOR(TwoCoversOfAPart, "two_covers_of_a_part"),
                MOTION(Turning<1>, "ignores_dt"), MOTION(Turning<2>, "euler"),
+               MOTION(Declared<2>, "euler_declared"), MOTION(Declared<3>, "euler_overstated"),
                MOTION(Turning<3>, "drifts"), MOTION(Turning<4>, "infinite_q"),
                MOTION(Noisy<Noise::kHeld>, "held"),
                MOTION(Noisy<Noise::kHeldUndeclared>, "held_undeclared"),

@@ -132,6 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
               {"Initialise at", "q and -q of pose are not the same"}},
         Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise moves it"}},
         Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
+        Fault{0, "euler_overstated", "step", {"of order 2 in dt, not 3", "kStepOrder = N"}},
         Fault{0, "drifts", "step", {"a step over dt = 0 without noise moves it"}},
         Fault{0,
               "held_undeclared",
@@ -148,8 +149,8 @@ INSTANTIATE_TEST_SUITE_P(
     Name);
 
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
-  std::set<std::string> tested = {"right",   "may_have_bias", "landmark",
-                                  "gravity", "turning",       "held"};
+  std::set<std::string> tested = {"right",   "may_have_bias", "landmark",      "gravity",
+                                  "turning", "held",          "euler_declared"};
   const auto* suite = ::testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
@@ -165,7 +166,8 @@ TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
 }
 
 TEST_F(CheckTest, ModelsWithoutFaultPass) {
-  for (const char* model : {"right", "may_have_bias", "landmark", "gravity", "turning", "held"}) {
+  for (const char* model :
+       {"right", "may_have_bias", "landmark", "gravity", "turning", "held", "euler_declared"}) {
     const auto findings = Checked(model);
     EXPECT_EQ(Joined(Failures(findings)), "") << model;
     EXPECT_FALSE(AnyFailure(findings));
@@ -189,6 +191,7 @@ TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
   EXPECT_EQ(Joined(Failures(Checked("euler", options))), "");
   options.step_order = 3;
   EXPECT_TRUE(AnyFailure(Checked("euler", options)));
+  EXPECT_TRUE(AnyFailure(Checked("euler_declared", options)));  // the option takes precedence
   EXPECT_TRUE(AnyFailure(Checked("ignores_dt", options)));
 }
 

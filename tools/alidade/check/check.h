@@ -16,7 +16,8 @@ struct CheckOptions {
   int states = 48;          ///< random ones, besides those at the edges
   double timeout_s = 10.0;  ///< wall-clock time of one check
   int memory_mb = 1024;     ///< that the model may take
-  /// A Step that is additive in dt only up to an error of this order passes (2: Euler); 0: exactly.
+  /// A Step that is additive in dt only up to an error of this order passes (2: Euler); 0: of the
+  /// order that the model declares, if it does, else exactly.
   int step_order = 0;
   /// The parameters may have keys that the model does not read, as an entry of a run's config has.
   bool other_keys = false;

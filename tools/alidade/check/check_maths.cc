@@ -299,11 +299,15 @@ Finding CheckStep(Context& context) {
   }
   if (!identity.failure.empty()) return Fail(identity.failure);
   if (additive.failure.empty()) return Ok("additive in dt, and over dt = 0 the identity");
-  if (context.options().step_order > 0 && order > context.options().step_order - 0.2) {
+  const int given = context.options().step_order;
+  const int expected = given > 0 ? given : context.model().instance->step_order();
+  if (expected > 0 && order > expected - 0.2) {
     return Ok("additive to order " + RoundedText(order, 2) + " in dt, over dt = 0 the identity");
   }
-  return Fail(additive.failure + "; of order " + RoundedText(order, 2) +
-              " in dt. A discretisation of order N passes with --step-order N");
+  return Fail(additive.failure + "; of order " + RoundedText(order, 2) + " in dt" +
+              (expected > 0 ? ", not " + std::to_string(expected) : "") +
+              ". A discretisation of order N declares `static constexpr int kStepOrder = N;`, or "
+              "passes with --step-order N");
 }
 
 // A wrong kind leaves 0.47 or more however small dt is, a right one what goes with dt.

@@ -33,6 +33,8 @@ install(TARGETS alidade_model alidade_estimation EXPORT alidadeEstimationTargets
         COMPONENT estimation
         LIBRARY NAMELINK_COMPONENT estimation
         FILE_SET HEADERS COMPONENT estimation)
+install(TARGETS alidade_testing EXPORT alidadeTestingTargets
+        FILE_SET HEADERS COMPONENT testing)
 install(TARGETS alidade_core alidade_tools EXPORT alidadeTargets FILE_SET HEADERS)
 
 foreach(folder IN ITEMS motion_models sensors plugins)
@@ -52,6 +54,8 @@ endforeach()
 
 install(EXPORT alidadeEstimationTargets NAMESPACE alidade:: DESTINATION ${package_folder}
         COMPONENT estimation)
+install(EXPORT alidadeTestingTargets NAMESPACE alidade:: DESTINATION ${package_folder}
+        COMPONENT testing)
 install(EXPORT alidadeTargets NAMESPACE alidade:: DESTINATION ${package_folder})
 configure_package_config_file(cmake/alidadeConfig.cmake.in alidadeConfig.cmake
                               INSTALL_DESTINATION ${package_folder}

@@ -11,7 +11,8 @@
 #   spdx      every source, CMake file and script begins with the licence line
 #   core      core includes headers of core alone, tools those of core and tools, each by its full
 #             path, "alidade/ROOM/FILE.h"
-#   order     a room of core or tools includes itself and those before it, in the order of `rooms`
+#   order     a room of core or tools includes itself and those before it, in the order of `rooms`;
+#             none includes testing, which is for tests alone
 #   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
 #             their own stem
 #   plugin    nothing includes from plugins/, but a plugin from its own folder, tests/plugins and
@@ -22,7 +23,8 @@
 #             of nlohmann-json the forward declarations also in core/alidade/io/json.h, which
 #             names the type for all, and the whole in its test; CLI11 in cli, OpenCV in
 #             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone;
-#             model, state and estimation include Eigen alone, and base the standard library
+#             model, state and estimation include Eigen alone, and base the standard library;
+#             GoogleTest in testing and tests alone
 #   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
 #   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
@@ -36,7 +38,7 @@ if [[ ${1:-} == --self-test ]]; then
   self_test=true
   shift
 fi
-rooms="model base state estimation io config plugin experiment evaluate bundle check replay record sweep compare"
+rooms="model base state estimation testing io config plugin experiment evaluate bundle check replay record sweep compare"
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 
@@ -95,6 +97,7 @@ sources() {
     function foreign_to_library(path, bracket) {
       if (path ~ /^alidade\//)
         return !exists("core/" path) && !(folder == "tools" && exists("tools/" path))
+      if (bracket && path ~ /^gtest\//) return FILENAME !~ /^core\/alidade\/testing\//
       if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
       return 1
     }
@@ -133,6 +136,9 @@ sources() {
         report("core", "not a header of " folder ", or not by its full path: " path)
       if (folder ~ /^(core|tools)$/ && path ~ /^alidade\// && floor_of(path) > floor_of(FILENAME))
         report("order", "a room that stands above: " path)
+      if (folder !~ /^(tests|bench)$/ && path ~ /^alidade\/testing\// &&
+          FILENAME !~ /^core\/alidade\/testing\//)
+        report("order", "of use to tests alone: " path)
       if (folder ~ /^(sensors|motion_models)$/ && foreign_to_model(path, bracket))
         report("model", "a model includes alidade/model, Eigen and its own header alone: " path)
       if (folder ~ /^(core|tools|sensors|motion_models|plugins|cli)$/ &&
@@ -309,6 +315,11 @@ plant core tools/alidade/sweep/new.cc "$licence\n#include \"sweep.h\""
 plant order core/alidade/base/new.h "$licence\n#include \"alidade/config/config.h\""
 plant order core/alidade/model/new.h "$licence\n#include \"alidade/base/error.h\""
 plant order core/alidade/estimation/new.cc "$licence\n#include \"alidade/experiment/run.h\""
+plant order core/alidade/testing/new.h "$licence\n#include \"alidade/io/json.h\""
+plant order core/alidade/experiment/new.cc "$licence\n#include \"alidade/testing/frames.h\""
+plant order sensors/new.cc "$licence\n#include \"alidade/testing/frames.h\""
+allow core/alidade/testing/new.h "$licence\n#include <gtest/gtest.h>\n#include \"alidade/estimation/ekf.h\""
+plant core core/alidade/estimation/new.h "$licence\n#include <gtest/gtest.h>"
 plant order tools/alidade/evaluate/new.cc "$licence\n#  include \"alidade/sweep/sweep.h\""
 for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_models/constant.h"' '<vector.h>' \
   '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<yaml-cpp/yaml.h>' '"alidade/model/no_such.h"' '"alidade/base/error.h"'; do

@@ -5,7 +5,8 @@
 #
 # Installs the component `estimation` of BUILD into an empty folder, which then has no header of another
 # room, and builds the C++ examples, and the program of late measurements, against it and Eigen (INCLUDE)
-# alone. They must give what they estimate.
+# alone. They must give what they estimate. Then installs the component `testing` too, and builds the tests
+# of tests/install/testing against both.
 set -euo pipefail
 cmake=$1 build=$2 compiler=$3
 IFS=',' read -ra options <<<"$4"
@@ -21,7 +22,7 @@ fail() {
 "$cmake" --install "$build" --prefix "$work/alidade" --component estimation >"$work/log" ||
   { cat "$work/log" >&2; exit 1; }
 include=$work/alidade/include
-for room in io config plugin experiment record; do
+for room in testing io config plugin experiment record; do
   [[ ! -e $include/alidade/$room ]] || fail "the component has headers of $room"
 done
 foreign=$(grep -rhoE '#include <(yaml|boost|spdlog|openssl|nlohmann|ceres|opencv)[^>]*>' "$include" || true)
@@ -29,10 +30,12 @@ foreign=$(grep -rhoE '#include <(yaml|boost|spdlog|openssl|nlohmann|ceres|opencv
 library=$(find "$work/alidade" -name libalidade-estimation.so)
 [[ -n $library ]] || fail "the component has no library"
 
-flags=(-std=c++20 -O1 -I"$include")
+flags=(-std=c++20 -I"$include")
+only_flags=(-O1)
 for argument in "$@"; do
-  [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
+  [[ $argument == -* ]] && only_flags+=("$argument") || flags+=(-isystem "$argument")
 done
+flags+=("${only_flags[@]}")
 # run FOLDER: what the program there prints.
 run() {
   "$compiler" "${flags[@]}" "${options[@]}" "$1/main.cc" -o "$work/program" \
@@ -56,4 +59,12 @@ awk -F'[(,)]' '/^robot/ {
 run tests/install/late >"$work/late"
 awk '{ d = $4 - $9; if (d * d > 16 * $6 * $6 || $6 > 0.01 || $1 < 400) exit 1 }' "$work/late" ||
   fail "tests/install/late says: $(cat "$work/late")"
+
+"$cmake" --install "$build" --prefix "$work/alidade" --component testing >"$work/log" ||
+  { cat "$work/log" >&2; exit 1; }
+{
+  "$cmake" -S tests/install/testing -B "$work/testing" -DCMAKE_CXX_COMPILER="$compiler" \
+    -DCMAKE_CXX_FLAGS="$(printf '%s ' "${only_flags[@]}")" -DCMAKE_PREFIX_PATH="$work/alidade" &&
+    "$cmake" --build "$work/testing" && "$work/testing/models_test"
+} >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
 echo "the programs build and run on the component alone"

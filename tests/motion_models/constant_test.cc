@@ -14,13 +14,13 @@ using testing::Blocks;
 using testing::Covariance;
 using testing::ExpectSame;
 using testing::ExpectTrueJacobians;
-using testing::Step;
-using testing::Stepped;
+using testing::StepResult;
+using testing::StepWithJacobians;
 
 TEST(Constant, StaysAndHasNoNoise) {
   const auto constant = AbiMotion<Constant<>>();
   EXPECT_EQ(constant->noise_size(), 0);
-  const Stepped out = Step(constant, {{3.3}}, nullptr, nullptr, 0.1);
+  const StepResult out = StepWithJacobians(constant, {{3.3}}, nullptr, nullptr, 0.1);
   EXPECT_EQ(out.next[0][0], 3.3);
   EXPECT_EQ(out.f[0], 1.0);
 }
@@ -30,7 +30,8 @@ TEST(Constant, WalksWithTheRootOfTime) {
   ASSERT_EQ(walk->noise_size(), 3);
   EXPECT_EQ(walk->blocks()[0].elements, (std::vector<std::string>{"0", "1", "2"}));
   const Blocks x{{1, 2, 3}};
-  EXPECT_EQ(Step(walk, x, nullptr, nullptr, 0.25).next, x) << "no noise given is zero noise";
+  EXPECT_EQ(StepWithJacobians(walk, x, nullptr, nullptr, 0.25).next, x)
+      << "no noise given is zero noise";
   ExpectTrueJacobians(walk, x, nullptr, {0.1, -0.2, 0.3}, 0.25);
   // 0.2^2 0.25 = 0.01
   ExpectSame(Covariance(walk, x, 0.25), {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01}, 1e-15);

@@ -13,8 +13,8 @@ using testing::AbiMotion;
 using testing::Blocks;
 using testing::Covariance;
 using testing::ExpectTrueJacobians;
-using testing::Step;
-using testing::Stepped;
+using testing::StepResult;
+using testing::StepWithJacobians;
 
 template <int D, bool kContinuous>
 void CheckConstantVelocity() {
@@ -27,7 +27,7 @@ void CheckConstantVelocity() {
   std::vector<double> w(motion->noise_size());
   for (int i = 0; i < D; ++i) x[0][i] = 1.0 + i, x[1][i] = -0.5 * i + 0.25;
   for (std::size_t i = 0; i < w.size(); ++i) w[i] = 0.3 - 0.1 * static_cast<double>(i);
-  const Stepped out = Step(motion, x, nullptr, nullptr, dt_s);
+  const StepResult out = StepWithJacobians(motion, x, nullptr, nullptr, dt_s);
   for (int i = 0; i < D; ++i) {
     EXPECT_DOUBLE_EQ(out.next[0][i], x[0][i] + dt_s * x[1][i]);
     EXPECT_EQ(out.next[1][i], x[1][i]);

@@ -12,7 +12,7 @@ namespace {
 using testing::AbiMotion;
 using testing::Blocks;
 using testing::MapHost;
-using testing::Stepped;
+using testing::StepResult;
 
 const double kPi = 3.14159265358979323846;
 
@@ -56,19 +56,21 @@ TEST(OdometryPose, FollowsTheVehicle) {
   ASSERT_TRUE(motion->has_input());
   // 2 m/s ahead for 3 s
   const double straight[6] = {2, 0, 0, 0, 0, 0};
-  ExpectPose(testing::Step(motion, Camera(5, 6, 0), straight, nullptr, 3.0).next, Camera(11, 6, 0));
+  ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, 0), straight, nullptr, 3.0).next,
+             Camera(11, 6, 0));
   // A quarter of a circle of radius 4 m to the left, in 1 s
   const double bend[6] = {2 * kPi, 0, 0, 0, 0, kPi / 2};
-  ExpectPose(testing::Step(motion, Camera(5, 6, 0), bend, nullptr, 1.0).next,
+  ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, 0), bend, nullptr, 1.0).next,
              Camera(9, 10, kPi / 2));
   // 0.005 rad of a circle of radius 400 m: there series take over
   const double all_but_straight[6] = {2, 0, 0, 0, 0, 0.005};
   const double half = std::sin(0.0025);
-  ExpectPose(testing::Step(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
-             Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
+  ExpectPose(
+      testing::StepWithJacobians(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
+      Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
   // from another heading, by noise alone
   const double none[6] = {};
-  ExpectPose(testing::Step(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,
+  ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,
              Camera(1, 10, kPi));
 }
 
@@ -76,8 +78,9 @@ TEST(OdometryPose, FollowsTheVehicle) {
 TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
   const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};
-  const Blocks truth =
-      testing::Step(AbiMotion<OdometryPose>(kMounted), Camera(5, 6, 1), input, nullptr, 0.7).next;
+  const Blocks truth = testing::StepWithJacobians(AbiMotion<OdometryPose>(kMounted),
+                                                  Camera(5, 6, 1), input, nullptr, 0.7)
+                           .next;
 
   MapHost::Values not_mounted = kMounted;  // 0.5 m lower; turned by 0.1 rad about y
   not_mounted["vehicle_from_cam.position"] = {1, 0, 1};
@@ -95,7 +98,7 @@ TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   x[3].assign(tilt, tilt + 4);
   x[4] = {0.25};
   const Blocks next =
-      testing::Step(AbiMotion<OdometryPose>(not_mounted), x, wrong, nullptr, 0.7).next;
+      testing::StepWithJacobians(AbiMotion<OdometryPose>(not_mounted), x, wrong, nullptr, 0.7).next;
   ExpectPose(next, truth);
   for (std::size_t i = 2; i < 5; ++i) EXPECT_EQ(next[i], x[i]);  // they stay
 }

@@ -18,7 +18,7 @@ namespace {
 using testing::AbiMotion;
 using testing::Blocks;
 using testing::MapHost;
-using testing::Stepped;
+using testing::StepResult;
 
 const MapHost::Values kNoise{{"noise.linear_acceleration", {0.6}},
                              {"noise.angular_acceleration", {0.1, 0.2, 0.3}}};
@@ -28,7 +28,8 @@ TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[6] = {0, 2, 0, 0, 0, pi / 2};
-  const Stepped out = testing::Step(AbiMotion<QuaternionPose>(kNoise), x, nullptr, w, 1.0);
+  const StepResult out =
+      testing::StepWithJacobians(AbiMotion<QuaternionPose>(kNoise), x, nullptr, w, 1.0);
   EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(out.next[2], (std::vector<double>{1, 2, 0}));
   EXPECT_EQ(out.next[3], (std::vector<double>{0, 0, pi}));
@@ -45,7 +46,7 @@ TEST(QuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
   testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
   // d rotation / d omega = dt at omega = 0, exact
-  const Stepped out = testing::Step(motion, still, nullptr, none.data(), 0.2);
+  const StepResult out = testing::StepWithJacobians(motion, still, nullptr, none.data(), 0.2);
   for (int i = 0; i < 3; ++i) EXPECT_DOUBLE_EQ(out.f[(3 + i) * 12 + 9 + i], 0.2);
 }
 
@@ -168,8 +169,8 @@ TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
-  const Stepped out =
-      testing::Step(AbiMotion<ContinuousQuaternionPose>(kNoise), x, nullptr, w, 1.0);
+  const StepResult out =
+      testing::StepWithJacobians(AbiMotion<ContinuousQuaternionPose>(kNoise), x, nullptr, w, 1.0);
   EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(out.next[2], (std::vector<double>{1, 0, 4}));
   EXPECT_EQ(out.next[3], (std::vector<double>{0, 1, pi / 2}));

@@ -13,9 +13,9 @@ using testing::Blocks;
 using testing::ExpectSame;
 using testing::kNumeric;
 using testing::kPoison;
-using testing::Linearised;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
+using testing::SensorJacobian;
 
 // m; world_from_body
 const Blocks kPoseRoles{{1.0, -2.0, 3.0}, {0.6, 0.0, 0.8, 0.0}};
@@ -30,9 +30,9 @@ TEST(Pose, IsPositionAndOrientation) {
   std::vector<double> z(7, kPoison);
   ASSERT_EQ(pose->Predict(Pointers(kPoseRoles).data(), z.data()), Status::kOk);
   EXPECT_EQ(z, (std::vector<double>{1.0, -2.0, 3.0, 0.6, 0.0, 0.8, 0.0}));
-  const std::vector<double> j = Linearised(pose, kPoseRoles);
+  const std::vector<double> j = SensorJacobian(pose, kPoseRoles);
   for (std::size_t i = 0; i < 36; ++i) EXPECT_EQ(j[i], i % 7 == 0 ? 1.0 : 0.0);
-  ExpectSame(j, NumericallyLinearised(pose, kPoseRoles), kNumeric);
+  ExpectSame(j, NumericSensorJacobian(pose, kPoseRoles), kNumeric);
 }
 
 TEST(Pose, HasNoiseByAxisOfBoth) {

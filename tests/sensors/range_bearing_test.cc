@@ -15,9 +15,9 @@ using testing::Blocks;
 using testing::ExpectSame;
 using testing::kNumeric;
 using testing::kPoison;
-using testing::Linearised;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
+using testing::SensorJacobian;
 
 SharedSensor MakeRangeBearing() {
   return MakeSensor(RangeBearing<Xyz>(0.1, 0.02, 10.0), "range_bearing");
@@ -33,8 +33,8 @@ TEST(RangeBearing, PredictsWorkedNumbers) {
   ExpectSame(z, {5.0, 0.6, 0.0, 0.8}, 1e-15);  // the world's y is the sensor's x
   EXPECT_EQ(sensor->measurement().elements,
             (std::vector<std::string>{"range", "bearing.x", "bearing.y", "bearing.z"}));
-  ExpectSame(Linearised(sensor, kRangeBearingRoles),
-             NumericallyLinearised(sensor, kRangeBearingRoles), kNumeric);
+  ExpectSame(SensorJacobian(sensor, kRangeBearingRoles),
+             NumericSensorJacobian(sensor, kRangeBearingRoles), kNumeric);
   std::vector<double> l(9, kPoison);
   ASSERT_EQ(sensor->SqrtNoise(Pointers(kRangeBearingRoles).data(), z.data(), l.data()),
             Status::kOk);
@@ -67,7 +67,7 @@ TEST(RangeBearing, TellsThePoint) {
             Status::kOk);
   ExpectSame(y, kRangeBearingRoles[2], 1e-15);
   const std::vector<double> j =
-      Linearised(sensor, kRangeBearingRoles);  // 3 x 9, the point's columns last
+      SensorJacobian(sensor, kRangeBearingRoles);  // 3 x 9, the point's columns last
   for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t c = 0; c < 3; ++c) {
       double product = 0.0;

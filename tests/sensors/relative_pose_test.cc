@@ -13,9 +13,9 @@ using testing::Blocks;
 using testing::ExpectSame;
 using testing::kNumeric;
 using testing::kPoison;
-using testing::Linearised;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
+using testing::SensorJacobian;
 
 // The body at (1, 2, 3), turned by 90 degrees about z: its x is the world's y.
 const double kHalf = std::sqrt(0.5);
@@ -31,7 +31,7 @@ TEST(RelativePose, IsThatOfTheLandmarkInTheBody) {
   ASSERT_EQ(sensor->Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
   // 4 m ahead and 0.5 m above. Turned back by 90 degrees about z, then by 90 degrees about x.
   ExpectSame(z, {4, 0, 0.5, 0.5, 0.5, -0.5, -0.5}, 1e-15);
-  ExpectSame(Linearised(sensor, kRoles), NumericallyLinearised(sensor, kRoles), kNumeric);
+  ExpectSame(SensorJacobian(sensor, kRoles), NumericSensorJacobian(sensor, kRoles), kNumeric);
 }
 
 TEST(RelativePose, PlacesTheLandmarkWhereItWasMeasured) {

@@ -15,10 +15,10 @@ using testing::ExpectSame;
 using testing::kNaN;
 using testing::kNumeric;
 using testing::kPoison;
-using testing::Linearised;
 using testing::MapHost;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
+using testing::SensorJacobian;
 
 // lambda = 3 1/m, Z = 0.5 m: s = 1.5
 const MapHost::Values kScale{{"noise_model", {0}}, {"template_px", {300}}, {"sigma_px", {1}}};
@@ -30,8 +30,9 @@ TEST(Scale2d, PredictsWorkedNumbers) {
   const auto roles = Pointers(kScaleRoles);
   ASSERT_EQ(scale->Predict(roles.data(), &s), Status::kOk);
   EXPECT_DOUBLE_EQ(s, 1.5);
-  EXPECT_EQ(Linearised(scale, kScaleRoles), (std::vector<double>{3.0, 0.5}));
-  ExpectSame(Linearised(scale, kScaleRoles), NumericallyLinearised(scale, kScaleRoles), kNumeric);
+  EXPECT_EQ(SensorJacobian(scale, kScaleRoles), (std::vector<double>{3.0, 0.5}));
+  ExpectSame(SensorJacobian(scale, kScaleRoles), NumericSensorJacobian(scale, kScaleRoles),
+             kNumeric);
   // (2 1 / 300) 1.5^3 = 0.0225
   ASSERT_EQ(scale->SqrtNoise(roles.data(), &s, &sigma), Status::kOk);
   EXPECT_DOUBLE_EQ(sigma, 0.0225);

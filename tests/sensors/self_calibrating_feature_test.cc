@@ -71,7 +71,7 @@ TEST(SelfCalibratingFeature, IsTheRadtanLensOfTheOtherSensors) {
 
 template <class Lens>
 void ExpectTrueJacobian(const Blocks& roles) {
-  ExpectSame(Linearised(Made<Lens>(), roles), NumericallyLinearised(Made<Lens>(), roles), 1e-8);
+  ExpectSame(SensorJacobian(Made<Lens>(), roles), NumericSensorJacobian(Made<Lens>(), roles), 1e-8);
 }
 TEST(SelfCalibratingFeature, HasTrueJacobians) {
   ExpectTrueJacobian<RadialLens>(kRadial);
@@ -97,7 +97,7 @@ TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 140.625, 1e-12);
   EXPECT_NEAR(z[1], -187.5, 1e-12);
-  ExpectSame(Linearised(sensor, roles), NumericallyLinearised(sensor, roles), 1e-8);
+  ExpectSame(SensorJacobian(sensor, roles), NumericSensorJacobian(sensor, roles), 1e-8);
   std::vector<double> untouched(2, kPoison);
   for (const double depth : {0.0, kNaN}) {
     roles[3][2] = depth;

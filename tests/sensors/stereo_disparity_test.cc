@@ -16,9 +16,9 @@ using testing::Blocks;
 using testing::ExpectSame;
 using testing::kNaN;
 using testing::kPoison;
-using testing::Linearised;
 using testing::MapHost;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
+using testing::SensorJacobian;
 
 // f = 400 px, B = 0.065 m, Z = 0.5 m: d = 400 0.065 / 0.5 = 52 px
 const MapHost::Values kStereo{
@@ -32,7 +32,7 @@ TEST(StereoDisparity, PredictsWorkedNumbers) {
   ASSERT_EQ(stereo->Predict(roles, &disparity_px), Status::kOk);
   EXPECT_DOUBLE_EQ(disparity_px, 52.0);
   // -f B / Z^2 = -26 / 0.25
-  EXPECT_DOUBLE_EQ(Linearised(stereo, {{0.5}})[0], -104.0);
+  EXPECT_DOUBLE_EQ(SensorJacobian(stereo, {{0.5}})[0], -104.0);
   ASSERT_EQ(stereo->SqrtNoise(roles, &disparity_px, &sigma_px), Status::kOk);
   EXPECT_EQ(sigma_px, 1.5);
 }
@@ -41,7 +41,7 @@ TEST(StereoDisparity, JacobianIsTrue) {
   const auto stereo = AbiSensor<StereoDisparity>(kStereo);
   for (const double depth_m : {0.3, 0.5, 2.0, 10.0}) {
     const Blocks roles{{depth_m}};
-    ExpectSame(Linearised(stereo, roles), NumericallyLinearised(stereo, roles), 3e-9);
+    ExpectSame(SensorJacobian(stereo, roles), NumericSensorJacobian(stereo, roles), 3e-9);
   }
 }
 

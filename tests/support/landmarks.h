@@ -79,7 +79,7 @@ inline std::vector<double> Predicted(const SharedSensor& sensor, const Blocks& r
 /// Checks Jacobians of Predict against differences.
 inline void ExpectTrueJacobians(const SharedSensor& sensor, const Blocks& roles) {
   // h^4 times fifth derivatives of pixels, 1e4 of the Jacobians at most
-  ExpectSame(Linearised(sensor, roles), NumericallyLinearised(sensor, roles), 10 * kNumeric);
+  ExpectSame(SensorJacobian(sensor, roles), NumericSensorJacobian(sensor, roles), 10 * kNumeric);
 }
 
 /// Checks that Initialise inverts Predict, and its Jacobians against differences. `from`: position,

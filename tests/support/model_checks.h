@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "alidade/plugin/plugin_models.h"
-#include "support/numeric_jacobian.h"
+#include "alidade/testing/jacobians.h"
 
 /// What the tests of models ask of them, through the plugin ABI.
 namespace alidade::testing {
@@ -19,31 +19,6 @@ inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // Of numeric Jacobians: h^4 = 1e-12 times derivatives of order 1e2, and rounding / h = 1e-13.
 inline constexpr double kNumeric = 1e-9;
 
-/// Jacobians by all roles side by side, m x n.
-inline std::vector<double> Linearised(const SharedSensor& sensor, const Blocks& roles) {
-  const int m = sensor->measurement().geometry.tangent, n = TangentSize(sensor->roles());
-  std::vector<double> z(sensor->measurement().geometry.ambient), j(m * n, kPoison);
-  std::vector<double*> blocks;
-  int column = 0;
-  for (const Space& role : sensor->roles()) {
-    blocks.push_back(j.data() + column);
-    column += role.geometry.tangent;
-  }
-  const std::vector<int> strides(blocks.size(), n);
-  EXPECT_EQ(sensor->Linearise(Pointers(roles).data(), z.data(), blocks.data(), strides.data()),
-            Status::kOk);
-  return j;
-}
-
-inline std::vector<double> NumericallyLinearised(const SharedSensor& sensor, const Blocks& roles) {
-  const auto predict = [&](const Blocks& x) {
-    Blocks z = Filled({sensor->measurement()}, kPoison);
-    EXPECT_EQ(sensor->Predict(Pointers(x).data(), z[0].data()), Status::kOk);
-    return z;
-  };
-  return NumericJacobian(sensor->roles(), roles, {sensor->measurement()}, predict);
-}
-
 inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& b,
                        double relative) {
   ASSERT_EQ(a.size(), b.size());
@@ -52,44 +27,14 @@ inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& 
   }
 }
 
-struct Stepped {
-  Blocks next;
-  std::vector<double> f, g;
-};
-
-inline Stepped Step(const SharedMotion& motion, const Blocks& x, const double* u, const double* w,
-                    double dt_s) {
-  const int n = motion->tangent_size();
-  Stepped out{Filled(motion->blocks(), kPoison), std::vector<double>(n * n, kPoison),
-              std::vector<double>(n * motion->noise_size(), kPoison)};
-  EXPECT_EQ(motion->Step(Pointers(x).data(), u, w, dt_s,
-                         {Pointers(out.next).data(), out.f.data(), out.g.data()}),
-            Status::kOk);
-  return out;
-}
-
 /// Checks F and G of a step at noise w against numeric ones.
 inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                 const std::vector<double>& w, double dt_s) {
-  const auto value = [&](const Blocks& blocks, const std::vector<double>& noise) {
-    Blocks next = Filled(motion->blocks(), kPoison);
-    EXPECT_EQ(motion->Step(Pointers(blocks).data(), u, noise.data(), dt_s,
-                           {Pointers(next).data(), nullptr, nullptr}),
-              Status::kOk);
-    return next;
-  };
-  const Stepped out = Step(motion, x, u, w.data(), dt_s);
-  EXPECT_EQ(out.next, value(x, w)) << "the value is the same with and without Jacobians";
-  ExpectSame(out.f,
-             NumericJacobian(motion->blocks(), x, motion->blocks(),
-                             [&](const Blocks& blocks) { return value(blocks, w); }),
-             kNumeric);
-  Space noise;
-  noise.geometry = Geometry::Vector(motion->noise_size());
-  ExpectSame(out.g,
-             NumericJacobian({noise}, {w}, motion->blocks(),
-                             [&](const Blocks& blocks) { return value(x, blocks[0]); }),
-             kNumeric);
+  const StepResult out = StepWithJacobians(motion, x, u, w.data(), dt_s),
+                   numeric = NumericStep(motion, x, u, w.data(), dt_s);
+  EXPECT_EQ(out.next, numeric.next) << "the value is the same with and without Jacobians";
+  ExpectSame(out.f, numeric.f, kNumeric);
+  ExpectSame(out.g, numeric.g, kNumeric);
 }
 
 /// L L' of the process noise, n_w x n_w.
@@ -115,7 +60,7 @@ inline NoisyStep StepWithNoise(const SharedMotion& motion, const Blocks& x, cons
                                double dt_s, const Blocks& noise_of, double noise_dt_s) {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const int n = motion->tangent_size(), n_w = motion->noise_size();
-  const Stepped step = Step(motion, x, u, nullptr, dt_s);
+  const StepResult step = StepWithJacobians(motion, x, u, nullptr, dt_s);
   Rows l = Rows::Zero(n_w, n_w);
   EXPECT_EQ(motion->SqrtQ(Pointers(noise_of).data(), u, noise_dt_s, l.data()), Status::kOk);
   return {step.next, Eigen::Map<const Rows>(step.f.data(), n, n),

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/systems.h"
 
-#include <algorithm>
-
 #include "motion_models/constant.h"
 #include "sensors/scale_2d.h"
 #include "sensors/stereo_disparity.h"
@@ -87,37 +85,6 @@ System WalkingOrientation() {
   system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
   AddSensor(system, "z", MakeSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
   return system;
-}
-
-std::vector<StreamInfo> StreamsOf(const System& system) {
-  std::vector<StreamInfo> streams;
-  for (const SensorBinding& sensor : system.sensors) {
-    streams.push_back({sensor.stream, sensor.model->measurement().geometry.ambient, 0.0,
-                       sensor.model->known_size()});
-  }
-  return streams;
-}
-
-Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
-  Frame frame;
-  frame.timestamp = TimestampFromSeconds(t_s);
-  for (const auto& [stream, value] : values) {
-    frame.measurements.push_back({frame.timestamp, stream, -1, {value}, {}});
-  }
-  return frame;
-}
-
-bool HasEvent(const UpdateReport& report, const std::string& kind) {
-  return std::ranges::count(report.events, kind, &Event::kind) > 0;
-}
-
-double ValueOf(const State& state, const std::string& block) {
-  return *state.value(state.layout().Find(block));
-}
-double CovarianceOf(const State& state, const std::string& a, const std::string& b) {
-  const StateLayout& layout = state.layout();
-  return state.covariance().Block(layout[layout.Find(a)].tangent_offset, 1,
-                                  layout[layout.Find(b)].tangent_offset, 1)(0);
 }
 
 }  // namespace alidade::testing

@@ -8,6 +8,7 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"
+#include "alidade/testing/frames.h"
 #include "motion_models/constant_velocity.h"
 
 /// Small systems composed in C++, for tests.
@@ -90,13 +91,5 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
 
 /// An orientation that walks at random, known to 0.1 rad at first and measured to 0.05 rad.
 System WalkingOrientation();
-
-std::vector<StreamInfo> StreamsOf(const System& system);
-/// A frame with one scalar for each (stream, value).
-Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values);
-
-bool HasEvent(const UpdateReport& report, const std::string& kind);
-double ValueOf(const State& state, const std::string& block);
-double CovarianceOf(const State& state, const std::string& a, const std::string& b);
 
 }  // namespace alidade::testing

@@ -23,10 +23,10 @@ using testing::AddSensor;
 using testing::Blocks;
 using testing::ExpectSame;
 using testing::kPoison;
-using testing::Linearised;
 using testing::LinearSensor;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
+using testing::SensorJacobian;
 
 BlockId AddOffset(System& system, double mean, double sigma) {
   AddMotion(system, "clock", testing::ConstantMotion(1), {{"offset", mean, sigma}});
@@ -55,7 +55,7 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
     double z = kPoison, l = kPoison;
     ASSERT_EQ(sensor.model->Predict(Pointers(roles).data(), &z), Status::kOk);
     EXPECT_DOUBLE_EQ(z, 2.0 * (3.0 - 4.0 * delta));
-    ExpectSame(Linearised(sensor.model, roles), {2.0, 2.0 * delta, -8.0}, 1e-12);
+    ExpectSame(SensorJacobian(sensor.model, roles), {2.0, 2.0 * delta, -8.0}, 1e-12);
     ASSERT_EQ(sensor.model->SqrtNoise(Pointers(roles).data(), &z, &l), Status::kOk);
     EXPECT_EQ(l, 0.1);
   }
@@ -118,7 +118,8 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
       roles[5] = {0.4, 0.3, 3.0};
     }
     // df/ddelta is by differences itself: 1e-12 of the values over 1 ms.
-    ExpectSame(Linearised(sensor.model, roles), NumericallyLinearised(sensor.model, roles), 1e-7);
+    ExpectSame(SensorJacobian(sensor.model, roles), NumericSensorJacobian(sensor.model, roles),
+               1e-7);
   }
 }
 

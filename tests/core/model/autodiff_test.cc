@@ -22,11 +22,11 @@ using testing::ExpectTrueJacobians;
 using testing::Filled;
 using testing::kNumeric;
 using testing::kPoison;
-using testing::Linearised;
-using testing::NumericallyLinearised;
+using testing::NumericSensorJacobian;
 using testing::Pointers;
-using testing::Step;
-using testing::Stepped;
+using testing::SensorJacobian;
+using testing::StepResult;
+using testing::StepWithJacobians;
 
 /// q' = q Exp((u + w) dt)
 struct Turn : Motion<3, UnitQuaternion> {
@@ -60,7 +60,7 @@ TEST(AutodiffMotion, GivesFOrGAlone) {
   const auto turn = AbiMotion<Turn>();
   const Blocks x{{0.5, -0.5, 0.5, 0.5}};
   const double rate[3] = {0.3, -1.0, 2.0};
-  const Stepped both = Step(turn, x, rate, nullptr, 0.1);
+  const StepResult both = StepWithJacobians(turn, x, rate, nullptr, 0.1);
   Blocks next = Filled(turn->blocks(), kPoison);
   std::vector<double> f(9, kPoison), g(9, kPoison);
   const auto blocks = Pointers(x);
@@ -193,7 +193,7 @@ TEST(AutodiffSensor, JacobianOfAnAngleIsTrueAcrossTheWrap) {
   const auto bearing = AbiSensor<Bearing>();
   for (const double y : {0.5, 1e-4, -1e-4}) {
     const Blocks roles{{-2.0, y}, {0.1}};
-    ExpectSame(Linearised(bearing, roles), NumericallyLinearised(bearing, roles), kNumeric);
+    ExpectSame(SensorJacobian(bearing, roles), NumericSensorJacobian(bearing, roles), kNumeric);
   }
 }
 

@@ -2,8 +2,8 @@
 //
 // Parameters that sensors and source share: the maps `camera` and `landmarks` at the root.
 #include "alidade/experiment/source_plugin.h"
+#include "alidade/testing/jacobians.h"
 #include "host_fixture.h"
-#include "support/numeric_jacobian.h"
 
 namespace alidade {
 namespace {

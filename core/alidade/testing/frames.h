@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/estimation/estimator.h"
+#include "alidade/estimation/system.h"
+
+/// Frames for an estimator, and what came of them, for tests of filters.
+namespace alidade::testing {
+
+/// A stream for each sensor of the system, in their order.
+inline std::vector<StreamInfo> StreamsOf(const System& system) {
+  std::vector<StreamInfo> streams;
+  for (const SensorBinding& sensor : system.sensors) {
+    streams.push_back({sensor.stream, sensor.model->measurement().geometry.ambient, 0.0,
+                       sensor.model->known_size()});
+  }
+  return streams;
+}
+
+/// A frame with one scalar for each (stream, value).
+inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
+  Frame frame;
+  frame.timestamp = TimestampFromSeconds(t_s);
+  for (const auto& [stream, value] : values) {
+    frame.measurements.push_back({frame.timestamp, stream, -1, {value}, {}});
+  }
+  return frame;
+}
+
+/// Whether the report has an event of this kind.
+inline bool HasEvent(const UpdateReport& report, std::string_view kind) {
+  return std::ranges::count(report.events, kind, &Event::kind) > 0;
+}
+
+/// The block of that name. ContractViolation if there is none.
+inline const Block& BlockOf(const State& state, std::string_view name) {
+  const BlockId id = state.layout().Find(name);
+  ALIDADE_EXPECTS(id >= 0);
+  return state.layout()[id];
+}
+
+/// The value of a scalar block. ContractViolation if it is not there.
+inline double ValueOf(const State& state, std::string_view block) {
+  return state.values()[static_cast<std::size_t>(BlockOf(state, block).value_offset)];
+}
+
+/// The covariance of two scalar blocks. ContractViolation if one of them is not there.
+inline double CovarianceOf(const State& state, std::string_view a, std::string_view b) {
+  return state.covariance().Block(BlockOf(state, a).tangent_offset, 1,
+                                  BlockOf(state, b).tangent_offset, 1)(0);
+}
+
+}  // namespace alidade::testing

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/estimation/models.h"
+
+/// Jacobians of models, by the model and by differences, for tests of models.
+namespace alidade::testing {
+
+/// Ambient values of roles or blocks, one after the other.
+using Blocks = std::vector<std::vector<double>>;
+
+/// The tangent size of all spaces together.
+inline int TangentSize(const std::vector<Space>& spaces) {
+  int size = 0;
+  for (const Space& space : spaces) size += space.geometry.tangent;
+  return size;
+}
+
+/// The blocks as models take them; null for an empty one.
+inline std::vector<const double*> Pointers(const Blocks& blocks) {
+  std::vector<const double*> pointers;
+  for (const auto& block : blocks) pointers.push_back(block.empty() ? nullptr : block.data());
+  return pointers;
+}
+inline std::vector<double*> Pointers(Blocks& blocks) {
+  std::vector<double*> pointers;
+  for (auto& block : blocks) pointers.push_back(block.data());
+  return pointers;
+}
+
+/// Blocks that hold `value` everywhere.
+inline Blocks Filled(const std::vector<Space>& spaces, double value) {
+  Blocks blocks;
+  for (const Space& space : spaces) {
+    blocks.emplace_back(static_cast<std::size_t>(space.geometry.ambient), value);
+  }
+  return blocks;
+}
+
+/// d f / d x in the tangent of both, row-major, by central differences through (+) and (-) with one
+/// Richardson step: (4 D(h/2) - D(h)) / 3, whose error is of order h^4 f'''''.
+template <class F>
+std::vector<double> NumericJacobian(const std::vector<Space>& from, const Blocks& x,
+                                    const std::vector<Space>& to, const F& f, double h = 1e-3) {
+  const int rows = TangentSize(to), columns = TangentSize(from);
+  std::vector<double> j(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
+  const Blocks center = f(x);
+  const auto add = [&](std::size_t block, int k, double step, int column, double weight) {
+    Blocks moved = x;
+    std::vector<double> d(static_cast<std::size_t>(from[block].geometry.tangent));
+    d[static_cast<std::size_t>(k)] = step;
+    from[block].geometry.Plus(x[block].data(), d.data(), moved[block].data());
+    const Blocks y = f(moved);
+    int row = 0;
+    for (std::size_t i = 0; i < to.size(); ++i) {
+      std::vector<double> difference(static_cast<std::size_t>(to[i].geometry.tangent));
+      to[i].geometry.Minus(y[i].data(), center[i].data(), difference.data());
+      for (const double element : difference) {
+        j[static_cast<std::size_t>(row++ * columns + column)] += weight * element;
+      }
+    }
+  };
+  int column = 0;
+  for (std::size_t block = 0; block < from.size(); ++block) {
+    for (int k = 0; k < from[block].geometry.tangent; ++k, ++column) {
+      for (const double sign : {1.0, -1.0}) {
+        add(block, k, sign * h / 2, column, sign * 4.0 / (3.0 * h));
+        add(block, k, sign * h, column, -sign / (6.0 * h));
+      }
+    }
+  }
+  return j;
+}
+
+/// An output that a model has to write: not a number everywhere.
+inline std::vector<double> UnwrittenOutput(int size) {
+  return std::vector<double>(static_cast<std::size_t>(size),
+                             std::numeric_limits<double>::quiet_NaN());
+}
+
+/// The Jacobian of h by all roles side by side, m x n row-major, as the model gives it.
+/// ContractViolation if h is not defined there.
+inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Blocks& roles,
+                                          const double* known = nullptr) {
+  const int m = sensor->measurement().geometry.tangent, n = TangentSize(sensor->roles());
+  std::vector<double> z = UnwrittenOutput(sensor->measurement().geometry.ambient),
+                      j = UnwrittenOutput(m * n);
+  std::vector<double*> blocks;
+  int column = 0;
+  for (const Space& role : sensor->roles()) {
+    blocks.push_back(j.data() + column);
+    column += role.geometry.tangent;
+  }
+  const std::vector<int> strides(blocks.size(), n);
+  const Status status =
+      sensor->Linearise(Pointers(roles).data(), z.data(), blocks.data(), strides.data(), known);
+  ALIDADE_EXPECTS(status == Status::kOk);
+  return j;
+}
+
+/// The same by differences. ContractViolation if h is not defined there, or 1e-3 beside it.
+inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, const Blocks& roles,
+                                                 const double* known = nullptr) {
+  const auto predict = [&](const Blocks& x) {
+    Blocks z{UnwrittenOutput(sensor->measurement().geometry.ambient)};
+    const Status status = sensor->Predict(Pointers(x).data(), z[0].data(), known);
+    ALIDADE_EXPECTS(status == Status::kOk);
+    return z;
+  };
+  return NumericJacobian(sensor->roles(), roles, {sensor->measurement()}, predict);
+}
+
+/// A step of a motion model.
+struct StepResult {
+  Blocks next;
+  std::vector<double> f;  ///< d next / d x, n x n row-major
+  std::vector<double> g;  ///< d next / d w, n x n_w row-major
+};
+
+/// A step from x with control input u (null: the model takes none) and noise w (null: zero), with
+/// its Jacobians as the model gives them. ContractViolation if the step is not defined.
+inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
+                                    const double* w, double dt_s) {
+  const int n = motion->tangent_size();
+  StepResult result{Filled(motion->blocks(), std::numeric_limits<double>::quiet_NaN()),
+                    UnwrittenOutput(n * n), UnwrittenOutput(n * motion->noise_size())};
+  const Status status =
+      motion->Step(Pointers(x).data(), u, w, dt_s,
+                   {Pointers(result.next).data(), result.f.data(), result.g.data()});
+  ALIDADE_EXPECTS(status == Status::kOk);
+  return result;
+}
+
+/// The same by differences. ContractViolation if the step is not defined there, or 1e-3 beside it.
+inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const double* u,
+                              const double* w, double dt_s) {
+  Space noise;
+  noise.geometry = Geometry::Vector(motion->noise_size());
+  Blocks noises = Filled({noise}, 0.0);
+  if (w != nullptr) noises[0].assign(w, w + motion->noise_size());
+  const auto step = [&](const Blocks& blocks, const Blocks& drawn) {
+    Blocks next = Filled(motion->blocks(), std::numeric_limits<double>::quiet_NaN());
+    const Status status = motion->Step(Pointers(blocks).data(), u, drawn[0].data(), dt_s,
+                                       {Pointers(next).data(), nullptr, nullptr});
+    ALIDADE_EXPECTS(status == Status::kOk);
+    return next;
+  };
+  const std::vector<Space>& spaces = motion->blocks();
+  return {step(x, noises),
+          NumericJacobian(spaces, x, spaces,
+                          [&](const Blocks& blocks) { return step(blocks, noises); }),
+          NumericJacobian({noise}, noises, spaces,
+                          [&](const Blocks& drawn) { return step(x, drawn); })};
+}
+
+/// max |a_i - b_i| / (1 + |b_i|); infinite if the sizes differ or an element is not a number.
+inline double LargestDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (a.size() != b.size()) return kInfinity;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double difference = std::abs(a[i] - b[i]) / (1.0 + std::abs(b[i]));
+    largest = std::max(largest, std::isnan(difference) ? kInfinity : difference);
+  }
+  return largest;
+}
+
+}  // namespace alidade::testing

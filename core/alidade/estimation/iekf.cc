@@ -189,7 +189,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
     const SensorModel& model = *row->model;
     const SensorPlace& place = *row->place;
     const double* const* const roles = RolesAt(f, *row, iterate_);
-    if (LineariseAt(f, *row, roles) != Outcome::kAccepted) return false;
+    if (LineariseAt(*row, roles) != Outcome::kAccepted) return false;
     for (double& r : row->R) r /= row->weight;
     ComputeInnovation(*row);
     const double* const* const at = RolesAt(f, *row, f.state.values());

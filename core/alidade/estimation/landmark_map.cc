@@ -201,7 +201,7 @@ void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& l
   const Family& family = FamilyOf(row);
   row.own = *row.place;
   row.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(), landmark.blocks);
-  row.place = &row.own;
+  row.Bind(row.own);
   if (landmark.representation != family.representation) row.model = row.binding->xyz.get();
 }
 

@@ -25,7 +25,7 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
   RolesAt(f, row, f.state.values());
   const bool elsewhere =
       (row.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, row);
-  Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(f, row, row.roles.data());
+  Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h = {};
   if (outcome != Outcome::kAccepted) {
     NoteRefusal(f, row, outcome);
@@ -73,7 +73,6 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   }
   const SensorPlace& place = *row.place;
   h_there_.resize(static_cast<std::size_t>(place.ambient));
-  AllocateJacobian(f, row);
   outcome = EvaluateAt(model, place, *row.measurement, at_.data(), {h_there_.data(), row.H.data()});
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
   if (outcome != Outcome::kAccepted) return outcome;
@@ -194,7 +193,11 @@ bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
     }
   }
   f.state.MoveTo(f.moved);  // last: P turns with the tangent planes
-  if (recorded) RecordGain(f, rows, [&](int i, int k) { return update.gain(i, k); });
+  if (recorded) {
+    RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
+      update.CopyGain(kept, column, count, to);
+    });
+  }
   return Outcome::kAccepted;
 }
 

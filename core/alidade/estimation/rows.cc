@@ -39,6 +39,15 @@ void Square(const double* l, int m, double* r) {
 
 }  // namespace
 
+void Row::Bind(const SensorPlace& to) {
+  place = &to;
+  roles_of = nullptr;
+  H.resize(static_cast<std::size_t>(to.dof * to.width));
+  for (std::size_t i = 0; i < to.columns.size(); ++i) {
+    jacobians[i] = to.columns[i] < 0 ? nullptr : H.data() + to.columns[i];
+  }
+}
+
 void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
                    std::optional<Outcome> refused) {
   count_ = 0;
@@ -76,14 +85,13 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   row.sensor = sensor;
   row.binding = &bound;
   row.model = bound.model.get();
-  row.place = &place;
+  if (row.place != &place) row.Bind(place);
   row.z = report.Allocate(2 * ambient + m + 3 * m * m);
   row.h = row.z + ambient;
   row.innovation = row.h + ambient;
   row.s = row.innovation + m;
   row.R = {row.s + m * m, m * m};
   row.root = row.s + 2 * m * m;
-  row.H = {};
   for (std::size_t i = 0; i < ambient; ++i) row.z[i] = measurement.values[i];
   MeasurementReport& entry = report.Add();
   entry.sensor = sensor;
@@ -147,7 +155,10 @@ Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measur
 }
 
 const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x) {
-  RolesAt(*row.place, x.data(), f.state.values().data(), row.roles);
+  const double* const values = f.state.values().data();
+  if (x.data() == values && row.roles_of == values) return row.roles.data();
+  RolesAt(*row.place, x.data(), values, row.roles);
+  row.roles_of = x.data() == values ? values : nullptr;
   return row.roles.data();
 }
 
@@ -155,24 +166,19 @@ Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, 
   return EvaluateAt(*row.model, *row.place, *row.measurement, RolesAt(f, row, x), {.h = h});
 }
 
-void AllocateJacobian(FilterState& f, Row& row) {
-  if (!row.H.empty()) return;
-  const auto size = static_cast<std::size_t>(row.place->dof * row.place->width);
-  row.H = {f.report.Allocate(size), size};
-}
-
-Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
+Outcome LineariseAt(Row& row, const double* const* roles) {
   const SensorPlace& place = *row.place;
   const Measurement& measurement = *row.measurement;
-  AllocateJacobian(f, row);
+  const bool has_noise = !measurement.covariance.empty();
   row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
-  if (!measurement.covariance.empty()) {
+  const Outcome outcome = OutcomeOf(row.model->Evaluate(
+      {measurement.values.data(), measurement.known.data()}, roles,
+      {row.h, row.jacobians.data(), place.strides.data(), has_noise ? nullptr : row.root}));
+  if (has_noise) {
     std::ranges::copy(measurement.covariance, row.R.begin());
-    return EvaluateAt(*row.model, place, measurement, roles, {row.h, row.H.data()});
+  } else {
+    Square(row.root, place.dof, row.R.data());
   }
-  const Outcome outcome =
-      EvaluateAt(*row.model, place, measurement, roles, {row.h, row.H.data(), row.root});
-  Square(row.root, place.dof, row.R.data());
   return outcome;
 }
 
@@ -217,6 +223,14 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
   Workspace::Matrix chained = work.Take(m, size);
   chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
   own = chained;
+}
+
+void RecordGain(FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain) {
+  RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
+    for (int j = column; j < column + count; ++j) {
+      for (const int i : kept) *to++ = gain(i, j);
+    }
+  });
 }
 
 int TotalDof(std::span<Row* const> rows) {

@@ -22,17 +22,21 @@ struct Row {
   int sensor = -1;
   const SensorBinding* binding = nullptr;
   const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
-  const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
+  const SensorPlace* place = nullptr;  ///< the sensor's, or `own`; set by Bind
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
   // Numbers in the memory of the report; m x m, row-major.
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;
-  std::span<double> R;     ///< R
-  std::span<double> H;     ///< H, m rows of the place's width; empty: not evaluated
-  double* root = nullptr;  ///< L of R = L L'
-  Roles roles{};           ///< as RolesAt last had them
-  double weight = 1.0;     ///< w of the robust loss; R is divided by it
-  int column = 0;          ///< its first one in the update, if it passes the gate
+  std::span<double> R;                         ///< R
+  double* root = nullptr;                      ///< L of R = L L'
+  std::vector<double> H;                       ///< H, m rows of the place's width
+  std::array<double*, kMaxRoles> jacobians{};  ///< in H, by role
+  Roles roles{};                               ///< as RolesAt last had them
+  const double* roles_of = nullptr;            ///< the values of the filter, if roles are those
+  double weight = 1.0;                         ///< w of the robust loss; R is divided by it
+  int column = 0;  ///< its first one in the update, if it passes the gate
 
+  /// Gives it another place.
+  void Bind(const SensorPlace& to);
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
   JacobianRows jacobian() const { return {H.data(), place->dof, place->rows}; }
@@ -94,10 +98,8 @@ Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measur
 const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x);
 /// h at x, ambient, in `h`.
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h);
-/// Memory for H, unless it has some.
-void AllocateJacobian(FilterState& f, Row& row);
 /// h at the roles, in the report; H and R, in the row.
-Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles);
+Outcome LineariseAt(Row& row, const double* const* roles);
 /// R at the roles, or as the measurement itself says, in the row.
 Outcome NoiseAt(Row& row, const double* const* roles);
 /// z (-) h of the h in the report, in the report.
@@ -117,24 +119,24 @@ int TotalDof(std::span<Row* const> rows);
 
 /// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
 inline bool GainIsRecorded(const Row& row) { return !row.place->has_landmark; }
-/// Puts gain(i, j), row i of P and column j of the update, into the reports of its rows.
-template <class Gain>
-void RecordGain(FilterState& f, std::span<Row* const> rows, const Gain& gain) {
+/// Gives the reports of the rows their columns of K: copy(rows of P, column, count, to).
+template <class Copy>
+void RecordGainBy(FilterState& f, std::span<Row* const> rows, const Copy& copy) {
   const std::vector<int>& kept = f.blocks.gain_rows;
   int column = 0;
   for (const Row* row : rows) {
-    const int end = column + row->report->dof;
+    const int m = row->place->dof;
     if (GainIsRecorded(*row)) {
-      const std::size_t count = kept.size() * static_cast<std::size_t>(row->report->dof);
-      double* at = f.report.Allocate(count);
-      row->report->gain = {at, count};
-      for (int j = column; j < end; ++j) {
-        for (const int i : kept) *at++ = gain(i, j);
-      }
+      const std::size_t count = kept.size() * static_cast<std::size_t>(m);
+      double* const to = f.report.Allocate(count);
+      row->report->gain = {to, count};
+      copy(kept, column, m, to);
     }
-    column = end;
+    column += m;
   }
 }
+/// The same of K as a matrix.
+void RecordGain(FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain);
 
 struct Stacked {
   Workspace::Matrix h, noise;    ///< H (m x n), R (m x m)

@@ -54,6 +54,14 @@ Solution KalmanUpdate::Solve(std::span<const MeasurementRows> measurements, bool
   return Kernels::For(kernels_->solve, update_.m)(update_);
 }
 
+void KalmanUpdate::CopyGain(std::span<const int> rows, int column, int count, double* to) const {
+  const int height = update_.panel_rows;
+  for (int j = column; j < column + count; ++j) {
+    const double* const first = update_.gain + std::ptrdiff_t{j} * height;
+    for (const int i : rows) *to++ = i < height ? first[i] : update_.At(update_.gain, i, j);
+  }
+}
+
 void KalmanUpdate::CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const {
   const Eigen::Index n = update_.p.size, height = update_.panel_rows;
   for (Eigen::Index i = 0; i < n; i += height) {

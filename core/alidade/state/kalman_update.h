@@ -39,6 +39,8 @@ class KalmanUpdate {
   }
   /// K, if it was wanted.
   double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
+  /// Elements of K, if it was wanted: of some rows in `count` columns, by columns.
+  void CopyGain(std::span<const int> rows, int column, int count, double* to) const;
   /// Columns of P H' before Solve, of W after it: n x their number.
   void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const;
   double w(int i, int j) const { return update_.At(update_.w, i, j); }

@@ -16,6 +16,8 @@ class Method {
   /// With all that it carries besides x and P.
   virtual std::unique_ptr<Method> Clone() const = 0;
 
+  /// The square root of P that it carries; null: none.
+  virtual const Eigen::MatrixXd* Root() const { return nullptr; }
   /// Takes over x and P as they are at the start.
   virtual void Begin(FilterState& /*f*/) {}
   /// Moves x and P by dt_s: all of it or nothing, and why.

@@ -50,7 +50,7 @@ class SquareRoot : public Method {
   double ComputeS(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
-  const Eigen::MatrixXd& root() const { return root_; }
+  const Eigen::MatrixXd* Root() const override { return &root_; }
 
  private:
   void SetCovariance(FilterState& f) const;
@@ -170,9 +170,9 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
 }
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
-  const auto* const method = dynamic_cast<const internal::SquareRoot*>(&*loop().method);
-  ALIDADE_EXPECTS(method != nullptr);
-  return method->root();
+  const Eigen::MatrixXd* const root = loop().method->Root();
+  ALIDADE_EXPECTS(root != nullptr);
+  return *root;
 }
 
 }  // namespace alidade

@@ -72,7 +72,7 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
 }
 
 /// The estimator alone over frames that were made before, so that its own time is taken.
-Outcome RunOne(alidade::NamedEstimator& named, const std::vector<alidade::SourceFrame>& frames,
+Outcome RunOne(alidade::EstimatorSpec& named, const std::vector<alidade::SourceFrame>& frames,
                std::size_t truth) {
   Outcome outcome;
   alidade::Estimator& estimator = *named.estimator;
@@ -105,7 +105,7 @@ std::map<std::string, Outcome> RunAll(const alidade::Config& config,
   const auto& truths = experiment.source->truths();
   const auto at = std::ranges::find(truths, "cam.position", &alidade::StreamInfo::name);
   std::map<std::string, Outcome> outcomes;
-  for (alidade::NamedEstimator& named : experiment.estimators) {
+  for (alidade::EstimatorSpec& named : experiment.estimators) {
     outcomes[named.name] = RunOne(named, frames, static_cast<std::size_t>(at - truths.begin()));
   }
   return outcomes;

@@ -184,7 +184,7 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
   int count = 0;
   for (SourceFrame frame; experiment.source->Next(frame); ++count) {
     std::vector<double> values;
-    for (const NamedEstimator& named : experiment.estimators) {
+    for (const EstimatorSpec& named : experiment.estimators) {
       named.estimator->Process(frame);
       const State& state = named.estimator->state();
       values.push_back(*state.value(state.layout().Find(block)));

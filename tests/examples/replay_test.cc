@@ -47,7 +47,7 @@ class Recording : public RunObserver {
   explicit Recording(int every) : every_(every) {}
 
   void Begin(const Experiment& experiment) override {
-    for (const NamedEstimator& one : experiment.estimators) series_.push_back({one.name, 0, {}});
+    for (const EstimatorSpec& one : experiment.estimators) series_.push_back({one.name, 0, {}});
     system_blocks_ = experiment.estimators.front().system.layout.blocks().size();
   }
   void OnEstimate(int estimator, const SourceFrame& /*frame*/, const State& state,

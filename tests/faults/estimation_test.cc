@@ -112,7 +112,7 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
 // FAULTS 75: the exit code, and the others go on.
 TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator named;
+  EstimatorSpec named;
   named.name = "indefinite";
   named.system = TwoElements(Indefinite(), 0.1);
   named.system.sensors[0].stream = "inverse_scale";

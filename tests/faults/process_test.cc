@@ -24,7 +24,7 @@ Result Finish(Experiment& experiment) {
   const RunResult run = Run(experiment, {});
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   Result result;
-  for (const NamedEstimator& named : experiment.estimators) {
+  for (const EstimatorSpec& named : experiment.estimators) {
     const State& state = named.estimator->state();
     result.values.insert(result.values.end(), state.values().begin(), state.values().end());
     const Eigen::MatrixXd p = state.covariance().Dense();

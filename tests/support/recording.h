@@ -76,7 +76,7 @@ inline Experiment MakeExperiment(int frames = 60) {
   Experiment experiment;
   experiment.source = std::make_unique<SwingingTarget>(frames);
   for (const char* name : {"ekf", "alone"}) {
-    NamedEstimator named;
+    EstimatorSpec named;
     named.name = name;
     named.type = "ekf";
     named.system = DepthFilter();

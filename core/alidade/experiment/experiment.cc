@@ -4,9 +4,9 @@
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/filter.h"
+#include "alidade/experiment/build_estimator.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_guide.h"
-#include "alidade/experiment/named_estimator.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
 #include "alidade/experiment/source_plugin.h"
@@ -71,7 +71,7 @@ void CheckTruths(const Node& source, const Experiment& experiment, const System&
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const auto node = listed->Find(truths[t].name);
-    const auto has_block = [&](const NamedEstimator& one) {
+    const auto has_block = [&](const EstimatorSpec& one) {
       return internal::WhyNoBlock(one.system.layout, truths, t).empty();
     };
     const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
@@ -119,11 +119,11 @@ std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const System& s
 }
 
 /// Index of the estimator that metrics compare with; -1: truth.
-int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimators) {
+int ReadReference(const Node& root, const std::vector<EstimatorSpec>& estimators) {
   const auto reference = root.Find("reference");
   if (!reference || reference->Text() == "truth") return -1;
   const std::string name = reference->Text();
-  const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
+  const auto found = std::ranges::find(estimators, name, &EstimatorSpec::name);
   if (found == estimators.end()) {
     std::vector<std::string> names = NamesOf(estimators);
     const std::string expected = "truth, or an estimator: " + internal::Join(names);
@@ -134,9 +134,9 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
 }
 
 /// What may stand under `guide`: the recursive filters of the config.
-std::string GuidesOf(const std::vector<NamedEstimator>& estimators) {
+std::string GuidesOf(const std::vector<EstimatorSpec>& estimators) {
   std::vector<std::string> names;
-  for (const NamedEstimator& one : estimators) {
+  for (const EstimatorSpec& one : estimators) {
     if (dynamic_cast<const Filter*>(one.estimator.get()) != nullptr) names.push_back(one.name);
   }
   return names.empty() ? "none, for `estimators` has no recursive filter, as of type ekf"
@@ -152,8 +152,8 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
     guide.Fail("a filter that guides has to process each frame before the next is measured",
                "out_of_sequence: {policy: reject}");
   }
-  const std::vector<NamedEstimator>& estimators = experiment.estimators;
-  const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
+  const std::vector<EstimatorSpec>& estimators = experiment.estimators;
+  const auto found = std::ranges::find(estimators, name, &EstimatorSpec::name);
   if (found == estimators.end()) {
     const std::vector<std::string> names = NamesOf(estimators);
     guide.Fail("no estimator '" + name + "'", GuidesOf(estimators), Nearest(name, names));

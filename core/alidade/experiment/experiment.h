@@ -28,8 +28,8 @@ enum class OnDivergence { kReport, kFail };
 /// from then on, once every sensor of the estimator on it has failed; the run ends.
 enum class OnPluginFailure { kSkip, kDisable, kAbort };
 
-/// One estimator of a run, on its own system (the config with the estimator's overrides merged in).
-struct NamedEstimator {
+/// One estimator to be run, on its own system (the config with the estimator's overrides merged in).
+struct EstimatorSpec {
   std::string name;
   std::string type;
   EstimatorKind kind = EstimatorKind::kFilter;
@@ -72,7 +72,7 @@ struct OutOfSequencePolicy {
 /// All that a config describes, made and checked, ready to run.
 struct Experiment {
   std::unique_ptr<Source> source;
-  std::vector<NamedEstimator> estimators;
+  std::vector<EstimatorSpec> estimators;
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;

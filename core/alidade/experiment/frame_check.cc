@@ -24,11 +24,11 @@ void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<dou
 
 /// What the models of the experiment say of a stream.
 Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
-  for (const NamedEstimator& named : experiment.estimators) {
-    for (const SensorBinding& sensor : named.system.sensors) {
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    for (const SensorBinding& sensor : spec.system.sensors) {
       if (sensor.stream == stream.name) return sensor.model->measurement().geometry;
     }
-    for (const MotionBinding& motion : named.system.motions) {
+    for (const MotionBinding& motion : spec.system.motions) {
       if (motion.input.stream == stream.name) return motion.model->input().geometry;
     }
   }
@@ -46,12 +46,12 @@ FrameCheck::FrameCheck(const Experiment& experiment, Counts& normalised)
   for (const StreamInfo& truth : truths) {
     truths_.push_back({truth, Geometry::Vector(truth.size)});
   }
-  for (const NamedEstimator& named : experiment.estimators) {
-    const std::vector<int> match = MatchTruths(named.system.layout, truths);
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    const std::vector<int> match = MatchTruths(spec.system.layout, truths);
     for (std::size_t block = 0; block < match.size(); ++block) {
       if (match[block] < 0) continue;
       truths_[static_cast<std::size_t>(match[block])].geometry =
-          named.system.layout.blocks()[block].geometry();
+          spec.system.layout.blocks()[block].geometry();
     }
   }
 }

@@ -26,7 +26,7 @@ std::string In(const Place& place) {
 FrameOrder::FrameOrder(Experiment& experiment, Check check)
     : experiment_(experiment), check_(std::move(check)), guide_(experiment) {
   if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
-  for (const NamedEstimator& named : experiment.estimators) {
+  for (const EstimatorSpec& named : experiment.estimators) {
     std::optional<Snapshots>& snapshots = snapshots_.emplace_back();
     if (!named.estimator->offline()) snapshots.emplace(*named.estimator);
   }

@@ -3,17 +3,17 @@
 
 #include <utility>
 
-#include "alidade/experiment/named_estimator.h"
+#include "alidade/experiment/build_estimator.h"
 
 namespace alidade {
 
 std::unique_ptr<Filter> MakeFilter(const Config& config, const PluginHost& host,
                                    const std::string& name) {
   const Node entry = config.root().At("estimators", "a filter").At(name, "MakeFilter");
-  NamedEstimator named = internal::BuildEstimator(name, entry, config, host, nullptr, {});
-  auto* const filter = dynamic_cast<Filter*>(named.estimator.get());
+  EstimatorSpec spec = internal::BuildEstimator(name, entry, config, host, nullptr, {});
+  auto* const filter = dynamic_cast<Filter*>(spec.estimator.get());
   if (filter == nullptr) {
-    entry.At("type").Fail("'" + named.type + "' is not a recursive filter",
+    entry.At("type").Fail("'" + spec.type + "' is not a recursive filter",
                           "ekf, iekf, square_root_ekf or ukf");
   }
   return std::make_unique<Filter>(std::move(*filter));

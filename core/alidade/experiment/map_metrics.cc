@@ -33,9 +33,9 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
   return metrics;
 }
 
-void internal::NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result) {
-  if (!named.system.landmarks) return;
-  result.landmarks = named.estimator->landmarks();
+void internal::NoteMap(const EstimatorSpec& spec, const Source& source, EstimatorResult& result) {
+  if (!spec.system.landmarks) return;
+  result.landmarks = spec.estimator->landmarks();
   for (std::vector<LandmarkEstimate>* map : {&*result.landmarks, &result.removed_landmarks}) {
     for (LandmarkEstimate& landmark : *map) {
       const auto position = source.TrueLandmark(landmark.id);

@@ -19,7 +19,7 @@ namespace alidade::internal {
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
 /// The landmarks at the end and their metrics, in `result`; of these and of those removed before
-/// the true places that `source` knows. Nothing where `named` has none.
-void NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result);
+/// the true places that `source` knows. Nothing if `spec` has none.
+void NoteMap(const EstimatorSpec& spec, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

@@ -291,12 +291,12 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
   const auto add = [&](const std::string& name) {
     if (std::ranges::count(subjects, name) == 0) subjects.push_back(name);
   };
-  for (const NamedEstimator& named : experiment.estimators) {
-    for (const Block& block : named.system.layout.blocks()) {
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    for (const Block& block : spec.system.layout.blocks()) {
       add(block.name);
       add(block.owner);
     }
-    for (const SensorBinding& sensor : named.system.sensors) add(sensor.name);
+    for (const SensorBinding& sensor : spec.system.sensors) add(sensor.name);
   }
   return subjects;
 }

@@ -431,25 +431,25 @@ void Metrics::Impl::WriteBounds(std::map<std::string, double>& metrics) const {
   }
 }
 
-Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& truths,
+Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truths,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
-  impl_->Track(named.system, truths);
-  impl_->FindImplied(named.system, truths);
-  impl_->sensors = internal::NamesOf(named.system.sensors);
-  impl_->path = internal::PositionBlockOf(named.system);
-  impl_->motions = internal::NamesOf(named.system.motions);
-  impl_->has_landmarks = named.system.landmarks.has_value();
+  impl_->Track(spec.system, truths);
+  impl_->FindImplied(spec.system, truths);
+  impl_->sensors = internal::NamesOf(spec.system.sensors);
+  impl_->path = internal::PositionBlockOf(spec.system);
+  impl_->motions = internal::NamesOf(spec.system.motions);
+  impl_->has_landmarks = spec.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
-      named.system.sensors, [](const SensorBinding& s) { return s.outlier_rejection.has_value(); });
-  for (std::size_t s = 0; s < named.system.sensors.size(); ++s) {
-    if (!internal::HasReprojection(named.system.sensors[s])) continue;
+      spec.system.sensors, [](const SensorBinding& s) { return s.outlier_rejection.has_value(); });
+  for (std::size_t s = 0; s < spec.system.sensors.size(); ++s) {
+    if (!internal::HasReprojection(spec.system.sensors[s])) continue;
     impl_->reprojection[static_cast<int>(s)] = {};
   }
   impl_->count_of.resize(impl_->sensors.size());
   impl_->far.resize(impl_->sensors.size());
-  const bool filters = named.estimator == nullptr || !named.estimator->offline();
-  for (const SensorBinding& sensor : named.system.sensors) {
+  const bool filters = spec.estimator == nullptr || !spec.estimator->offline();
+  for (const SensorBinding& sensor : spec.system.sensors) {
     const Geometry& measured = sensor.model->measurement().geometry;
     impl_->angle.push_back(measured.kind == GeometryKind::kAngle);
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;

@@ -54,7 +54,7 @@ namespace alidade {
 class Metrics {
  public:
   /// `truths` are those of the source, or the blocks of an estimator that stands for them.
-  Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& truths,
+  Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truths,
           const std::vector<Segment>& segments);
   ~Metrics();
   Metrics(Metrics&&) noexcept;

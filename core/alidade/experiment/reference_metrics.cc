@@ -25,12 +25,12 @@ std::vector<StreamInfo> BlocksOf(const System& system) {
 }
 
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
-                    const std::vector<Seen>& seen, Metrics& metrics) {
+                    const std::vector<FrameWithSegments>& seen, Metrics& metrics) {
   std::vector<const Estimate*> at(seen.size(), nullptr);
   for (const Estimate& one : reference) at[one.frame] = &one;
   for (const Estimate& one : estimates) {
     if (at[one.frame] == nullptr) continue;
-    const Seen& frame = seen[one.frame];
+    const FrameWithSegments& frame = seen[one.frame];
     std::vector<std::vector<double>> known = at[one.frame]->values;
     for (std::vector<double>& value : known) {
       if (!AllFinite(value)) value.clear();

@@ -21,7 +21,7 @@ struct Estimate {
 std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks);
 
 /// A frame of a run, and which segments it is in.
-struct Seen {
+struct FrameWithSegments {
   SourceFrame frame;
   std::vector<bool> in_segment;
 };
@@ -30,6 +30,6 @@ struct Seen {
 /// those of the reference at the same frames of `seen`. A value of the reference that is not finite
 /// counts as unknown.
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
-                    const std::vector<Seen>& seen, Metrics& metrics);
+                    const std::vector<FrameWithSegments>& seen, Metrics& metrics);
 
 }  // namespace alidade::internal

@@ -4,17 +4,16 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
-#include <span>
 
 #include "alidade/base/number_text.h"
 #include "alidade/experiment/accepted_data.h"
+#include "alidade/experiment/diagnosis.h"
+#include "alidade/experiment/estimator_run.h"
 #include "alidade/experiment/frame_check.h"
 #include "alidade/experiment/frame_order.h"
-#include "alidade/experiment/map_metrics.h"
 #include "alidade/experiment/metrics.h"
 #include "alidade/experiment/reference_metrics.h"
 #include "alidade/experiment/run_log.h"
-#include "alidade/experiment/running_estimator.h"
 
 namespace alidade {
 namespace {
@@ -31,8 +30,8 @@ bool InSegment(const Segment& segment, const Frame& frame) {
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
 
-using internal::Running;
-using internal::Seen;
+using internal::EstimatorRun;
+using internal::FrameWithSegments;
 using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
@@ -54,14 +53,15 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
 
 /// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
 /// where the whole run has to end.
-bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source& source,
-             const ProcessedFrame* passed, const RunOptions& options, RunResult& result) {
-  one.last = nullptr;
-  if (one.ended) return true;
-  Estimator& estimator = *one.named.estimator;
+bool Advance(EstimatorRun& one, const FrameWithSegments& seen, const Frame& visible,
+             const Source& source, const ProcessedFrame* passed, const RunOptions& options,
+             RunResult& result) {
+  one.last_report = nullptr;
+  if (one.finished) return true;
+  Estimator& estimator = *one.spec.estimator;
   Frame rest;
   const bool all = one.failed_sensors.empty();
-  if (!all) rest = WithoutFailed(one, visible, source.streams());
+  if (!all) rest = one.WithoutFailed(visible, source.streams());
   const auto started = Clock::now();
   const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
   if (!passed) {
@@ -71,51 +71,51 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
                            std::plus<>());
     for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
   }
-  one.last = &report;
-  one.ended = (passed ? *passed->after : estimator).failed();
+  one.last_report = &report;
+  one.finished = (passed ? *passed->after : estimator).failed();
   one.diverged = (passed ? *passed->after : estimator).diverged();
-  one.Note(report.events);
-  if (!one.ended && !estimator.offline()) {
+  one.AddEvents(report.events);
+  if (!one.finished && !estimator.offline()) {
     const auto takes_since = Clock::now();
-    one.Take(static_cast<std::size_t>(result.frames), seen,
-             (passed ? *passed->after : estimator).state(), report, options);
+    one.AddEstimate(static_cast<std::size_t>(result.frames), seen,
+                    (passed ? *passed->after : estimator).state(), report, options);
     one.result.record_s += SecondsSince(takes_since);
   }
-  if (const std::string why = one.TakeFailures(report); !why.empty()) {
+  if (const std::string why = one.HandleFailures(report); !why.empty()) {
     if (result.status == RunStatus::kOk) {
       Fail(result, ExitCode::kPlugin,
-           "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+           "estimator '" + one.spec.name + "'" + At(seen.frame) + ": " + why);
     }
     return false;
   }
-  const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
-  if (!one.ended && !policy) return true;
+  const bool policy = one.spec.on_divergence == OnDivergence::kFail && one.diverged;
+  if (!one.finished && !policy) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = Cause(report.events, "diverged");
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+         "estimator '" + one.spec.name + "'" + At(seen.frame) + ": " + why);
   }
   return !policy;
 }
 
 /// The measurements of the frame that filter `by`, which has had what it sees of it, accepted.
-Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame,
+Frame AcceptedBy(int by, const std::vector<EstimatorRun>& running, const Frame& frame,
                  const Source& source) {
-  const Running& filter = running[static_cast<std::size_t>(by)];
-  const int before = filter.named.accepted_by;
+  const EstimatorRun& filter = running[static_cast<std::size_t>(by)];
+  const int before = filter.spec.accepted_by;
   return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
-                              source.streams(), filter.named.system,
-                              filter.last ? *filter.last : UpdateReport());
+                              source.streams(), filter.spec.system,
+                              filter.last_report ? *filter.last_report : UpdateReport());
 }
 
 /// The next frame, as the experiment's OutOfSequencePolicy has it; false at the end. What became of
 /// others on the way is noted.
-bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunResult& result,
+bool NextFrame(internal::FrameOrder& frames, std::vector<EstimatorRun>& running, RunResult& result,
                SourceFrame& frame) {
   const auto note = [&] {
     result.arrivals = frames.arrivals();
     const std::vector<Event> events = frames.TakeEvents();
-    for (Running& one : running) one.Note(events);
+    for (EstimatorRun& one : running) one.AddEvents(events);
   };
   try {
     const bool more = frames.Next(frame);
@@ -129,13 +129,14 @@ bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunR
 
 /// The frames one by one through all estimators. They are kept where an estimator is offline or
 /// metrics wait for one.
-void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
-               RunResult& result, std::vector<Seen>& kept) {
-  Seen seen;
+void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& running,
+               const RunOptions& options, RunResult& result, std::vector<FrameWithSegments>& kept) {
+  FrameWithSegments seen;
   seen.in_segment.resize(experiment.segments.size());
   const std::int64_t size = experiment.source->size();
-  const bool keep = std::ranges::any_of(
-      running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
+  const bool keep = std::ranges::any_of(running, [](const EstimatorRun& one) {
+    return one.needs_reference || one.spec.estimator->offline();
+  });
   internal::FrameCheck check(experiment, result.normalised);
   internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
   while (NextFrame(frames, running, result, seen.frame)) {
@@ -147,7 +148,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
-      const int by = running[e].named.accepted_by;
+      const int by = running[e].spec.accepted_by;
       Frame accepted;
       if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
       go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, *experiment.source,
@@ -155,7 +156,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
               go_on;
     }
     ++result.frames;
-    if (!go_on || std::ranges::all_of(running, &Running::ended)) return;
+    if (!go_on || std::ranges::all_of(running, &EstimatorRun::finished)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
       if (result.status != RunStatus::kOk) return;
@@ -169,7 +170,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
 }
 
 /// The metrics of the estimator; where memory, say, does not last for them, the rest is kept.
-void Measure(Running& one, RunResult& result) {
+void Measure(EstimatorRun& one, RunResult& result) {
   try {
     one.result.metrics = one.metrics.Finish();
   } catch (...) {
@@ -179,27 +180,27 @@ void Measure(Running& one, RunResult& result) {
 }
 
 /// The smoothing of `one` was stopped; the others keep theirs.
-void NoteStop(Running& one, const char* why, RunResult& result) {
-  one.Note({{one.named.estimator->timestamp(), "stopped", why}});
+void NoteStop(EstimatorRun& one, const char* why, RunResult& result) {
+  one.AddEvents({{one.spec.estimator->timestamp(), "stopped", why}});
   if (result.status != RunStatus::kOk) return;
   result.status = RunStatus::kStopped;
   result.code = ExitCode::kStopped;
-  result.reason = "estimator '" + one.named.name + "': " + why;
+  result.reason = "estimator '" + one.spec.name + "': " + why;
 }
 
 /// The estimates of those that needed all frames.
-void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
+void SmoothAll(std::vector<EstimatorRun>& running, const std::vector<FrameWithSegments>& kept,
                const RunOptions& options, RunResult& result) {
-  for (Running& one : running) {
-    Estimator& estimator = *one.named.estimator;
-    if (one.ended || !estimator.offline()) continue;
+  for (EstimatorRun& one : running) {
+    Estimator& estimator = *one.spec.estimator;
+    if (one.finished || !estimator.offline()) continue;
     std::vector<Event> events;
     auto works_since = Clock::now();  // rather than the record and the metrics
     try {
       estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
         one.result.wall_s += SecondsSince(works_since);
-        one.Take(k, kept[k], state, report, options);
+        one.AddEstimate(k, kept[k], state, report, options);
         events = report.events;
         works_since = Clock::now();
       });
@@ -213,19 +214,19 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
       if (!estimator.failed()) throw;  // it is the record, say, that failed
       events.push_back({estimator.timestamp(), "failed", e.what()});
     }
-    one.ended = estimator.failed();
-    one.Note(events);
-    if (!one.ended || result.status == RunStatus::kFailed) continue;
+    one.finished = estimator.failed();
+    one.AddEvents(events);
+    if (!one.finished || result.status == RunStatus::kFailed) continue;
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + one.named.name + "': " + Cause(events, "failed"));
+         "estimator '" + one.spec.name + "': " + Cause(events, "failed"));
   }
 }
 
 /// Why the estimates of a reference are of no use to compare with; "": they are of use.
-std::string WhyNoReference(const Running& reference) {
-  const Estimator& estimator = *reference.named.estimator;
+std::string WhyNoReference(const EstimatorRun& reference) {
+  const Estimator& estimator = *reference.spec.estimator;
   const char* why = nullptr;
-  if (reference.ended || estimator.failed()) {
+  if (reference.finished || estimator.failed()) {
     why = "failed";
   } else if (reference.diverged || estimator.diverged()) {
     why = "diverged";
@@ -233,66 +234,20 @@ std::string WhyNoReference(const Running& reference) {
     why = "has no estimates";
   }
   if (why == nullptr) return "";
-  return "no reference: estimator '" + reference.named.name + "' " + why +
+  return "no reference: estimator '" + reference.spec.name + "' " + why +
          ", the comparison with it is withheld";
 }
 
 /// The metrics that waited for the estimates of the reference; what does not last for them is kept.
-void Compare(std::vector<Running>& running, int index, const std::vector<Seen>& kept,
-             RunResult& result) {
-  const Running& reference = running[static_cast<std::size_t>(index)];
+void Compare(std::vector<EstimatorRun>& running, int index,
+             const std::vector<FrameWithSegments>& kept, RunResult& result) {
+  const EstimatorRun& reference = running[static_cast<std::size_t>(index)];
   result.withheld = WhyNoReference(reference);
   if (!result.withheld.empty()) return;
-  for (Running& one : running) {
+  for (EstimatorRun& one : running) {
     if (one.index == index) continue;
     internal::AddDifferences(one.estimates, reference.estimates, kept, one.metrics);
   }
-}
-
-/// All estimators of the experiment before their first frame.
-std::vector<Running> BeginAll(Experiment& experiment) {
-  const int reference = experiment.reference;
-  std::vector<StreamInfo> truths = experiment.source->truths();
-  for (std::size_t t = 0; t < experiment.truth_sigmas.size(); ++t)
-    truths.at(t).sigma = experiment.truth_sigmas[t];
-  if (reference >= 0) {
-    truths = internal::BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].system);
-  }
-  std::vector<Running> running;
-  for (NamedEstimator& named : experiment.estimators) {
-    const int index = static_cast<int>(running.size());
-    Metrics metrics(named, index == reference ? std::vector<StreamInfo>() : truths,
-                    experiment.segments);
-    running.push_back({named, index, std::move(metrics), internal::Begin(named)});
-    running.back().waits = reference >= 0;
-  }
-  return running;
-}
-
-/// Notes of `one` what the whole run shows, and puts its result behind those before it.
-void Conclude(Running& one, const std::vector<Running>& running, const Experiment& experiment,
-              RunResult& result) {
-  Measure(one, result);
-  one.result.counts = one.metrics.counts();
-  if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
-  one.result.units = one.metrics.units();
-  const std::size_t before = one.result.events.size();
-  internal::NoteMap(one.named, *experiment.source, one.result);
-  const Estimator& estimator = *one.named.estimator;
-  if (one.took && !estimator.failed()) {
-    const int by = one.named.accepted_by;
-    internal::NoteUnused(one.named.system,
-                         by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
-                         one.result);
-    if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
-  }
-  internal::NoteUnits(one.named.system, one.metrics, one.result);
-  if (one.took && !estimator.failed()) internal::NoteConsistency(one.result);
-  internal::LogEvents(one.named.name, std::span(one.result.events).subspan(before));
-  one.Note(one.metrics.events());
-  one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
-  one.result.inconsistent = !one.metrics.events().empty();
-  one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
 }
 
 }  // namespace
@@ -315,8 +270,8 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   if (reference >= 0) {
     result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;
   }
-  std::vector<Running> running;
-  std::vector<Seen> kept;
+  std::vector<EstimatorRun> running;
+  std::vector<FrameWithSegments> kept;
   const auto guarded = [&result](const auto& call) {
     try {
       call();
@@ -330,18 +285,21 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     }
   };
   guarded([&] {
-    running = BeginAll(experiment);
+    running = internal::BeginAll(experiment);
     for (RunObserver* const observer : options.observers) observer->Begin(experiment);
     internal::LogExperiment(experiment);
-    for (const Running& one : running) internal::LogEvents(one.named.name, one.result.events);
+    for (const EstimatorRun& one : running) internal::LogEvents(one.spec.name, one.result.events);
     RunFrames(experiment, running, options, result, kept);
     SmoothAll(running, kept, options, result);
   });
   if (reference >= 0 && !running.empty()) {
     guarded([&] { Compare(running, reference, kept, result); });
   }
-  for (Running& one : running) {
-    guarded([&] { Conclude(one, running, experiment, result); });
+  for (EstimatorRun& one : running) {
+    guarded([&] {
+      Measure(one, result);
+      internal::Diagnose(experiment, one);
+    });
     result.estimators.push_back(std::move(one.result));
   }
   internal::LogDurations(result);

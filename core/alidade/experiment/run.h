@@ -25,9 +25,15 @@ enum class RunStatus { kOk, kStopped, kFailed };
 /// `ok`, `stopped`, `failed`, as in run.json.
 const char* ToString(RunStatus status);
 
-/// What became of one estimator.
+/// One estimator and its outcome, at the end of a run.
 struct EstimatorResult {
-  std::string name;
+  std::string name, type;
+  EstimatorKind kind = EstimatorKind::kFilter;
+  bool smoothed = false;    ///< its estimates depend on later data too
+  std::string accepted_by;  ///< the estimator that chose its measurements, or ""
+  std::string overrides;    ///< of the config, as YAML, or ""
+  std::vector<std::string> sensors;
+  std::string position_block;  ///< the block of a position that landmarks are seen from, or ""
   std::map<std::string, double> metrics;       ///< as in docs/metrics.md
   std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
   std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some

@@ -17,10 +17,10 @@ void LogExperiment(const Experiment& experiment) {
   Log(LogLevel::kInfo, "source: streams " + OrNone(Join(NamesOf(experiment.source->streams()))) +
                            "; truth " + OrNone(Join(NamesOf(experiment.source->truths()))) +
                            "; seed " + std::to_string(experiment.seed));
-  for (const NamedEstimator& named : experiment.estimators) {
-    Log(LogLevel::kInfo, named.name + ": type " + named.type + "; sensors " +
-                             OrNone(Join(NamesOf(named.system.sensors))) + "; blocks " +
-                             OrNone(Join(NamesOf(named.system.layout.blocks()))));
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    Log(LogLevel::kInfo, spec.name + ": type " + spec.type + "; sensors " +
+                             OrNone(Join(NamesOf(spec.system.sensors))) + "; blocks " +
+                             OrNone(Join(NamesOf(spec.system.layout.blocks()))));
   }
 }
 

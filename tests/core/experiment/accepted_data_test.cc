@@ -39,8 +39,8 @@ class WithOutliers : public SwingingTarget {
   std::size_t next_ = 0;
 };
 
-NamedEstimator MakeEkf(const std::string& name, double gate) {
-  NamedEstimator named;
+EstimatorSpec MakeEkf(const std::string& name, double gate) {
+  EstimatorSpec named;
   named.name = name;
   named.type = "ekf";
   named.system = DepthFilter();
@@ -114,7 +114,7 @@ Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
                      std::vector<Frame> frames) {
   Experiment experiment;
   for (int i = 0; i < 3; ++i) {
-    NamedEstimator& named = experiment.estimators.emplace_back();
+    EstimatorSpec& named = experiment.estimators.emplace_back();
     named.name = "ekf" + std::to_string(i);
     named.system = system;
     EkfOptions options;
@@ -194,7 +194,7 @@ struct Once : Ekf {
 // The frame at which the filter ended still counts: it accepted what came.
 TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
   Experiment experiment = MakeFiltered(false);
-  NamedEstimator& filter = experiment.estimators[0];
+  EstimatorSpec& filter = experiment.estimators[0];
   filter.estimator = std::make_unique<Once>(filter.system, EkfOptions{}, StreamsOf(filter.system));
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.frames, kFrames);
@@ -204,7 +204,7 @@ TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
 
 TEST(AcceptedBy, ASensorOfWhichTheFilterTookNothingIsNamed) {
   Experiment experiment = MakeFiltered(false);
-  NamedEstimator& filter = experiment.estimators[0];
+  EstimatorSpec& filter = experiment.estimators[0];
   EkfOptions options;
   options.gate = 1e-9;
   options.rejection_recovery = RejectionRecovery::kNone;

@@ -202,13 +202,13 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
   std::vector<Timestamp> ends;
   const auto run = [&ends](std::vector<SourceFrame> given, OutOfSequence order) {
     Experiment experiment = MakeGiven(std::move(given), order);
-    NamedEstimator& alone = experiment.estimators[1];
+    EstimatorSpec& alone = experiment.estimators[1];
     alone.system.priors[0].mean = {-0.2};
     alone.on_divergence = OnDivergence::kFail;
     alone.estimator =
         std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
     const RunResult result = alidade::Run(experiment, {});
-    for (const NamedEstimator& one : experiment.estimators) {
+    for (const EstimatorSpec& one : experiment.estimators) {
       ends.push_back(one.estimator->timestamp());
     }
     return result;
@@ -247,7 +247,7 @@ TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
   for (int k = 0; k < 8; ++k) frames.push_back(GivenAt(0.05 * k, {{0, 80.0 - k}, {1, 1.0}}));
   const auto run = [&frames](OutOfSequence order, std::vector<std::string>& log) {
     Experiment experiment = MakeGiven(frames, order);
-    NamedEstimator& named = experiment.estimators[1];
+    EstimatorSpec& named = experiment.estimators[1];
     named.system.priors[0].mean = {-0.2};
     auto mortal =
         std::make_unique<Mortal>(named.system, EkfOptions{}, experiment.source->streams());
@@ -305,7 +305,7 @@ TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.05, {{1, 1.0}}),
                                      GivenAt(0.1, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
-  NamedEstimator& named = experiment.estimators[0];
+  EstimatorSpec& named = experiment.estimators[0];
   auto watching =
       std::make_unique<Watching>(named.system, EkfOptions{}, experiment.source->streams());
   const auto seen = watching->timestamps;
@@ -333,7 +333,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}}),
                                      GivenAt(0.04, {{1, 1.0}}), GivenAt(0.06, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
-  NamedEstimator& named = experiment.estimators[1];
+  EstimatorSpec& named = experiment.estimators[1];
   auto throwing =
       std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
   throwing->at = TimestampFromSeconds(0.04);
@@ -343,7 +343,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   EXPECT_EQ(result.reason, "internal: an invariant");
   EXPECT_EQ(result.frames, 2);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
-  for (const NamedEstimator& one : experiment.estimators) {  // the first had the third frame
+  for (const EstimatorSpec& one : experiment.estimators) {  // the first had the third frame
     EXPECT_EQ(one.estimator->timestamp(), TimestampFromSeconds(0.02));
   }
 }

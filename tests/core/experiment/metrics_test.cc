@@ -71,7 +71,7 @@ class MetricsOf {
   const Metrics& metrics() const { return *metrics_; }
 
  private:
-  NamedEstimator named_;
+  EstimatorSpec named_;
   FakeSource source_;
   State state_;
   std::vector<bool> in_segment_;

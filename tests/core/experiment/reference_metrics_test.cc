@@ -57,7 +57,7 @@ class Blind : public SwingingTarget {
 Experiment MakeCompared(bool fails = false) {
   Experiment experiment = MakeExperiment();
   experiment.source = std::make_unique<Blind>(60);
-  NamedEstimator named;
+  EstimatorSpec named;
   named.name = "known";
   named.system = DepthFilter();
   named.estimator = std::make_unique<Known>(named.system, fails);
@@ -162,7 +162,7 @@ TEST(Reference, KeepsNoCovariances) {
   Experiment experiment;
   experiment.source = std::make_unique<Counting>(100, grown);
   for (const char* name : {"one", "two"}) {
-    NamedEstimator& named = experiment.estimators.emplace_back();
+    EstimatorSpec& named = experiment.estimators.emplace_back();
     named.name = name;
     named.system = DepthFilter();
     named.system.sensors.pop_back();

@@ -27,8 +27,8 @@ struct Exploding : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-NamedEstimator ExplodingEstimator(const std::vector<StreamInfo>& streams) {
-  NamedEstimator named;
+EstimatorSpec ExplodingEstimator(const std::vector<StreamInfo>& streams) {
+  EstimatorSpec named;
   named.name = "exploding";
   testing::AddMotion(named.system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 1.0, 1.0}});
   testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
@@ -55,7 +55,7 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
 
 TEST(Run, DivergenceUnderFailEndsTheRun) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator& alone = experiment.estimators[1];
+  EstimatorSpec& alone = experiment.estimators[1];
   alone.system.priors[0].mean = {-0.2};
   alone.on_divergence = OnDivergence::kFail;
   alone.estimator = std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
@@ -67,7 +67,7 @@ TEST(Run, DivergenceUnderFailEndsTheRun) {
 
 TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator& alone = experiment.estimators[1];
+  EstimatorSpec& alone = experiment.estimators[1];
   alone.on_divergence = OnDivergence::kFail;
   alone.system.priors[0].mean = {-0.2};
   EkfOptions options;
@@ -113,7 +113,7 @@ struct Hindsight : Estimator {
 
 TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator& alone = experiment.estimators[1];
+  EstimatorSpec& alone = experiment.estimators[1];
   alone.estimator = std::make_unique<Hindsight>(alone.system);
   Experiment truths = MakeExperiment();
   SourceFrame frame;
@@ -143,7 +143,7 @@ struct Speechless : Hindsight {
 
 TEST(Run, AnEstimatorThatFailsSaysNothingOfItsSensors) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator& alone = experiment.estimators[1];
+  EstimatorSpec& alone = experiment.estimators[1];
   alone.estimator = std::make_unique<Speechless>(alone.system);
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kDiverged);
@@ -212,7 +212,7 @@ struct Interrupted : Hindsight {
 TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   const auto run = [](bool fails) {
     Experiment experiment = MakeExperiment();
-    NamedEstimator& alone = experiment.estimators[1];
+    EstimatorSpec& alone = experiment.estimators[1];
     alone.estimator = std::make_unique<Interrupted>(alone.system);
     if (fails) {
       experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
@@ -250,7 +250,7 @@ class Walking : public testing::SwingingTarget {
 EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   Experiment experiment;
   experiment.source = std::make_unique<Walking>(seed);
-  NamedEstimator& named = experiment.estimators.emplace_back();
+  EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
   testing::AddMotion(named.system, "p", testing::ConstantMotion(1, 0.1 * factor),
                      {{"depth", 0.0, 2.0 * factor}});
@@ -349,7 +349,7 @@ class Turning : public testing::SwingingTarget {
 std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
   Experiment experiment;
   experiment.source = std::make_unique<Turning>(source);
-  NamedEstimator& named = experiment.estimators.emplace_back();
+  EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
   const SharedMotion model = MakeMotion(Turn(), "turn");
   const BlockId id = named.system.layout.Declare("car.heading", "car", model->blocks()[0]);
@@ -391,7 +391,7 @@ TEST(Run, RadiansAreNoEvent) {
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
-  NamedEstimator& ekf = experiment.estimators[0];
+  EstimatorSpec& ekf = experiment.estimators[0];
   ekf.system.initial_time_s = 49.5 * 0.033;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
   const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
@@ -415,7 +415,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]), Texts{});
 
   experiment = MakeExperiment();
-  NamedEstimator& ekf = experiment.estimators[0];
+  EstimatorSpec& ekf = experiment.estimators[0];
   const SharedSensor linear = testing::LinearSensor(1.0, 1.0);
   testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
   for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
@@ -464,7 +464,7 @@ class EachSecond : public testing::SwingingTarget {
 TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   Experiment experiment;
   experiment.source = std::make_unique<EachSecond>(100);
-  NamedEstimator& named = experiment.estimators.emplace_back();
+  EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
   testing::AddMotion(named.system, "car", MakeMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
@@ -512,7 +512,7 @@ struct Mapless : Hindsight {
 
 TEST(Run, AFailureAtTheEndKeepsTheResults) {
   Experiment experiment = MakeExperiment();
-  NamedEstimator& first = experiment.estimators[0];
+  EstimatorSpec& first = experiment.estimators[0];
   first.system.landmarks.emplace();
   first.estimator = std::make_unique<Mapless>(first.system);
   const RunResult result = alidade::Run(experiment, {});
@@ -535,7 +535,7 @@ struct FailsLate : Hindsight {
 TEST(Run, TheFirstFailureIsTheReason) {
   const auto reason = [](bool explodes) {
     Experiment experiment = MakeExperiment();
-    NamedEstimator& alone = experiment.estimators[1];
+    EstimatorSpec& alone = experiment.estimators[1];
     alone.estimator = std::make_unique<FailsLate>(alone.system);
     if (explodes) {
       experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));

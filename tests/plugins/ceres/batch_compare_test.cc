@@ -41,7 +41,7 @@ class Swing : public Source {
 
 void Add(Experiment& experiment, const std::string& name, EstimatorKind kind,
          std::unique_ptr<Estimator> estimator, int accepted_by = -1) {
-  NamedEstimator& named = experiment.estimators.emplace_back();
+  EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = name;
   named.type = name;
   named.kind = kind;
@@ -240,7 +240,7 @@ TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
   // `best` has another sensor and another noise.
   EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
-  for (const NamedEstimator& named : compared.experiment.estimators) {
+  for (const EstimatorSpec& named : compared.experiment.estimators) {
     EXPECT_EQ(named.system.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
     EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
   }

@@ -85,7 +85,7 @@ class Tally : public RunObserver {
   void OnFrame(const SourceFrame& /*frame*/) override { ++frames_; }
   void OnEstimate(int index, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override {
-    const NamedEstimator& named = experiment_->estimators[static_cast<std::size_t>(index)];
+    const EstimatorSpec& named = experiment_->estimators[static_cast<std::size_t>(index)];
     Sums& sums = sums_[named.name];
     for (const MeasurementReport& m : report.measurements()) {
       if (m.outcome == Outcome::kInitialised) continue;

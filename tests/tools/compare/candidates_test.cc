@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-using internal::ComparedEntry;
+using internal::Candidate;
 using internal::ComparedRun;
 using internal::CompareRuns;
 
@@ -25,14 +25,14 @@ EstimatorKind KindOf(const std::string& type) {
 }
 
 /// An estimator of a block p.x that is off the truth by `error`, nought, at three timestamps.
-ComparedEntry Entry(const std::string& name, const std::string& type, bool smoothed, double error,
-                    const std::vector<std::string>& sensors = {"stereo"}) {
-  ComparedEntry entry;
-  entry.facts.type = type;
-  entry.facts.kind = KindOf(type);
-  entry.facts.smoothed = smoothed;
-  entry.facts.sensors = sensors;
-  entry.facts.blocks = entry.series.blocks = {{"p.x", "m", Geometry::Vector(1)}};
+Candidate Entry(const std::string& name, const std::string& type, bool smoothed, double error,
+                const std::vector<std::string>& sensors = {"stereo"}) {
+  Candidate entry;
+  entry.result.type = type;
+  entry.result.kind = KindOf(type);
+  entry.result.smoothed = smoothed;
+  entry.result.sensors = sensors;
+  entry.series.blocks = {{"p.x", "m", Geometry::Vector(1)}};
   entry.series.timestamps = {10, 20, 30};
   entry.series.values = {error, error, error};
   entry.series.covariances = {1.0, 1.0, 1.0};
@@ -42,7 +42,7 @@ ComparedEntry Entry(const std::string& name, const std::string& type, bool smoot
   return entry;
 }
 
-ComparedRun RunOf(const std::vector<ComparedEntry>& estimators) {
+ComparedRun RunOf(const std::vector<Candidate>& estimators) {
   ComparedRun run;
   run.frames = 3;
   run.estimators = estimators;
@@ -79,8 +79,8 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
 
 // Only where no batch of the same system served does one with other overrides, a robust loss, say.
 TEST(CompareRuns, OverridesMakeAnotherSystem) {
-  ComparedEntry other = Entry("other", "ceres_batch", true, 8.0);
-  other.facts.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
+  Candidate other = Entry("other", "ceres_batch", true, 8.0);
+  other.result.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
   ComparedRun run =
       RunOf({other, Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "batch");
@@ -92,10 +92,10 @@ TEST(CompareRuns, OverridesMakeAnotherSystem) {
 }
 
 TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
-  ComparedEntry failed = Entry("failed", "ceres_batch", true, 8.0);
+  Candidate failed = Entry("failed", "ceres_batch", true, 8.0);
   failed.result.failed = true;
-  const ComparedEntry ekf = Entry("ekf", "ekf", false, 2.0);
-  const ComparedEntry batch = Entry("batch", "ceres_batch", true, 1.0);
+  const Candidate ekf = Entry("ekf", "ekf", false, 2.0);
+  const Candidate batch = Entry("batch", "ceres_batch", true, 1.0);
   for (const auto& entries : {std::vector{failed, ekf, batch}, std::vector{batch, ekf, failed}}) {
     const Comparison comparison = CompareRuns({RunOf(entries)}, {});
     EXPECT_EQ(comparison.withheld, "");
@@ -161,7 +161,7 @@ TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
 }
 
 /// With a map of three landmarks at distance `error` of the true ones, along x.
-ComparedEntry WithMap(ComparedEntry entry, double error) {
+Candidate WithMap(Candidate entry, double error) {
   const Eigen::Vector3d places[] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 3}};
   entry.result.landmarks.emplace();
   for (int i = 0; i < 3; ++i) {
@@ -176,10 +176,10 @@ ComparedEntry WithMap(ComparedEntry entry, double error) {
 // With landmarks no batch solves at every frame, but at the last one that of all data is that of
 // the data up to it.
 TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
-  ComparedEntry ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
+  Candidate ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
   ekf.series.values = {9.0, 9.0, 2.0};
   ekf.result.metrics["rmse:p.x"] = 7.5;
-  ComparedEntry batch = WithMap(Entry("batch", "ceres_batch", true, 0.5), 0.125);
+  Candidate batch = WithMap(Entry("batch", "ceres_batch", true, 0.5), 0.125);
   batch.series.covariances = {4.0, 4.0, 0.25};
   const Comparison comparison = CompareRuns({RunOf({ekf, batch})}, {});
   const DecompositionStep& step = comparison.decomposition[0];
@@ -201,12 +201,12 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
 
 // What the gate kept out is another step's, where both batches are there.
 TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
-  ComparedEntry accepted = Entry("accepted", "ceres_batch", true, 1.0);
-  accepted.facts.accepted_by = "ekf";
-  const ComparedEntry ekf = Entry("ekf", "ekf", false, 2.0);
-  const ComparedEntry batch = Entry("batch", "ceres_batch", true, 0.5);
+  Candidate accepted = Entry("accepted", "ceres_batch", true, 1.0);
+  accepted.result.accepted_by = "ekf";
+  const Candidate ekf = Entry("ekf", "ekf", false, 2.0);
+  const Candidate batch = Entry("batch", "ceres_batch", true, 0.5);
   EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).decomposition[0].to, "accepted");
-  ComparedEntry full_information = Entry("full_information", "ceres_batch", false, 1.5);
+  Candidate full_information = Entry("full_information", "ceres_batch", false, 1.5);
   const DecompositionStep step =
       CompareRuns({RunOf({ekf, batch, accepted, full_information})}, {}).decomposition[0];
   EXPECT_EQ(step.to, "full_information");

@@ -34,7 +34,7 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   Experiment experiment = MakeExperiment();
   experiment.estimators.clear();
   for (int i = 0; i < GetParam(); ++i) {
-    NamedEstimator named;
+    EstimatorSpec named;
     named.name = "an_estimator_" + std::to_string(i);
     named.system = DepthFilter();
     named.estimator =
@@ -68,7 +68,7 @@ TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
   Experiment experiment = MakeExperiment();
   experiment.estimators.clear();
   for (int i = 0; i < 7; ++i) {
-    NamedEstimator named;
+    EstimatorSpec named;
     named.name = "an_estimator_" + std::to_string(i);
     const SharedMotion constant = testing::ConstantMotion(1);
     for (const char* entry : {"first", "second"}) {

@@ -55,7 +55,7 @@ class Street : public Source {
 Experiment OnTheStreet(bool outlier = false) {
   Experiment experiment;
   experiment.source = std::make_unique<Street>(outlier);
-  NamedEstimator named;
+  EstimatorSpec named;
   named.name = "ekf";
   named.type = "ekf";
   named.system = MapSystem(Offset(0.05), {}, 0.1);
@@ -134,7 +134,7 @@ class Passing : public Street {
 
 Experiment OfOneThatPasses() {
   Experiment experiment = OnTheStreet();
-  NamedEstimator& named = experiment.estimators[0];
+  EstimatorSpec& named = experiment.estimators[0];
   experiment.source = std::make_unique<Passing>();
   named.system.landmarks->max_missed_frames = 3;
   named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());

@@ -45,7 +45,7 @@ Names SvgsOf(const fs::path& folder) {
 TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
-  NamedEstimator other;
+  EstimatorSpec other;
   other.name = "other";
   testing::AddMotion(other.system, "thing", testing::ConstantMotion(1), {{"depth", 0.3, 0.1}});
   testing::AddMotion(other.system, "own", testing::ConstantMotion(1), {{"bias", 0.1, 0.1}});
@@ -76,7 +76,7 @@ struct Spinning : Motion<0, Angle> {
 TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
-  for (NamedEstimator& named : experiment.estimators) {
+  for (EstimatorSpec& named : experiment.estimators) {
     testing::AddMotion(named.system, "top", MakeMotion(Spinning(), "spinning"),
                        {{"heading", 0.0, 0.1}});
     named.estimator =
@@ -151,7 +151,7 @@ TEST(DrawFigures, DrawsTheVarianceOfARotationAndNoTwoCurvesAlike) {
 
 TEST(Recorder, AConstantBlockHasNoPanel) {
   Experiment experiment = MakeExperiment();
-  for (NamedEstimator& named : experiment.estimators) {
+  for (EstimatorSpec& named : experiment.estimators) {
     named.system = WithStatus(named.system, "template.inverse_distance", BlockStatus::kConstant);
     named.estimator =
         std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
@@ -231,7 +231,7 @@ TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
   while (experiment.estimators.size() < 9) {
-    NamedEstimator more;
+    EstimatorSpec more;
     more.name = "more_" + std::to_string(experiment.estimators.size());
     more.system = DepthFilter();
     more.estimator = std::make_unique<Ekf>(more.system, EkfOptions{}, experiment.source->streams());

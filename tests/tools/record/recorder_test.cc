@@ -127,7 +127,7 @@ struct HandMade {
 
   HandMade() {
     experiment.source = std::make_unique<SwingingTarget>(1);
-    NamedEstimator named;
+    EstimatorSpec named;
     named.name = "hand";
     named.type = "fake";
     named.estimator = std::make_unique<NoEstimator>();
@@ -198,7 +198,7 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
 TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment(6);  // one frame each 33 ms
-  NamedEstimator& ekf = experiment.estimators[0];
+  EstimatorSpec& ekf = experiment.estimators[0];
   ekf.system.initial_time_s = 0.066;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
@@ -255,7 +255,8 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   result.reason = "it \"broke\"";
   result.frames = 7;
   EstimatorResult one;
-  one.name = "ekf";
+  one.name = one.type = "ekf";
+  one.sensors = {"disparity", "inverse_scale"};
   one.metrics = {{"rmse:target.depth", 0.00195}, {"final_error:target.depth", INFINITY}};
   one.counts = {{"accepted:stereo", 151}};
   one.units = {{"target.depth", "m"}};

@@ -361,10 +361,10 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
 
 std::string Explain(const Config& config, const Experiment& experiment) {
   std::string text = SourceText(config, experiment);
-  for (const NamedEstimator& named : experiment.estimators) {
-    const System& system = named.system;
-    const Node entry = config.root().At("estimators").At(named.name);
-    text += "\nestimator " + named.name + " (" + named.type + ")\n";
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    const System& system = spec.system;
+    const Node entry = config.root().At("estimators").At(spec.name);
+    text += "\nestimator " + spec.name + " (" + spec.type + ")\n";
     text += "  state\n" + States(system, experiment.source->truths());
     text += "  motion\n" + Motions(system);
     text += "  sensors\n" + Sensors(system);
@@ -372,9 +372,9 @@ std::string Explain(const Config& config, const Experiment& experiment) {
       text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
     text += "  who touches which block\n" + Touches(system);
     text += Unobservable(system);
-    text += "  options\n" + TextTable(internal::OptionRows(entry, named), kIndent);
-    if (const std::string support = SupportText(named.type); !support.empty()) {
-      text += "  type " + named.type + " supports\n" + support;
+    text += "  options\n" + TextTable(internal::OptionRows(entry, spec), kIndent);
+    if (const std::string support = SupportText(spec.type); !support.empty()) {
+      text += "  type " + spec.type + " supports\n" + support;
     }
   }
   return text;

@@ -74,10 +74,10 @@ std::string LossText(const System& system) {
 
 }  // namespace
 
-std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named) {
-  const System& system = named.system;
+std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
+  const System& system = spec.system;
   std::vector<TextRow> rows;
-  if (const EstimatorType* const type = FindEstimatorType(named.type)) {
+  if (const EstimatorType* const type = FindEstimatorType(spec.type)) {
     const auto [options, own] = type->describe(entry);
     rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
     if (type->support.recovery)
@@ -89,11 +89,11 @@ std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named) 
   if (const auto use = entry.Find("use"); use && use->is_map()) {
     rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
   }
-  rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
+  rows.push_back({"on_divergence", spec.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
                                        : "report: the run goes on"});
-  if (named.on_plugin_failure != OnPluginFailure::kSkip) {
-    rows.push_back({"on_plugin_failure", named.on_plugin_failure == OnPluginFailure::kAbort
+  if (spec.on_plugin_failure != OnPluginFailure::kSkip) {
+    rows.push_back({"on_plugin_failure", spec.on_plugin_failure == OnPluginFailure::kAbort
                                              ? "abort: the run ends with exit code 69"
                                              : "disable: a sensor that fails is no longer used"});
   }

@@ -13,6 +13,6 @@ namespace alidade::internal {
 std::vector<TextRow> LandmarkRows(const System& system);
 
 /// What the entry of an estimator sets, a key and its value in words each.
-std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named);
+std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec);
 
 }  // namespace alidade::internal

@@ -7,9 +7,9 @@
 #include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
+#include "alidade/experiment/build_estimator.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/estimator_types.h"
-#include "alidade/experiment/named_estimator.h"
 #include "alidade/io/text_table.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -59,25 +59,25 @@ const std::vector<Variant>& Variants() {
 }
 
 /// Names of the sensors of a system, sorted.
-std::vector<std::string> SensorsOf(const NamedEstimator& named) {
-  std::vector<std::string> names = internal::NamesOf(named.system.sensors);
+std::vector<std::string> SensorsOf(const EstimatorSpec& spec) {
+  std::vector<std::string> names = internal::NamesOf(spec.system.sensors);
   std::ranges::sort(names);
   return names;
 }
 
-/// Whether `named` is what the variant would be. A full-information filter does for one of the
+/// Whether `spec` is what the variant would be. A full-information filter does for one of the
 /// data that a filter accepted: another line tells what these two differ by.
-bool IsThere(const Variant& variant, const NamedEstimator& named, const NamedEstimator& filter,
+bool IsThere(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
              int filter_index) {
-  const bool full_information = named.kind == EstimatorKind::kBatch && !named.estimator->offline();
-  if (named.kind != variant.kind || full_information != variant.full_information) return false;
-  if (named.overrides != filter.overrides || SensorsOf(named) != SensorsOf(filter)) return false;
-  if (named.accepted_by >= 0) return variant.accepted && named.accepted_by == filter_index;
+  const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
+  if (spec.kind != variant.kind || full_information != variant.full_information) return false;
+  if (spec.overrides != filter.overrides || SensorsOf(spec) != SensorsOf(filter)) return false;
+  if (spec.accepted_by >= 0) return variant.accepted && spec.accepted_by == filter_index;
   return variant.full_information || !variant.accepted;
 }
 
 /// A name that no estimator has.
-std::string FreeName(const std::string& name, const std::vector<NamedEstimator>& taken) {
+std::string FreeName(const std::string& name, const std::vector<EstimatorSpec>& taken) {
   const std::vector<std::string> names = internal::NamesOf(taken);
   std::string free = name;
   for (int i = 2; std::ranges::count(names, free) > 0; ++i) free = name + '_' + std::to_string(i);
@@ -158,7 +158,7 @@ void CheckReference(const Experiment& experiment, const std::string& name) {
 int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
-    const NamedEstimator& one = experiment.estimators[e];
+    const EstimatorSpec& one = experiment.estimators[e];
     if (one.kind != EstimatorKind::kFilter) continue;
     if (name.empty() ? one.accepted_by < 0 : one.name == name) return static_cast<int>(e);
     filters.push_back(one.name);
@@ -186,10 +186,10 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
   if (!options.decompose) return compared;
   std::map<std::string, std::vector<std::string>> left_out;  // by reason
   for (const Variant& variant : Variants()) {
-    const std::vector<NamedEstimator>& all = compared.experiment.estimators;
-    const NamedEstimator& of = all[static_cast<std::size_t>(filter)];
+    const std::vector<EstimatorSpec>& all = compared.experiment.estimators;
+    const EstimatorSpec& of = all[static_cast<std::size_t>(filter)];
     const bool there = std::ranges::any_of(
-        all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
+        all, [&](const EstimatorSpec& one) { return IsThere(variant, one, of, filter); });
     if (there) continue;
     if (const auto found = without.find(FreeName(variant.name, all)); found != without.end()) {
       left_out[found->second].emplace_back(variant.what);

@@ -26,10 +26,10 @@ std::optional<ForetoldTime> ForetellTime(Experiment& experiment) {
   if (foretold.all_frames <= 0) return std::nullopt;
   std::vector<std::shared_ptr<CpuTime>> times;
   std::vector<bool> solves_each_frame;
-  for (NamedEstimator& named : experiment.estimators) {
-    solves_each_frame.push_back(named.kind == EstimatorKind::kBatch && !named.estimator->offline());
+  for (EstimatorSpec& spec : experiment.estimators) {
+    solves_each_frame.push_back(spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
     times.push_back(std::make_shared<CpuTime>());
-    named.estimator = WithCpuClock(std::move(named.estimator), times.back());
+    spec.estimator = WithCpuClock(std::move(spec.estimator), times.back());
   }
   bool asked = false;  // what is stopped are the frames, not the smoothing
   RunOptions options;

@@ -13,10 +13,12 @@
 namespace alidade {
 
 using internal::Candidate;
-using internal::ComparedEntry;
 using internal::ComparedRun;
 using internal::Distance;
+using internal::SameSensors;
+using internal::SameSystem;
 using internal::Single;
+using internal::SmoothsAllData;
 
 namespace {
 
@@ -31,15 +33,17 @@ std::string FolderName(const ComparedRun& run) {
 }
 
 /// What estimators are called by among those of other runs: the folder of each run, by its name
-/// alone where no other has that.
-std::vector<Candidate> CandidatesOf(const std::vector<ComparedRun>& runs) {
+/// alone if no other has that. Moves the estimators of the runs.
+std::vector<Candidate> CandidatesOf(std::vector<ComparedRun>& runs) {
   std::vector<Candidate> candidates;
-  for (const ComparedRun& run : runs) {
+  for (ComparedRun& run : runs) {
     const std::string name = FolderName(run);
     const bool unique = std::ranges::count(runs, name, FolderName) == 1;
     const std::string prefix = (unique ? name : run.folder.string()) + '/';
-    for (const ComparedEntry& entry : run.estimators) {
-      candidates.push_back({(runs.size() > 1 ? prefix : "") + entry.result.name, &run, &entry});
+    for (Candidate& one : run.estimators) {
+      one.name = (runs.size() > 1 ? prefix : "") + one.result.name;
+      one.run = &run;
+      candidates.push_back(std::move(one));
     }
   }
   return candidates;
@@ -49,7 +53,7 @@ std::vector<Candidate> CandidatesOf(const std::vector<ComparedRun>& runs) {
 const Candidate& Named(const std::string& name, const std::vector<Candidate>& candidates,
                        const char* option) {
   for (const Candidate& one : candidates) {
-    if (one.name == name || one.entry->result.name == name) return one;
+    if (one.name == name || one.result.name == name) return one;
   }
   internal::RefuseOption(option, "no estimator '" + name + "'", name,
                          internal::NamesOf(candidates));
@@ -61,7 +65,7 @@ const Candidate* FirstOf(const std::vector<Candidate>& candidates,
   const Candidate* first = nullptr;
   for (const Candidate& one : candidates) {
     if (!is_so(one)) continue;
-    if (one.entry->usable()) return &one;
+    if (one.usable()) return &one;
     if (first == nullptr) first = &one;
   }
   return first;
@@ -73,18 +77,18 @@ const Candidate* FirstOf(const std::vector<Candidate>& candidates,
 const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
                           bool smoothed) {
   const auto sees_the_same = [&](const Candidate& one) {
-    return one.batch() && one.facts().smoothed == smoothed && SameSensors(one.facts(), of.facts());
+    return one.batch() && one.result.smoothed == smoothed && SameSensors(one.result, of.result);
   };
   const auto fits = [&](const Candidate& one) {
-    return sees_the_same(one) && SameSystem(one.facts(), of.facts());
+    return sees_the_same(one) && SameSystem(one.result, of.result);
   };
-  const auto sees_all = [](const Candidate& one) { return one.facts().accepted_by.empty(); };
+  const auto sees_all = [](const Candidate& one) { return one.result.accepted_by.empty(); };
   const std::function<bool(const Candidate&)> choices[] = {
       [&](const Candidate& one) { return fits(one) && sees_all(one); }, fits,
       [&](const Candidate& one) { return sees_the_same(one) && sees_all(one); }};
   for (const auto& choice : choices) {
     const Candidate* const found = FirstOf(candidates, choice);
-    if (found != nullptr && found->entry->usable()) return found;
+    if (found != nullptr && found->usable()) return found;
   }
   const Candidate* const own = FirstOf(candidates, choices[0]);
   return own != nullptr ? own : FirstOf(candidates, fits);
@@ -92,7 +96,7 @@ const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& can
 
 bool HasErrors(const Candidate& one) {
   return one.run->reference == "truth" &&
-         std::ranges::any_of(one.entry->result.metrics,
+         std::ranges::any_of(one.result.metrics,
                              [](const auto& metric) { return metric.first.starts_with("rmse:"); });
 }
 
@@ -124,27 +128,27 @@ References ReferencesOf(const Candidate& one, const std::vector<Candidate>& cand
   const Candidate* smoothed = BatchFor(one, candidates, true);
   if (smoothed == nullptr) {
     smoothed = FirstOf(candidates, [&](const Candidate& other) {
-      return internal::SmoothsAllData(other.facts()) && SameSystem(other.facts(), one.facts());
+      return SmoothsAllData(other.result) && SameSystem(other.result, one.result);
     });
   }
-  const bool later = one.facts().smoothed || (!truth && full_information == nullptr);
+  const bool later = one.result.smoothed || (!truth && full_information == nullptr);
   return {later ? smoothed : full_information, smoothed != nullptr ? smoothed : full_information};
 }
 
 /// Why a comparison with the reference is withheld, or "".
 std::string WhyWithheld(const std::vector<Candidate>& candidates,
                         const std::vector<References>& references, bool truth) {
-  const bool measured = std::ranges::any_of(
-      candidates, [](const Candidate& one) { return one.entry->measurements() > 0; });
+  const bool measured =
+      std::ranges::any_of(candidates, [](const Candidate& one) { return one.measurements() > 0; });
   if (!measured) return "no estimator was given a measurement: what is compared is their start";
   bool any = truth;
   for (const References& of_one : references) {
     for (const Candidate* const reference : {of_one.final, of_one.along}) {
       if (reference == nullptr) continue;
       any = true;
-      if (reference->entry->usable()) continue;
+      if (reference->usable()) continue;
       return "no reference: estimator '" + reference->name + "' " +
-             (reference->entry->result.failed ? "failed" : "has no estimates") +
+             (reference->result.failed ? "failed" : "has no estimates") +
              ", the comparison with it is withheld";
     }
   }
@@ -157,7 +161,7 @@ std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidat
   bool final = false, online = false;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     final = final || references[i].final != nullptr;
-    online = online || (references[i].along != nullptr && !candidates[i].facts().smoothed);
+    online = online || (references[i].along != nullptr && !candidates[i].result.smoothed);
   }
   std::vector<std::string> notes;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -174,7 +178,7 @@ std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidat
 
 bool ScaleIsFree(const Candidate& one) {
   const std::vector<std::string> scale = {"scale"};
-  return std::ranges::count(one.entry->result.unobservable, scale) > 0;
+  return std::ranges::count(one.result.unobservable, scale) > 0;
 }
 
 void AddAll(const std::map<std::string, double>& from, const std::string& kind,
@@ -183,7 +187,7 @@ void AddAll(const std::map<std::string, double>& from, const std::string& kind,
 }
 
 /// Of the keys that begin like one of `kinds`.
-void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
+void AddRatios(const Candidate& one, const Candidate& reference,
                const std::vector<std::string>& kinds, std::map<std::string, Ratio>& ratios) {
   for (const auto& [key, value] : one.result.metrics) {
     const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
@@ -197,22 +201,21 @@ void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
 
 /// The distance from `reference` along the run, and where scale is free that of the path.
 void AddRmsd(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
-  const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
+  const Distance distance = internal::DistanceBetween(one.series, reference.series);
   AddAll(distance.rms, "rmsd:", compared.values);
   AddAll(distance.sigmas, "rmsd.sigmas:", compared.values);
-  const std::string& path = one.facts().position_block;
+  const std::string& path = one.result.position_block;
   if (path.empty() || !ScaleIsFree(one)) return;
-  if (const auto aligned = AlignTrajectories(one.entry->series, reference.entry->series, path)) {
+  if (const auto aligned = AlignTrajectories(one.series, reference.series, path)) {
     compared.values["trajectory.sim3.rmsd"] = Single(aligned->rmse);
   }
 }
 
 void AddFinal(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
-  const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
+  const Distance distance = internal::DistanceBetween(one.series, reference.series);
   AddAll(distance.final, "final_difference:", compared.values);
   AddAll(distance.final_sigmas, "final_difference.sigmas:", compared.values);
-  for (const auto& [map, rms] :
-       internal::DistanceBetweenMaps(one.entry->result, reference.entry->result)) {
+  for (const auto& [map, rms] : internal::DistanceBetweenMaps(one.result, reference.result)) {
     compared.values[map + ".rmsd"] = Single(rms);
   }
 }
@@ -227,58 +230,56 @@ bool NeedsNoTruth(const std::string& key) {
 
 /// CPU time for each frame. What a batch of all data does frame by frame is its start.
 void AddCpuTime(const Candidate& one, ComparedEstimator& compared) {
-  const internal::CpuTime& cpu = one.entry->cpu;
+  const internal::CpuTime& cpu = one.cpu;
   const auto frames = static_cast<double>(one.run->frames);
-  const bool timed = one.entry->result.wall_s > 0.0 && cpu.frames_s + cpu.smoothing_s > 0.0;
+  const bool timed = one.result.wall_s > 0.0 && cpu.frames_s + cpu.smoothing_s > 0.0;
   if (!timed || one.run->frames == 0) return;
-  const bool solves_once = one.batch() && one.facts().smoothed;
+  const bool solves_once = one.batch() && one.result.smoothed;
   const double own_s = cpu.smoothing_s + (solves_once ? 0.0 : cpu.frames_s);
   compared.values["cpu_us"] = Single(1e6 * own_s / frames);
   if (solves_once) compared.values["cpu_us.start"] = Single(1e6 * cpu.frames_s / frames);
 }
 
 ComparedEstimator Compare(const Candidate& one, const References& references, bool truth) {
-  const EstimatorResult& result = one.entry->result;
+  const EstimatorResult& result = one.result;
   ComparedEstimator compared;
   compared.name = one.name;
-  compared.type = one.facts().type;
-  compared.smoothed = one.facts().smoothed;
+  compared.type = one.result.type;
+  compared.smoothed = one.result.smoothed;
   compared.units = result.units;
   compared.used = 1;
   compared.diverged = result.diverged ? 1 : 0;
-  for (const internal::SeriesBlock& block : one.entry->series.blocks) {
+  for (const internal::SeriesBlock& block : one.series.blocks) {
     if (!block.unit.empty()) compared.units[block.name] = block.unit;
   }
   for (const auto& [key, value] : result.metrics) {
     const bool from_truth = truth && one.run->reference == "truth";
     if (from_truth || NeedsNoTruth(key)) compared.values[key] = Single(value);
   }
-  const std::int64_t count = one.entry->measurements();
+  const std::int64_t count = one.measurements();
   if (count > 0 && result.wall_s > 0.0) {
     compared.values["time_us"] = Single(1e6 * result.wall_s / static_cast<double>(count));
   }
   AddCpuTime(one, compared);
-  compared.series = one.entry->errors;
-  for (const auto& [block, by_bound] : one.entry->errors.by_bound) {
+  compared.series = one.errors;
+  for (const auto& [block, by_bound] : one.errors.by_bound) {
     compared.ratios["mse_by_bound:" + block] = {by_bound, 1.0};
   }
-  if (!one.entry->usable()) return compared;
-  if (references.along != nullptr && references.along->entry->usable()) {
+  if (!one.usable()) return compared;
+  if (references.along != nullptr && references.along->usable()) {
     const Candidate& along = *references.along;
     compared.reference = along.name;
     compared.reference_runs = 1;
-    if (truth)
-      AddRatios(*one.entry, *along.entry, {"rmse:", "trajectory.sim3.rmse"}, compared.ratios);
-    if (along.entry != one.entry) AddRmsd(one, along, compared);
+    if (truth) AddRatios(one, along, {"rmse:", "trajectory.sim3.rmse"}, compared.ratios);
+    if (&along != &one) AddRmsd(one, along, compared);
   }
-  if (references.final != nullptr && references.final->entry->usable()) {
+  if (references.final != nullptr && references.final->usable()) {
     const Candidate& final = *references.final;
     compared.final_reference = final.name;
     compared.final_reference_runs = 1;
     if (truth)
-      AddRatios(*one.entry, *final.entry, {"final_error:", "map.rmse", "map.sim3.rmse"},
-                compared.ratios);
-    if (final.entry != one.entry) AddFinal(one, final, compared);
+      AddRatios(one, final, {"final_error:", "map.rmse", "map.sim3.rmse"}, compared.ratios);
+    if (&final != &one) AddFinal(one, final, compared);
   }
   return compared;
 }
@@ -286,18 +287,18 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
 /// The filter whose error is decomposed; null: there is none. Error: kUsage.
 const Candidate* FilterOf(const std::vector<Candidate>& candidates, const CompareOptions& options) {
   const auto is_filter = [](const Candidate& one) {
-    return one.facts().kind == EstimatorKind::kFilter;
+    return one.result.kind == EstimatorKind::kFilter;
   };
   if (options.filter.empty()) {
     const auto first = std::ranges::find_if(candidates, [&](const Candidate& one) {
-      return is_filter(one) && one.facts().accepted_by.empty();
+      return is_filter(one) && one.result.accepted_by.empty();
     });
     return first == candidates.end() ? nullptr : &*first;
   }
   std::vector<std::string> filters;
   bool known = false;
   for (const Candidate& one : candidates) {
-    const bool named = one.name == options.filter || one.entry->result.name == options.filter;
+    const bool named = one.name == options.filter || one.result.name == options.filter;
     if (named && is_filter(one)) return &one;
     known = known || named;
     if (is_filter(one)) filters.push_back(one.name);
@@ -317,17 +318,17 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate* const along = references[i].along;
     if (along == nullptr) continue;
-    if (!along->entry->series.joint && along->entry->usable()) {
+    if (!along->series.joint && along->usable()) {
       notes.insert("'" + along->name +
                    "' has no covariance.bin: RMSD in sigmas leaves its correlations out");
     }
-    if (!truth && along->facts().smoothed && !candidates[i].facts().smoothed) {
+    if (!truth && along->result.smoothed && !candidates[i].result.smoothed) {
       notes.insert("'" + along->name +
                    "' knows later data, a filter does not: it lags behind by nature");
     }
   }
   for (const Candidate& one : candidates) {
-    const std::string& why = one.entry->errors.no_bound;
+    const std::string& why = one.errors.no_bound;
     if (!why.empty()) notes.insert("no Cramer-Rao bound: " + why);
   }
   std::vector<std::string> all(notes.begin(), notes.end());
@@ -358,8 +359,7 @@ const char* ToString(DecompositionKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
-                                 const CompareOptions& options) {
+Comparison internal::CompareRuns(std::vector<ComparedRun> runs, const CompareOptions& options) {
   ALIDADE_EXPECTS(!runs.empty());
   const std::vector<Candidate> candidates = CandidatesOf(runs);
   const bool truth = FromTruth(candidates, options);
@@ -383,7 +383,7 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   if (filter != nullptr) {
     comparison.decomposed = filter->name;
     comparison.decomposition = Decompose(*filter, candidates, truth);
-    if (filter->entry->had_rejection_recovery) {
+    if (filter->had_rejection_recovery) {
       comparison.notes.push_back(
           "'" + filter->name +
           "' recovered from rejections: what that cost is in its step to a batch or smoother");

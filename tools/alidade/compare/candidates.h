@@ -10,24 +10,14 @@
 
 namespace alidade::internal {
 
-/// An estimator of one of the runs.
-struct Candidate {
-  std::string name;  ///< as the comparison has it
-  const ComparedRun* run;
-  const ComparedEntry* entry;
-
-  const EstimatorFacts& facts() const { return entry->facts; }
-  bool batch() const { return facts().kind == EstimatorKind::kBatch; }
-};
-
 /// Whether both take the same measurements.
-bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b);
+bool SameSensors(const EstimatorResult& a, const EstimatorResult& b);
 /// Whether both are of the same models and sensors.
-bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
+bool SameSystem(const EstimatorResult& a, const EstimatorResult& b);
 
 /// Whether its estimates rest on all data; later data of a window end with it.
-inline bool SmoothsAllData(const EstimatorFacts& facts) {
-  return facts.smoothed && facts.kind != EstimatorKind::kSlidingWindow;
+inline bool SmoothsAllData(const EstimatorResult& one) {
+  return one.smoothed && one.kind != EstimatorKind::kSlidingWindow;
 }
 
 /// Refuses what an option names. Error: kUsage.
@@ -43,7 +33,7 @@ std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
                                                   const EstimatorResult& reference);
 
 /// Compares the estimators of runs over the same data. Error: kUsage.
-Comparison CompareRuns(const std::vector<ComparedRun>& runs, const CompareOptions& options);
+Comparison CompareRuns(std::vector<ComparedRun> runs, const CompareOptions& options);
 
 /// The steps from `filter` to the batch of all data, of those that the candidates allow.
 std::vector<DecompositionStep> Decompose(const Candidate& filter,

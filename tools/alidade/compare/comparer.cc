@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-using internal::ComparedEntry;
+using internal::Candidate;
 using internal::ComparedRun;
 
 struct RunComparer::Impl {
@@ -24,14 +24,13 @@ struct RunComparer::Impl {
 RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
     : impl_(std::make_unique<Impl>(Impl{
           {}, internal::DataHash(experiment.source->streams(), experiment.source->truths())})) {
-  for (NamedEstimator& named : experiment.estimators) {
-    ComparedEntry& entry = impl_->run.estimators.emplace_back();
+  for (EstimatorSpec& spec : experiment.estimators) {
+    Candidate& one = impl_->run.estimators.emplace_back();
     impl_->clocks.push_back(std::make_shared<internal::CpuTime>());
-    named.estimator = internal::WithCpuClock(std::move(named.estimator), impl_->clocks.back());
-    if (over_seeds) impl_->errors.emplace_back(named, experiment);
-    entry.facts = internal::FactsOf(named, experiment);
-    entry.series.blocks = entry.facts.blocks;
-    entry.series.joint = entry.series.tangent() <= internal::Series::kMostJoint;
+    spec.estimator = internal::WithCpuClock(std::move(spec.estimator), impl_->clocks.back());
+    if (over_seeds) impl_->errors.emplace_back(spec, experiment);
+    one.series.blocks = internal::SeriesBlocksOf(spec.system);
+    one.series.joint = one.series.tangent() <= internal::Series::kMostJoint;
   }
 }
 
@@ -67,7 +66,7 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   run.estimators.resize(result.estimators.size());
   std::vector<ComparedRun> runs;
   runs.push_back(std::move(run));
-  return internal::CompareRuns(runs, options);
+  return internal::CompareRuns(std::move(runs), options);
 }
 
 Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
@@ -83,16 +82,17 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
   for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
   std::vector<std::string> notes = internal::CheckSameData(runs);
   for (const ComparedRun& run : runs) {
-    for (const internal::ComparedEntry& entry : run.estimators) {
-      if (entry.not_finite == 0) continue;
-      notes.push_back("'" + (run.folder / entry.result.name / "estimates.csv").string() + "': " +
-                      std::to_string(entry.not_finite) + " of " + std::to_string(entry.facts.rows) +
+    for (const Candidate& one : run.estimators) {
+      if (one.not_finite == 0) continue;
+      notes.push_back("'" + (run.folder / one.result.name / "estimates.csv").string() +
+                      "': " + std::to_string(one.not_finite) + " of " +
+                      std::to_string(one.series.timestamps.size()) +
                       " rows have values that are not finite; the comparison leaves these out");
     }
     if (run.status == RunStatus::kOk) continue;
     notes.push_back("'" + run.folder.string() + "' " + ToString(run.status) + ": " + run.reason);
   }
-  Comparison comparison = internal::CompareRuns(runs, options);
+  Comparison comparison = internal::CompareRuns(std::move(runs), options);
   comparison.notes.insert(comparison.notes.begin(), notes.begin(), notes.end());
   return comparison;
 }

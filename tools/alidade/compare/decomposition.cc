@@ -19,22 +19,22 @@ struct Partners {
 Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candidates) {
   Partners found;
   const auto keep = [](const Candidate*& place, const Candidate& one) {
-    const bool better = place != nullptr && !place->entry->usable() && one.entry->usable();
+    const bool better = place != nullptr && !place->usable() && one.usable();
     if (place == nullptr || better) place = &one;
   };
   for (const Candidate& one : candidates) {
-    const EstimatorFacts& facts = one.facts();
-    if (!SameSystem(facts, filter.facts())) continue;
-    const bool by_filter = one.run == filter.run && facts.accepted_by == filter.entry->result.name;
-    if (!facts.accepted_by.empty() && !by_filter) continue;
-    if (!one.batch() && SmoothsAllData(facts) && !by_filter) keep(found.smoother, one);
+    const EstimatorResult& result = one.result;
+    if (!SameSystem(result, filter.result)) continue;
+    const bool by_filter = one.run == filter.run && result.accepted_by == filter.result.name;
+    if (!result.accepted_by.empty() && !by_filter) continue;
+    if (!one.batch() && SmoothsAllData(result) && !by_filter) keep(found.smoother, one);
     if (!one.batch()) continue;
-    if (facts.smoothed) keep(by_filter ? found.accepted : found.all, one);
+    if (result.smoothed) keep(by_filter ? found.accepted : found.all, one);
     // What the filter did not accept is another step's.
-    const bool better = by_filter && one.entry->usable() && found.full_information != nullptr &&
-                        found.full_information->facts().accepted_by.empty();
-    if (!facts.smoothed && better) found.full_information = &one;
-    if (!facts.smoothed) keep(found.full_information, one);
+    const bool better = by_filter && one.usable() && found.full_information != nullptr &&
+                        found.full_information->result.accepted_by.empty();
+    if (!result.smoothed && better) found.full_information = &one;
+    if (!result.smoothed) keep(found.full_information, one);
   }
   return found;
 }
@@ -75,10 +75,10 @@ DecompositionStep Between(DecompositionKind kind, const Candidate* from, const C
     return step;
   }
   for (const Candidate* const one : {from, to}) {
-    if (!one->entry->usable()) step.withheld = "'" + one->name + "' failed";
+    if (!one->usable()) step.withheld = "'" + one->name + "' failed";
   }
   if (!step.withheld.empty()) return step;
-  const Distance distance = DistanceBetween(from->entry->series, to->entry->series);
+  const Distance distance = DistanceBetween(from->series, to->series);
   for (const auto& [block, d] : at_end ? distance.final : distance.rms) {
     step.values["rmsd:" + block] = Single(d);
   }
@@ -86,12 +86,12 @@ DecompositionStep Between(DecompositionKind kind, const Candidate* from, const C
     step.values["rmsd.sigmas:" + owner] = Single(sigmas);
   }
   if (at_end) {
-    for (const auto& [map, d] : DistanceBetweenMaps(from->entry->result, to->entry->result)) {
+    for (const auto& [map, d] : DistanceBetweenMaps(from->result, to->result)) {
       step.values["rmsd:" + map] = Single(d);
     }
   }
   const bool truth = from->run->reference == "truth" && to->run->reference == "truth";
-  if (with_truth && truth) AddErrors(from->entry->result, to->entry->result, step);
+  if (with_truth && truth) AddErrors(from->result, to->result, step);
   return step;
 }
 
@@ -99,7 +99,7 @@ DecompositionStep Between(DecompositionKind kind, const Candidate* from, const C
 /// last frame against a batch of all data: there the two are the same.
 DecompositionStep Linearisation(const Candidate& filter, const Partners& partners,
                                 bool with_truth) {
-  const bool accepted = partners.accepted != nullptr && partners.accepted->entry->usable();
+  const bool accepted = partners.accepted != nullptr && partners.accepted->usable();
   const Candidate* const of_end = accepted ? partners.accepted : partners.all;
   const bool at_end = partners.full_information == nullptr && of_end != nullptr;
   return Between(DecompositionKind::kLinearisation, &filter,
@@ -109,11 +109,11 @@ DecompositionStep Linearisation(const Candidate& filter, const Partners& partner
 
 }  // namespace
 
-bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b) {
+bool SameSensors(const EstimatorResult& a, const EstimatorResult& b) {
   return std::ranges::is_permutation(a.sensors, b.sensors);
 }
 
-bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b) {
+bool SameSystem(const EstimatorResult& a, const EstimatorResult& b) {
   return a.overrides == b.overrides && SameSensors(a, b);
 }
 
@@ -145,7 +145,7 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
                                          bool with_truth) {
   const Partners partners = PartnersOf(filter, candidates);
   std::vector<DecompositionStep> steps = {Linearisation(filter, partners, with_truth)};
-  const bool smoother = partners.smoother != nullptr && partners.smoother->entry->usable();
+  const bool smoother = partners.smoother != nullptr && partners.smoother->usable();
   steps.push_back(
       Between(DecompositionKind::kSmoothing, smoother ? &filter : partners.full_information,
               smoother                       ? partners.smoother
@@ -157,7 +157,7 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
   steps.push_back(Between(DecompositionKind::kRejected, partners.accepted, partners.all, with_truth,
                           "there are no two batches, of all data and of what it accepted, {type: "
                           "BATCH, use: {accepted_by: FILTER}}"));
-  const std::int64_t all = filter.entry->measurements(), used = filter.entry->used();
+  const std::int64_t all = filter.measurements(), used = filter.used();
   steps.back().values["measurements"] = Single(static_cast<double>(all));
   steps.back().values["rejected"] = Single(static_cast<double>(all - used));
   return steps;

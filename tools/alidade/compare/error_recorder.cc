@@ -25,10 +25,10 @@ void KeepEvenRows(std::size_t columns, std::vector<double>& cells) {
 
 }  // namespace
 
-ErrorRecorder::ErrorRecorder(const NamedEstimator& named, const Experiment& experiment) {
+ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment) {
   if (experiment.reference >= 0) return;
   const std::vector<StreamInfo> truths = experiment.source->truths();
-  const StateLayout& layout = named.system.layout;
+  const StateLayout& layout = spec.system.layout;
   const std::vector<int> match = MatchTruths(layout, truths);
   for (BlockId id = 0; id < std::ssize(match); ++id) {
     const int of = match[static_cast<std::size_t>(id)];
@@ -46,13 +46,13 @@ ErrorRecorder::ErrorRecorder(const NamedEstimator& named, const Experiment& expe
     const std::vector<bool> angles = AreAngles(layout[id].geometry());
     series_.angles.push_back(std::ranges::find(angles, false) == angles.end());
   }
-  const bool online = named.kind == EstimatorKind::kFilter ||
-                      (named.kind == EstimatorKind::kBatch && !named.estimator->offline());
+  const bool online = spec.kind == EstimatorKind::kFilter ||
+                      (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
   if (!online || tracked_.empty()) return;
-  series_.no_bound = CramerRaoBound::WhyNone(named.system, truths);
+  series_.no_bound = CramerRaoBound::WhyNone(spec.system, truths);
   if (!series_.no_bound.empty()) return;
   const Source* source = experiment.source.get();
-  bound_.emplace(named.system, experiment.source->streams(), truths,
+  bound_.emplace(spec.system, experiment.source->streams(), truths,
                  [source](std::int64_t id) { return source->TrueLandmark(id); });
 }
 

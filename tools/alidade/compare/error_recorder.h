@@ -19,7 +19,7 @@ class ErrorRecorder {
  public:
   static constexpr std::size_t kMost = 2048;  ///< timestamps
 
-  ErrorRecorder(const NamedEstimator& named, const Experiment& experiment);
+  ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment);
   void Add(const SourceFrame& frame, const State& state);
   ErrorSeries Take();
 

@@ -146,27 +146,26 @@ Geometry GeometryOf(const JsonNode& block) {
   return all[kind];
 }
 
-EstimatorFacts ReadFacts(const JsonNode& entry) {
-  EstimatorFacts facts;
-  facts.type = TextOf(entry, "type");
-  using enum EstimatorKind;
-  facts.kind = static_cast<EstimatorKind>(entry.At("kind").Choice(
-      {ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kSlidingWindow)}));
-  facts.smoothed = entry.At("smoothed").Flag();
-  facts.accepted_by = TextOf(entry, "accepted_by");
-  facts.overrides = TextOf(entry, "overrides");
-  facts.sensors = entry.At("sensors").Texts();
-  facts.position_block = TextOf(entry, "position_block");
-  facts.rows = entry.At("rows").Count();
+std::vector<SeriesBlock> ReadBlocks(const JsonNode& entry) {
+  std::vector<SeriesBlock> blocks;
   for (const JsonNode& block : entry.At("blocks").Items()) {
-    facts.blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});
+    blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});
   }
-  return facts;
+  return blocks;
 }
 
 EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   EstimatorResult result;
   result.name = name;
+  result.type = TextOf(entry, "type");
+  using enum EstimatorKind;
+  result.kind = static_cast<EstimatorKind>(entry.At("kind").Choice(
+      {ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kSlidingWindow)}));
+  result.smoothed = entry.At("smoothed").Flag();
+  result.accepted_by = TextOf(entry, "accepted_by");
+  result.overrides = TextOf(entry, "overrides");
+  result.sensors = entry.At("sensors").Texts();
+  result.position_block = TextOf(entry, "position_block");
   result.failed = entry.At("failed").Flag();
   for (const auto& [key, value] : entry.At("metrics").Entries()) {
     if (key == "diverged") {
@@ -222,7 +221,7 @@ std::int64_t CountOf(const EstimatorResult& result, const std::vector<std::strin
 
 }  // namespace
 
-std::int64_t ComparedEntry::measurements() const {
+std::int64_t Candidate::measurements() const {
   std::vector<std::string> all;
   for (int i = 0; i < kOutcomes; ++i) {
     all.emplace_back(ToString(static_cast<Outcome>(i)));
@@ -230,7 +229,7 @@ std::int64_t ComparedEntry::measurements() const {
   return CountOf(result, all);
 }
 
-std::int64_t ComparedEntry::used() const {
+std::int64_t Candidate::used() const {
   return CountOf(result, {ToString(Outcome::kAccepted), ToString(Outcome::kInitialised)});
 }
 
@@ -260,14 +259,14 @@ ComparedRun ReadRun(const fs::path& folder) {
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
   for (const auto& [name, entry] : root.At("estimators").Entries()) {
-    ComparedEntry& one = run.estimators.emplace_back();
-    one.facts = ReadFacts(entry);
+    Candidate& one = run.estimators.emplace_back();
     one.result = ReadResult(name, entry);
     one.result.wall_s = timing.At("estimators").At(name).At("wall_s").Number();
-    one.series.blocks = one.facts.blocks;
+    one.series.blocks = ReadBlocks(entry);
     one.series.joint = false;
     one.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
-    one.not_finite = ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
+    one.not_finite =
+        ReadEstimates(folder / name / "estimates.csv", entry.At("rows").Count(), one.series);
     ReadCovariances(folder / name / "covariance.bin", one.series);
     const fs::path map = folder / name / "landmarks.csv";
     if (fs::exists(map)) one.result.landmarks = ReadMap(map);

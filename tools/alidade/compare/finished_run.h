@@ -10,22 +10,24 @@
 #include "alidade/compare/over_runs.h"
 #include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
-#include "alidade/record/run_json.h"
 
 /// Runs as far as they are compared, from memory or from their folders.
 namespace alidade::internal {
 
-/// One estimator of a run.
-struct ComparedEntry {
-  EstimatorFacts facts;
-  EstimatorResult result;  ///< without events
-  Series series;
-  CpuTime cpu;                  ///< as far as it is known
-  ErrorSeries errors;           ///< where they are wanted
-  std::int64_t not_finite = 0;  ///< rows of estimates.csv with a cell that is not finite
-  bool had_rejection_recovery =
-      false;  ///< a sensor was rejected again and again, `rejection_recovery` in its events
+struct ComparedRun;
 
+/// One estimator of a comparison.
+struct Candidate {
+  std::string name;                  ///< as the comparison has it
+  const ComparedRun* run = nullptr;  ///< of which it is one
+  EstimatorResult result;            ///< without events
+  Series series;
+  CpuTime cpu;                          ///< as far as it is known
+  ErrorSeries errors;                   ///< if they are wanted
+  std::int64_t not_finite = 0;          ///< rows of estimates.csv with a cell that is not finite
+  bool had_rejection_recovery = false;  ///< event `rejection_recovery`
+
+  bool batch() const { return result.kind == EstimatorKind::kBatch; }
   /// Whether its estimates are of use to compare with.
   bool usable() const { return !result.failed && !series.timestamps.empty(); }
   /// Measurements that it was given, and those of them that it used.
@@ -40,7 +42,7 @@ struct ComparedRun {
   std::string reference = "truth";  ///< what its metrics compare with
   std::string measurements_sha256, truth_sha256;
   std::int64_t frames = 0;
-  std::vector<ComparedEntry> estimators;
+  std::vector<Candidate> estimators;
 };
 
 /// A run folder. Errors: kInputMissing where it is none, kBadData where its files do not fit

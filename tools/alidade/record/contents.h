@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/record/estimate_series.h"
 
 /// What the csv files of a run folder hold, for those who draw them. Columns go by their names.
 namespace alidade::internal {
@@ -69,6 +70,7 @@ struct RecordedMap {
 
 struct RecordedEstimator {
   std::string name;
+  std::vector<SeriesBlock> blocks = {};
   std::vector<RecordedElement> elements = {};
   std::vector<RecordedSigma> sigmas = {};
   std::vector<RecordedError> errors = {};

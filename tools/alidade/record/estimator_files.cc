@@ -8,7 +8,6 @@
 
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/truth_match.h"
-#include "alidade/record/estimate_series.h"
 #include "alidade/state/element_names.h"
 
 namespace alidade::internal {
@@ -28,10 +27,11 @@ std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
 
 }  // namespace
 
-RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
+RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
   RecordedEstimator recorded;
-  recorded.name = named.name;
-  for (const SensorBinding& binding : named.system.sensors) {
+  recorded.name = spec.name;
+  recorded.blocks = SeriesBlocksOf(spec.system);
+  for (const SensorBinding& binding : spec.system.sensors) {
     const Space& space = binding.model->measurement();
     RecordedSensor& sensor = recorded.sensors.emplace_back();
     sensor.name = binding.name;
@@ -44,23 +44,23 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
   return recorded;
 }
 
-EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const NamedEstimator& named,
+EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec,
                                const std::vector<StreamInfo>& truths,
                                const std::vector<std::vector<std::string>>& truth_columns,
                                bool covariances)
-    : recorded_(Describe(named)),
+    : recorded_(Describe(spec)),
       estimates_(
-          folder, named.name + "/estimates.csv",
-          EstimatesHeader(named.system, MatchTruths(named.system.layout, truths), truth_columns)),
-      innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)),
-      errors_(folder, named.name, named.system, MatchTruths(named.system.layout, truths)) {
-  measured_.assign(named.system.sensors.size(), kNoTimestamp);
-  FindPath(named.system);
-  OpenTrajectory(folder, named.system);
-  if (covariances) covariances_ = folder.Create(named.name + "/covariance.bin");
-  if (std::ranges::any_of(named.system.sensors, HasReprojection)) {
-    reprojection_.emplace(folder, named.name + "/reprojection.csv",
+          folder, spec.name + "/estimates.csv",
+          EstimatesHeader(spec.system, MatchTruths(spec.system.layout, truths), truth_columns)),
+      innovations_(folder, spec.name + "/innovations.csv", InnovationsHeader()),
+      gains_(folder, spec.name + "/gains.csv", GainsHeader(spec.system)),
+      errors_(folder, spec.name, spec.system, MatchTruths(spec.system.layout, truths)) {
+  measured_.assign(spec.system.sensors.size(), kNoTimestamp);
+  FindPath(spec.system);
+  OpenTrajectory(folder, spec.system);
+  if (covariances) covariances_ = folder.Create(spec.name + "/covariance.bin");
+  if (std::ranges::any_of(spec.system.sensors, HasReprojection)) {
+    reprojection_.emplace(folder, spec.name + "/reprojection.csv",
                           std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
   }
 }

@@ -21,7 +21,7 @@ class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element; `covariances` asks for
   /// `covariance.bin` too.
-  EstimatorFiles(const OutputFolder& folder, const NamedEstimator& named,
+  EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec,
                  const std::vector<StreamInfo>& truths,
                  const std::vector<std::vector<std::string>>& truth_columns, bool covariances);
 
@@ -40,7 +40,7 @@ class EstimatorFiles {
     int truth;            ///< index into SourceFrame::truth, or -1
   };
 
-  static RecordedEstimator Describe(const NamedEstimator& named);
+  static RecordedEstimator Describe(const EstimatorSpec& spec);
   std::vector<std::string> EstimatesHeader(
       const System& system, const std::vector<int>& truth_of,
       const std::vector<std::vector<std::string>>& truth_columns);

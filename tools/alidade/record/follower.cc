@@ -10,8 +10,8 @@
 namespace alidade {
 
 void Follower::Begin(const Experiment& experiment) {
-  for (const NamedEstimator& named : experiment.estimators) {
-    estimators_.push_back({named.name, named.system.layout});
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    estimators_.push_back({spec.name, spec.system.layout});
   }
 }
 

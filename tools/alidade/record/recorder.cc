@@ -38,7 +38,7 @@ struct Recorder::Impl {
   internal::RecordedRun CloseFiles();
   void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
-  void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
+  void WriteReport(const RunResult& result);
   /// Writes all files but run.json. Returns what kept the report from being written; null: it is.
   std::exception_ptr WriteResults(const RunResult& result);
 
@@ -144,12 +144,12 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   return internal::JsonText(json);
 }
 
-void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {
+void Recorder::Impl::WriteReport(const RunResult& result) {
   internal::Report report{title, config_text, facts, {}, {}, subjects};
   if (options.figures) {
     const auto limit = std::chrono::duration<double>(options.drawing_s);
     const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
-    report.figures = internal::DrawFigures(folder, recorded, {options.stop, end});
+    report.figures = internal::DrawFigures(folder, facts.recorded, {options.stop, end});
   } else {
     report.figures.note = "figures were not asked for";
   }
@@ -180,10 +180,9 @@ void Recorder::Begin(const Experiment& experiment) {
   impl_->source.emplace(impl_->folder, experiment);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
   impl_->timing.emplace(impl_->folder, experiment);
-  for (const NamedEstimator& named : experiment.estimators) {
-    impl_->facts.estimators.emplace(named.name, internal::FactsOf(named, experiment));
+  for (const EstimatorSpec& spec : experiment.estimators) {
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
-        impl_->folder, named, experiment.source->truths(), impl_->source->truth_columns(),
+        impl_->folder, spec, experiment.source->truths(), impl_->source->truth_columns(),
         impl_->options.covariances));
   }
   impl_->started = Clock::now();
@@ -214,11 +213,7 @@ void Recorder::AddFile(const std::string& name, std::string_view text) {
 
 std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
   const std::string timing_json = TimingJson(result);
-  internal::RecordedRun recorded = CloseFiles();
-  for (const auto& files : estimators) {
-    const internal::RecordedEstimator& closed = files->recorded();
-    facts.estimators.at(closed.name).rows = closed.estimate_rows;
-  }
+  internal::RecordedRun& recorded = facts.recorded = CloseFiles();
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     const EstimatorResult& one = result.estimators[e];
     WriteEvents(one);
@@ -236,7 +231,7 @@ std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing_json);
   try {
-    WriteReport(result, recorded);
+    WriteReport(result);
   } catch (const Error&) {
     folder.Remove("report.html");
     folder.Remove("figures");

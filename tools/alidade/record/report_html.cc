@@ -106,9 +106,8 @@ std::string Events(const EstimatorResult& result) {
 std::string Estimator(const EstimatorResult& result, std::size_t index, const Report& report) {
   std::string html =
       "<h2 id=\"estimator-" + std::to_string(index) + "\">" + HtmlEscaped(result.name);
-  const auto known = report.facts.estimators.find(result.name);
-  if (known != report.facts.estimators.end() && known->second.type != result.name) {
-    html += " <span class=\"soft\">(" + HtmlEscaped(known->second.type) + ")</span>";
+  if (!result.type.empty() && result.type != result.name) {
+    html += " <span class=\"soft\">(" + HtmlEscaped(result.type) + ")</span>";
   }
   if (result.diverged) html += " <span class=\"badge diverged\">diverged</span>";
   if (result.inconsistent) html += " <span class=\"badge diverged\">inconsistent</span>";

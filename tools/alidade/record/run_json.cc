@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/run_json.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/io/json.h"
@@ -12,27 +12,24 @@
 namespace alidade::internal {
 namespace {
 
-Json JsonOf(const EstimatorFacts& facts) {
-  Json json = {{"type", facts.type}, {"kind", ToString(facts.kind)}};
-  if (!facts.accepted_by.empty()) json["accepted_by"] = facts.accepted_by;
-  if (!facts.overrides.empty()) json["overrides"] = facts.overrides;
-  json["sensors"] = facts.sensors;
-  json["smoothed"] = facts.smoothed;
-  if (!facts.position_block.empty()) json["position_block"] = facts.position_block;
-  Json& blocks = json["blocks"] = Json::array();
-  for (const SeriesBlock& block : facts.blocks) {
-    blocks.push_back({{"name", block.name},
-                      {"unit", block.unit},
-                      {"geometry", ToString(block.geometry.kind)},
-                      {"size", block.geometry.ambient}});
+/// `recorded` is null if the run ended before its files were begun.
+Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
+  Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
+  if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;
+  if (!result.overrides.empty()) json["overrides"] = result.overrides;
+  json["sensors"] = result.sensors;
+  json["smoothed"] = result.smoothed;
+  if (!result.position_block.empty()) json["position_block"] = result.position_block;
+  if (recorded != nullptr) {
+    Json& blocks = json["blocks"] = Json::array();
+    for (const SeriesBlock& block : recorded->blocks) {
+      blocks.push_back({{"name", block.name},
+                        {"unit", block.unit},
+                        {"geometry", ToString(block.geometry.kind)},
+                        {"size", block.geometry.ambient}});
+    }
+    json["rows"] = recorded->estimate_rows;
   }
-  json["rows"] = facts.rows;
-  return json;
-}
-
-Json JsonOf(const EstimatorResult& result, const RunFacts& facts) {
-  const auto known = facts.estimators.find(result.name);
-  Json json = known == facts.estimators.end() ? Json::object() : JsonOf(known->second);
   json["failed"] = result.failed;
   Json& metrics = json["metrics"] = result.metrics;
   metrics["diverged"] = result.diverged;
@@ -50,20 +47,6 @@ std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
   std::map<std::string, std::int64_t> counts;
   for (const Event& event : result.events) ++counts[event.kind];
   return counts;
-}
-
-EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment) {
-  const BlockId path = PositionBlockOf(named.system);
-  const auto by = static_cast<std::size_t>(named.accepted_by);
-  return {named.type,
-          named.kind,
-          named.estimator->offline(),
-          named.accepted_by < 0 ? "" : experiment.estimators[by].name,
-          named.overrides,
-          NamesOf(named.system.sensors),
-          path < 0 ? "" : named.system.layout[path].name,
-          SeriesBlocksOf(named.system),
-          0};
 }
 
 std::string UnfinishedRunJson(const std::string& status, const std::string& reason) {
@@ -89,7 +72,11 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
     plugins.push_back({{"file", file}, {"sha256", hash}});
   }
   Json& estimators = json["estimators"] = Json::object();
-  for (const EstimatorResult& one : result.estimators) estimators[one.name] = JsonOf(one, facts);
+  for (const EstimatorResult& one : result.estimators) {
+    const auto& all = facts.recorded.estimators;
+    const auto recorded = std::ranges::find(all, one.name, &RecordedEstimator::name);
+    estimators[one.name] = JsonOf(one, recorded == all.end() ? nullptr : &*recorded);
+  }
   return JsonText(json);
 }
 

@@ -18,8 +18,8 @@ std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment)
   for (std::size_t t = 0; t < truths.size(); ++t) {
     std::vector<std::string> names = NumberedNames(truths[t].name, truths[t].size);
     // Elements are named as in the first state that has this block.
-    for (const NamedEstimator& named : experiment.estimators) {
-      const StateLayout& layout = named.system.layout;
+    for (const EstimatorSpec& spec : experiment.estimators) {
+      const StateLayout& layout = spec.system.layout;
       const std::vector<int> match = MatchTruths(layout, truths);
       const auto block = std::find(match.begin(), match.end(), static_cast<int>(t));
       if (block == match.end()) continue;
@@ -72,8 +72,8 @@ SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experimen
 void SourceFiles::FindInverses(const Experiment& experiment) {
   std::set<std::string> sensors;
   std::map<std::string, std::size_t> cells;
-  for (const NamedEstimator& named : experiment.estimators) {
-    const System& system = named.system;
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    const System& system = spec.system;
     for (const SensorBinding& binding : system.sensors) {
       const auto stream = std::find_if(streams_.begin(), streams_.end(), [&](const StreamInfo& s) {
         return s.name == binding.stream;

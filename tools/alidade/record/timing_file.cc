@@ -10,8 +10,8 @@ namespace {
 
 std::vector<std::string> HeaderOf(const Experiment& experiment) {
   std::vector<std::string> header = {"t_s"};
-  for (const NamedEstimator& named : experiment.estimators) {
-    if (!named.estimator->offline()) header.push_back(named.name);
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    if (!spec.estimator->offline()) header.push_back(spec.name);
   }
   return header;
 }
@@ -20,10 +20,10 @@ std::vector<std::string> HeaderOf(const Experiment& experiment) {
 
 TimingFile::TimingFile(const OutputFolder& folder, const Experiment& experiment)
     : file_(folder, "timing.csv", HeaderOf(experiment)) {
-  for (const NamedEstimator& named : experiment.estimators) {
-    const bool offline = named.estimator->offline();
+  for (const EstimatorSpec& spec : experiment.estimators) {
+    const bool offline = spec.estimator->offline();
     column_of_.push_back(offline ? -1 : static_cast<int>(times_.size()));
-    if (!offline) times_.push_back({named.name});
+    if (!offline) times_.push_back({spec.name});
   }
   row_.resize(times_.size());
 }

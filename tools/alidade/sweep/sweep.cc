@@ -83,8 +83,8 @@ class Queue {
       Config config = from.Copy();
       config.Set("source.seed", std::to_string(seed), "--first-seed");
       Experiment experiment = BuildExperiment(config, host_);
-      for (NamedEstimator& named : experiment.estimators) {
-        named.on_divergence = OnDivergence::kReport;
+      for (EstimatorSpec& spec : experiment.estimators) {
+        spec.on_divergence = OnDivergence::kReport;
       }
       RunOptions options;
       options.stop = options_.stop;
@@ -144,8 +144,8 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   // What is wrong with the config is said once, before the first run.
   {
     const Experiment experiment = BuildExperiment(config, host);
-    for (const NamedEstimator& named : experiment.estimators) {
-      result.estimators.push_back(named.name);
+    for (const EstimatorSpec& spec : experiment.estimators) {
+      result.estimators.push_back(spec.name);
     }
     if (experiment.reference >= 0) {
       result.reference = result.estimators[static_cast<std::size_t>(experiment.reference)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/named_estimator.h"
+#include "alidade/experiment/build_estimator.h"
 
 #include <algorithm>
 #include <exception>
@@ -205,13 +205,13 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
   }
 }
 
-/// Refuses `filter` where what it accepted does not tell what `named` is to see.
-void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
+/// Refuses `filter` where what it accepted does not tell what `spec` is to see.
+void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& by) {
   const std::string quoted = '\'' + filter.name + '\'';
   if (filter.estimator->offline()) {
     by.Fail(quoted + " has its estimates at the end only", "a filter");
   }
-  for (const SensorBinding& sensor : named.system.sensors) {
+  for (const SensorBinding& sensor : spec.system.sensors) {
     const int index = filter.system.FindSensor(sensor.name);
     const auto& theirs = filter.system.sensors;
     if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
@@ -227,9 +227,9 @@ void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, con
   }
 }
 
-/// Refuses a control input of `named` that is a measurement of `filter`, which may not accept it.
-void CheckInputs(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
-  for (const MotionBinding& motion : named.system.motions) {
+/// Refuses a control input of `spec` that is a measurement of `filter`, which may not accept it.
+void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& by) {
+  for (const MotionBinding& motion : spec.system.motions) {
     const std::string& stream = motion.input.stream;
     const auto& theirs = filter.system.sensors;
     const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
@@ -241,42 +241,42 @@ void CheckInputs(const NamedEstimator& filter, const NamedEstimator& named, cons
   }
 }
 
-/// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:
+/// Index of the estimator whose accepted measurements `spec` is to see, as the key `use` says; -1:
 /// it sees all. `before` are those listed before it. Error: kBadConfig.
-int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators,
-            const std::vector<NamedEstimator>& before) {
+int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
+            const std::vector<EstimatorSpec>& before) {
   if (!use.is_map()) {
     if (use.Text() == "all") return -1;
     use.Fail("not a choice of data: '" + use.Text() + "'", "all, or {accepted_by: NAME}");
   }
   const Node by = use.At("accepted_by", "use");
   const std::string name = by.Text();
-  if (name == named.name) by.Fail("'" + name + "' is this estimator itself", "another one");
-  const auto found = std::ranges::find(before, name, &NamedEstimator::name);
+  if (name == spec.name) by.Fail("'" + name + "' is this estimator itself", "another one");
+  const auto found = std::ranges::find(before, name, &EstimatorSpec::name);
   if (found == before.end()) {
     std::vector<std::string> known;
     for (const auto& [other, entry] : estimators.Entries()) known.push_back(other);
     if (std::ranges::find(known, name) != known.end()) {
-      by.Fail("'" + name + "' is listed after '" + named.name + "'",
+      by.Fail("'" + name + "' is listed after '" + spec.name + "'",
               "an estimator listed before, which has each frame first");
     }
-    std::erase(known, named.name);
+    std::erase(known, spec.name);
     by.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
   }
-  CheckAccepts(*found, named, by);
+  CheckAccepts(*found, spec, by);
   const int first = static_cast<int>(found - before.begin());
   for (int i = first; i >= 0; i = before[static_cast<std::size_t>(i)].accepted_by) {
-    CheckInputs(before[static_cast<std::size_t>(i)], named, by);
+    CheckInputs(before[static_cast<std::size_t>(i)], spec, by);
   }
   return first;
 }
 
 /// Makes the estimator of the entry `node`, of a plugin unless null. Error: kPlugin.
-std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator& named,
+std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const EstimatorSpec& spec,
                                 const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
                                 const Node& node) {
   const auto made = [&] {
-    return make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
+    return make(spec.system, streams != nullptr ? *streams : StreamsOf(spec.system));
   };
   if (plugin == nullptr) return made();
   std::string why = "an exception of unknown type";
@@ -297,39 +297,39 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator
 }
 
 /// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
-void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
-  if (named.estimator->offline() || named.estimator->Clone() != nullptr) return;
+void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
+  if (spec.estimator->offline() || spec.estimator->Clone() != nullptr) return;
   entry.At("type").Fail(
-      "'" + named.type + "' cannot roll back for an out-of-sequence frame",
+      "'" + spec.type + "' cannot roll back for an out-of-sequence frame",
       "another type under 'out_of_sequence.policy: rollback', or 'out_of_sequence.policy: buffer'");
 }
 
 }  // namespace
 
-NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
-                              const PluginHost& host, const std::vector<StreamInfo>* streams,
-                              const std::vector<NamedEstimator>& before) {
+EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
+                             const PluginHost& host, const std::vector<StreamInfo>* streams,
+                             const std::vector<EstimatorSpec>& before) {
   CheckName(name, entry);
-  NamedEstimator named;
-  named.name = name;
+  EstimatorSpec spec;
+  spec.name = name;
   const Node type = entry.At("type", "an estimator");
-  named.type = type.Text();
-  const EstimatorType* const of_core = FindEstimatorType(named.type);
+  spec.type = type.Text();
+  const EstimatorType* const of_core = FindEstimatorType(spec.type);
   const PluginEntry* const of_plugin =
-      of_core == nullptr ? &FindOffered(named.type, host, type) : nullptr;
-  named.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
+      of_core == nullptr ? &FindOffered(spec.type, host, type) : nullptr;
+  spec.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
   const Support& support = of_core != nullptr ? of_core->support : SupportOf(*of_plugin);
   const EstimatorMaker make =
-      of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, named.type, entry);
+      of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, spec.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
-    named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
+    spec.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
   if (const auto policy = entry.Find("on_plugin_failure")) {
-    named.on_plugin_failure =
+    spec.on_plugin_failure =
         static_cast<OnPluginFailure>(policy->Choice({"skip", "disable", "abort"}));
     const auto order = config.root().Find("out_of_sequence");
     const auto rollback = order ? order->Find("policy") : std::nullopt;
-    if (named.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
+    if (spec.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
         rollback->Text() == "rollback") {
       policy->Fail("a rollback gives frames of before again, with the sensor",
                    "skip or abort, or another out_of_sequence.policy");
@@ -339,28 +339,28 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const Config own = overrides ? config.Merged(*overrides) : config;
   if (overrides) {
     CheckOverrides(*overrides, config.root(), own.root());
-    named.overrides = overrides->ToYaml();
+    spec.overrides = overrides->ToYaml();
   }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
-  RefuseUnsupportedKeys(named.type, entry);
+  RefuseUnsupportedKeys(spec.type, entry);
   entry.RejectUnread();
-  named.system = ReadProblem(own.root(), host, only);
-  RefuseUnsupported(named.type, support, own.root(), named.system);
+  spec.system = ReadProblem(own.root(), host, only);
+  RefuseUnsupported(spec.type, support, own.root(), spec.system);
   if (of_core != nullptr) {
-    RefuseLoneMatches(entry, named.system);
+    RefuseLoneMatches(entry, spec.system);
   }
-  if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
+  if (streams != nullptr) CheckStreams(own.root(), spec.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
-  if (lent && named.system.landmarks) {
-    LandmarkOptions& landmarks = *named.system.landmarks;
+  if (lent && spec.system.landmarks) {
+    LandmarkOptions& landmarks = *spec.system.landmarks;
     landmarks.min_observations = 1;
     if (landmarks.prior) landmarks.prior->min_observations = 0;
   }
-  named.estimator = Make(make, named, streams, of_plugin, entry);
-  if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
-  return named;
+  spec.estimator = Make(make, spec, streams, of_plugin, entry);
+  if (use) spec.accepted_by = ReadUse(*use, spec, config.root().At("estimators"), before);
+  return spec;
 }
 
 int FindStream(const Node& sensor, const SensorModel& model,
@@ -395,10 +395,10 @@ void CheckStreams(const Node& root, const System& system, const std::vector<Stre
 void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
                   Experiment& experiment) {
   const Node entry = config.root().At("estimators").At(name);
-  NamedEstimator named = BuildEstimator(name, entry, config, host, &experiment.source->streams(),
-                                        experiment.estimators);
-  if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(named, entry);
-  experiment.estimators.push_back(std::move(named));
+  EstimatorSpec spec = BuildEstimator(name, entry, config, host, &experiment.source->streams(),
+                                      experiment.estimators);
+  if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(spec, entry);
+  experiment.estimators.push_back(std::move(spec));
 }
 
 }  // namespace alidade::internal

@@ -18,9 +18,9 @@ void CheckStreams(const Node& root, const System& system, const std::vector<Stre
 
 /// The entry `name` of the config's `estimators:`, given the streams of its source (null: those
 /// that it takes) and the estimators before it. Errors: those of BuildExperiment.
-NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
-                              const PluginHost& host, const std::vector<StreamInfo>* streams,
-                              const std::vector<NamedEstimator>& before);
+EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
+                             const PluginHost& host, const std::vector<StreamInfo>* streams,
+                             const std::vector<EstimatorSpec>& before);
 
 /// Makes the entry `name` of the `estimators:` of a config that has the calibration of the data,
 /// and puts it behind those that the experiment has; nothing is added where that fails. Errors:

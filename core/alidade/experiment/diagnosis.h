@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/experiment/estimator_run.h"
+
+namespace alidade::internal {
+
+/// Completes the result of `run`, but for its metrics, from the whole run: counts, units, the map,
+/// whether it failed, and an event for each finding, such as a sensor that was never used.
+void Diagnose(const Experiment& experiment, EstimatorRun& run);
+
+}  // namespace alidade::internal

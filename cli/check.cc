@@ -60,9 +60,8 @@ void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntr
 }
 
 /// Whether a model failed with these parameters; prints its findings.
-bool Fails(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
-           const CheckOptions& options) {
-  const auto findings = CheckModel(host, entry, parameters, options);
+bool Fails(const PluginEntry& entry, const Node& parameters, const CheckOptions& options) {
+  const auto findings = CheckModel(entry, parameters, options);
   const std::string from = parameters.path().empty() ? "" : parameters.path() + ": ";
   Print(from + CheckText(entry, findings));
   return AnyFailure(findings);
@@ -85,14 +84,13 @@ std::string OfModel(const std::string& name, const std::string& lines) {
 }
 
 /// The models as the command line sets them.
-bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries,
-              const CheckArguments& arguments) {
+bool AnyFails(const std::vector<PluginEntry>& entries, const CheckArguments& arguments) {
   RequireModels(arguments, entries);
   bool failed = false;
   for (const PluginEntry& entry : entries) {
     const Config parameters = Parameters(arguments, entry, entries.size() == 1);
     try {
-      failed = Fails(host, entry, parameters.root(), arguments.options) || failed;
+      failed = Fails(entry, parameters.root(), arguments.options) || failed;
     } catch (const Error& e) {
       if (e.code() != ExitCode::kBadConfig) throw;
       throw Error(e.code(), OfModel(entry.name, e.what()) + "\n  parameters are given with --set " +
@@ -103,8 +101,7 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries,
 }
 
 /// The models as the entries of a run's config set them.
-bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries, const Config& config,
-              CheckOptions options) {
+bool AnyFails(const std::vector<PluginEntry>& entries, const Config& config, CheckOptions options) {
   options.other_keys = true;
   bool failed = false, any = false;
   constexpr std::pair<const char*, const char*> kSections[] = {{"state", kMotionKind},
@@ -116,7 +113,7 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries, c
       const auto model = node.Find("model");
       for (const PluginEntry& entry : entries) {
         if (!model || model->Text() != entry.name || entry.kind != kind) continue;
-        failed = Fails(host, entry, node, options) || failed;
+        failed = Fails(entry, node, options) || failed;
         any = true;
       }
     }
@@ -141,8 +138,8 @@ ExitCode Check(const CheckArguments& arguments) {
   for (const fs::path& path : Absolute(arguments.plugin_paths)) places.push_back(path);
   const PluginHost host(places);
   const auto entries = FindModels(host, arguments.plugin, arguments.model);
-  const bool failed = config ? AnyFails(host, entries, *config, arguments.options)
-                             : AnyFails(host, entries, arguments);
+  const bool failed =
+      config ? AnyFails(entries, *config, arguments.options) : AnyFails(entries, arguments);
   return failed ? ExitCode::kFound : ExitCode::kOk;
 }
 

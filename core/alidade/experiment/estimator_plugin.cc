@@ -2,6 +2,7 @@
 #include "alidade/experiment/estimator_plugin.h"
 
 #include "alidade/base/error.h"
+#include "alidade/plugin/create.h"
 
 namespace alidade {
 
@@ -13,17 +14,17 @@ const EstimatorEntry& EstimatorOf(const PluginEntry& entry) {
 EstimatorMaker CreateEstimator(const PluginHost& host, const std::string& name, const Node& node) {
   const PluginEntry& entry = host.Find(kEstimatorKind, name, node);
   EstimatorMaker maker;
-  host.CallFactory(entry, node, [&](Params& params) {
+  CallFactory(entry, node, [&](Params& params) {
     maker = EstimatorOf(entry).create(EstimatorArguments{node, params});
     return maker != nullptr;
   });
   return maker;
 }
 
-std::vector<ParamInfo> EstimatorSchema(const PluginHost& host, const PluginEntry& entry) {
+std::vector<ParamInfo> EstimatorSchema(const PluginEntry& entry) {
   const EstimatorEntry& factory = EstimatorOf(entry);
   const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
-  return host.FactorySchema(entry, [&](Params& params) {
+  return FactorySchema(entry, [&](Params& params) {
     static_cast<void>(factory.create(EstimatorArguments{stand_in.root(), params}));
   });
 }

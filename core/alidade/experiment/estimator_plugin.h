@@ -50,8 +50,8 @@ const EstimatorEntry& EstimatorOf(const PluginEntry& entry);
 /// searched, kBadConfig, those of the estimator.
 EstimatorMaker CreateEstimator(const PluginHost& host, const std::string& name, const Node& node);
 
-/// The parameters of an estimator, one of the entries of `host`.
-std::vector<ParamInfo> EstimatorSchema(const PluginHost& host, const PluginEntry& entry);
+/// The parameters of the estimator `entry`.
+std::vector<ParamInfo> EstimatorSchema(const PluginEntry& entry);
 
 }  // namespace alidade
 

@@ -31,8 +31,8 @@ constexpr CppEntry EntryOf(const SourceEntry& source) {
 std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
                                      std::uint64_t seed, bool any_order = false);
 
-/// The parameters of a source, one of the entries of `host`.
-std::vector<ParamInfo> SourceSchema(const PluginHost& host, const PluginEntry& entry);
+/// The parameters of the source `entry`.
+std::vector<ParamInfo> SourceSchema(const PluginEntry& entry);
 
 }  // namespace alidade
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/create.h"
+
 #include <algorithm>
 #include <exception>
 #include <iterator>
@@ -11,8 +13,6 @@
 #include "alidade/plugin/given_noise.h"
 #include "alidade/plugin/param_reader.h"
 #include "alidade/plugin/plugin_file.h"
-#include "alidade/plugin/plugin_host.h"
-#include "alidade/plugin/plugin_models.h"
 
 namespace alidade {
 namespace {
@@ -20,15 +20,13 @@ namespace {
 using internal::ParamReader;
 using internal::ParamRecorder;
 
-std::uint32_t ToKind(const std::string& kind) {
-  return kind == kSensorKind ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
-}
-
-/// For what takes some microseconds, as most creations do: to look again takes less than to sleep.
-std::unique_lock<std::recursive_mutex> LockShortly(std::recursive_mutex& mutex) {
-  constexpr int kLooks = 100;
+/// The lock of all creation; recursive, for a source may create models. Most creations take some
+/// microseconds: to try again takes less than to sleep.
+std::unique_lock<std::recursive_mutex> LockCreation() {
+  static std::recursive_mutex mutex;
+  constexpr int kTries = 100;
   std::unique_lock lock(mutex, std::try_to_lock);
-  for (int i = 0; i < kLooks && !lock; ++i) {
+  for (int i = 0; i < kTries && !lock; ++i) {
     std::this_thread::yield();
     static_cast<void>(lock.try_lock());
   }
@@ -127,26 +125,16 @@ std::vector<ParamInfo> ListedKeys(const std::string& keys) {
 
 }  // namespace
 
-AlidadeEntry PluginHost::EntryOf(const PluginEntry& entry) const {
+std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const Node& node,
+                                                 const std::string& representation) {
   ALIDADE_EXPECTS(entry.is_model());
-  const AlidadeTable table = internal::ReadPrefix(LoadedFrom(entry.plugin).table);
-  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
-    const AlidadeEntry c = internal::ReadEntry(table.entries, table.entry_stride, i);
-    if (c.kind == ToKind(entry.kind) && entry.name == c.name) return c;
-  }
-  throw ContractViolation("no such entry: " + entry.name);
-}
-
-std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
-                                                        const std::string& representation) const {
-  const AlidadeEntry c = EntryOf(entry);
-  const std::optional<Node> covariance = internal::GivenCovariance(node, c.kind);
+  const std::optional<Node> covariance = internal::GivenCovariance(node, entry.model.kind);
   ParamReader reader(node, Named(entry), representation, covariance.has_value());
   NewInstance instance(entry);
   std::int32_t code;
   {
-    const auto lock = LockShortly(create_mutex_);
-    code = instance.Create(c, reader.host());
+    const auto lock = LockCreation();
+    code = instance.Create(entry.model, reader.host());
   }
   reader.Check();
   if (!instance.thrown().empty()) FailCreation(entry, node, "it threw: " + instance.thrown());
@@ -154,30 +142,21 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
     FailCreation(entry, node, reader.failure().empty() ? "it does not say why" : reader.failure());
   }
   if (!reader.failure().empty()) node.Fail(reader.failure());
-  if (instance.kind() != c.kind) FailCreation(entry, node, "it is not what its table says");
+  if (instance.kind() != entry.model.kind)
+    FailCreation(entry, node, "it is not what its table says");
   auto model =
       std::make_shared<ModelInstance>(instance.Release(), entry.name, entry.plugin.string());
   if (covariance) model->GiveNoise(internal::RootForModel(*covariance, *model));
   return model;
 }
 
-SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,
-                                      const std::string& representation) const {
-  return std::make_shared<PluginSensor>(
-      Create(Find(kSensorKind, name, entry), entry, representation));
-}
-
-SharedMotion PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
-  return std::make_shared<PluginMotion>(Create(Find(kMotionKind, name, entry), entry));
-}
-
-void PluginHost::CallFactory(const PluginEntry& entry, const Node& node,
-                             const std::function<bool(Params&)>& call) const {
+void CallFactory(const PluginEntry& entry, const Node& node,
+                 const std::function<bool(Params&)>& call) {
   ParamReader reader(node, Named(entry));
   Params params(&reader.host());
   bool made = false;
   try {
-    const auto lock = LockShortly(create_mutex_);
+    const auto lock = LockCreation();
     made = call(params);
   } catch (const Error&) {
     reader.Check();
@@ -196,21 +175,21 @@ void PluginHost::CallFactory(const PluginEntry& entry, const Node& node,
   if (!made) FailCreation(entry, node, "it gives nothing");
 }
 
-std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
+std::vector<ParamInfo> ModelSchema(const PluginEntry& entry) {
   ParamRecorder recorder;
-  const AlidadeEntry c = EntryOf(entry);
-  const std::lock_guard lock(create_mutex_);
+  ALIDADE_EXPECTS(entry.is_model());
+  const auto lock = LockCreation();
   recorder.Run([&] {
     NewInstance instance(entry);
-    static_cast<void>(instance.Create(c, recorder.host()));
+    static_cast<void>(instance.Create(entry.model, recorder.host()));
   });
   return recorder.Result();
 }
 
-std::vector<ParamInfo> PluginHost::FactorySchema(const PluginEntry& entry,
-                                                 const std::function<void(Params&)>& call) const {
+std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
+                                     const std::function<void(Params&)>& call) {
   ParamRecorder recorder;
-  const std::lock_guard lock(create_mutex_);
+  const auto lock = LockCreation();
   recorder.Run([&] {
     Params params(&recorder.host());
     try {
@@ -224,12 +203,12 @@ std::vector<ParamInfo> PluginHost::FactorySchema(const PluginEntry& entry,
   return result;
 }
 
-std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
+std::vector<std::string> DescribeModel(const PluginEntry& entry) {
   if (!entry.is_model()) return {};
   ParamRecorder recorder;
   NewInstance instance(entry);
-  const std::lock_guard lock(create_mutex_);
-  if (instance.Create(EntryOf(entry), recorder.host()) != ALIDADE_OK) return {};
+  const auto lock = LockCreation();
+  if (instance.Create(entry.model, recorder.host()) != ALIDADE_OK) return {};
   const ModelInstance model(instance.Release(), entry.name, entry.plugin.string());
   const bool sensor = entry.kind == kSensorKind;
   std::vector<std::string> lines;

@@ -58,6 +58,4 @@ std::string Defect(const CppPluginTable* table);
 
 }  // namespace internal
 
-struct PluginHost::Loaded : internal::OpenedPlugin {};
-
 }  // namespace alidade

@@ -12,7 +12,9 @@
 #include "alidade/io/log.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/create.h"
 #include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/plugin_models.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
@@ -35,6 +37,33 @@ constexpr const char* kGiven = "given";
 
 const char* ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? kSensorKind : kMotionKind;
+}
+
+/// Appends the entries of the plugin, and those of an unknown kind to the refusals.
+void AddEntries(const internal::OpenedPlugin& plugin, std::vector<PluginEntry>& entries,
+                std::vector<Refusal>& refusals) {
+  if (plugin.cpp_table != nullptr) {
+    for (int i = 0; i < plugin.cpp_table->entry_count; ++i) {
+      const CppEntry& entry = plugin.cpp_table->entries[i];
+      entries.push_back({entry.kind, entry.name, Text(entry.doc), Text(entry.citation), "",
+                         plugin.file, 0, Text(entry.keys), entry.factory});
+    }
+    return;
+  }
+  const AlidadeTable table = internal::ReadPrefix(plugin.table);
+  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
+    const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
+    if (!internal::IsKnown(entry)) {
+      refusals.push_back({plugin.file,
+                          std::string("its entry '") + entry.name + "' is of kind " +
+                              std::to_string(entry.kind) +
+                              ", which this version does not know; the others are used",
+                          ExitCode::kPlugin});
+      continue;
+    }
+    entries.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
+                       Text(entry.family), plugin.file, entry.thread_flags, "", nullptr, entry});
+  }
 }
 
 }  // namespace
@@ -71,8 +100,6 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
   const fs::path own = internal::FolderOfProgram();
   if (!own.empty()) LoadPlace(own / "plugins", "next to the program", false);
 }
-
-PluginHost::~PluginHost() = default;
 
 PluginHost PluginHost::Complete() const { return PluginHost(given_, OnRefusal::kList); }
 
@@ -134,44 +161,20 @@ void PluginHost::Load(const fs::path& file) {
   std::error_code error;
   const fs::path canonical = fs::canonical(file, error);
   if (error) Refuse(file, error.message());
-  const auto same = [&](const auto& other) {
-    return other->file == canonical || fs::equivalent(other->file, canonical, error);
+  const auto same = [&](const fs::path& other) {
+    return other == canonical || fs::equivalent(other, canonical, error);
   };
   if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical)}));
+  const internal::OpenedPlugin plugin = internal::OpenPlugin(file, canonical);
+  loaded_.push_back(canonical);
   const std::size_t before = entries_.size();
-  AddEntries(*loaded_.back());
+  AddEntries(plugin, entries_, refusals_);
   if (!IsLogged(LogLevel::kDebug)) return;
   std::string names;
   for (std::size_t i = before; i < entries_.size(); ++i) {
     names += (i > before ? ", " : "") + entries_[i].name;
   }
   Log(LogLevel::kDebug, "plugin loaded: " + canonical.string() + ": " + names);
-}
-
-void PluginHost::AddEntries(const Loaded& plugin) {
-  if (plugin.cpp_table != nullptr) {
-    for (int i = 0; i < plugin.cpp_table->entry_count; ++i) {
-      const CppEntry& entry = plugin.cpp_table->entries[i];
-      entries_.push_back({entry.kind, entry.name, Text(entry.doc), Text(entry.citation), "",
-                          plugin.file, 0, Text(entry.keys), entry.factory});
-    }
-    return;
-  }
-  const AlidadeTable table = internal::ReadPrefix(plugin.table);
-  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
-    const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
-    if (!internal::IsKnown(entry)) {
-      refusals_.push_back({plugin.file,
-                           std::string("its entry '") + entry.name + "' is of kind " +
-                               std::to_string(entry.kind) +
-                               ", which this version does not know; the others are used",
-                           ExitCode::kPlugin});
-      continue;
-    }
-    entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
-                        Text(entry.family), plugin.file, entry.thread_flags});
-  }
 }
 
 const PluginEntry& PluginHost::Find(const std::string& kind, const std::string& name,
@@ -220,11 +223,14 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
   throw Error(code, ErrorLine(at.place(), at.path(), what, {}, Nearest(name, names)) + places);
 }
 
-const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
-  const auto same = [&](const auto& plugin) { return plugin->file == file; };
-  const auto found = std::find_if(loaded_.begin(), loaded_.end(), same);
-  ALIDADE_EXPECTS(found != loaded_.end());
-  return **found;
+SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,
+                                      const std::string& representation) const {
+  return std::make_shared<PluginSensor>(
+      CreateModel(Find(kSensorKind, name, entry), entry, representation));
+}
+
+SharedMotion PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
+  return std::make_shared<PluginMotion>(CreateModel(Find(kMotionKind, name, entry), entry));
 }
 
 std::string PluginPlaces(const PluginHost& host) {

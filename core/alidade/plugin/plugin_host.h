@@ -2,10 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <map>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -22,10 +18,10 @@ namespace alidade {
 struct ParamInfo {
   std::string key, unit, doc;
   std::string type;                  ///< number, integer, flag, choice, or `number[3]`
-  std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
-  std::string fallback;              ///< the default as text, "" where the key is required
+  std::string range;                 ///< `> 0`, `[1, 3]`, or "" if everything is allowed
+  std::string fallback;              ///< the default as text, "" if the key is required
   std::vector<std::string> choices;  ///< of a choice
-  std::string when;  ///< `noise_model = constant` where only that choice reads it, else ""
+  std::string when;  ///< `noise_model = constant` if only that choice reads it, else ""
 };
 
 /// The kinds of models; those of C++ plugins are named by the headers of their interfaces.
@@ -40,6 +36,7 @@ struct PluginEntry {
   unsigned thread_flags = 0;      ///< ALIDADE_THREAD_*; of a factory 0
   std::string keys = {};          ///< of a factory: CppEntry::keys
   const void* factory = nullptr;  ///< CppEntry::factory; of a model null
+  AlidadeEntry model = {};        ///< of a model, as its table has it
 
   bool is_model() const { return factory == nullptr; }
 };
@@ -55,9 +52,9 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Finds and loads plugins and creates their models. A file is opened only if CheckTrusted accepts
-/// it and its build tag, read from the bytes beforehand, fits this program. Plugins are never
-/// unloaded. Creation is safe from several threads.
+/// Finds and loads plugins. A file is opened only if CheckTrusted accepts it and its build tag, read
+/// from the bytes beforehand, fits this program. Plugins are never unloaded. Const members may be
+/// called from several threads.
 class PluginHost {
  public:
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
@@ -69,26 +66,14 @@ class PluginHost {
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
                       OnRefusal on_refusal = OnRefusal::kThrow,
                       const std::optional<std::set<std::string>>& only = {});
-  ~PluginHost();
 
-  /// A model from its config entry: reads its parameters there, leaving unread keys to
-  /// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
-  /// sensor that has this choice; "": as it is written. Errors: kPlugin with the places searched,
-  /// kBadConfig.
+  /// The model of that name, made by CreateModel. Errors: those of Find and of CreateModel.
   SharedSensor CreateSensor(const std::string& name, const Node& entry,
                             const std::string& representation = {}) const;
   SharedMotion CreateMotion(const std::string& name, const Node& entry) const;
-  /// The model `entry` of entries(), also where another plugin offers its name.
-  std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
-                                              const std::string& representation = {}) const;
   /// The only entry of that kind and name, which `node` asks for. Errors: kPlugin with the places
   /// searched if there is none, and if there are two.
   const PluginEntry& Find(const std::string& kind, const std::string& name, const Node& node) const;
-  /// Runs `call`, which calls the factory of `entry` with the parameters in `node` and returns
-  /// whether it made something; one call at a time. Errors: those of the parameters before those of
-  /// the factory, kPlugin for anything else that it throws.
-  void CallFactory(const PluginEntry& entry, const Node& node,
-                   const std::function<bool(Params&)>& call) const;
 
   /// Whether no plugin was left closed for its names.
   bool complete() const { return !only_; }
@@ -96,38 +81,24 @@ class PluginHost {
   PluginHost Complete() const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
-  /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
-  std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
-  /// The keys of a factory, and the parameters that `call` reads with stand-in values.
-  std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
-                                       const std::function<void(Params&)>& call) const;
-  /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
-  /// each, for `plugins info`.
-  std::vector<std::string> Describe(const PluginEntry& entry) const;
   /// Every place looked at, in order, with what was found there in the plugins that were opened.
   const std::vector<std::string>& searched() const { return searched_; }
   const std::vector<Refusal>& refusals() const { return refusals_; }
 
  private:
-  struct Loaded;
   void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
   void LoadFolder(const std::filesystem::path& folder, bool required, bool whole);
   void LoadFile(const std::filesystem::path& file, bool required);
   void Load(const std::filesystem::path& file);
-  void AddEntries(const Loaded& plugin);
-
   [[noreturn]] void FailMissing(const std::string& kind, const std::string& name,
                                 const Node& node) const;
-  const Loaded& LoadedFrom(const std::filesystem::path& file) const;
-  AlidadeEntry EntryOf(const PluginEntry& entry) const;
 
-  const std::vector<std::filesystem::path> given_;
-  const std::optional<std::set<std::string>> only_;
-  std::vector<std::unique_ptr<Loaded>> loaded_;
+  std::vector<std::filesystem::path> given_;
+  std::optional<std::set<std::string>> only_;
+  std::vector<std::filesystem::path> loaded_;  ///< canonical
   std::vector<PluginEntry> entries_;
   std::vector<std::string> searched_;
   std::vector<Refusal> refusals_;
-  mutable std::recursive_mutex create_mutex_;  ///< a source may create models
 };
 
 /// Every place searched and what was found there, and every file refused with the reason.

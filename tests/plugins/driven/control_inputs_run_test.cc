@@ -256,7 +256,7 @@ TEST_F(DrivenTest, ExplainShowsWhereTheInputComesFrom) {
 
 TEST_F(DrivenTest, TheModelPassesTheChecker) {
   for (const Finding& finding :
-       CheckModel(host_, FindModels(host_, Built("driven").string(), "driven").at(0),
+       CheckModel(FindModels(host_, Built("driven").string(), "driven").at(0),
                   Config::FromText("noise: {speed: 0.2}", "driven").root(), {})) {
     EXPECT_NE(finding.verdict, Finding::Verdict::kFail) << finding.check << ' ' << finding.words;
   }

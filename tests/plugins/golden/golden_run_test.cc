@@ -57,7 +57,7 @@ TEST_P(GoldenRun, KeepsTheRules) {
     const std::vector<PluginEntry> entries = FindModels(Host(), Lent(), name);
     ASSERT_EQ(entries.size(), 1u) << name;
     const Config config = Parse(parameters);
-    const auto findings = CheckModel(Host(), entries.front(), config.root(), {});
+    const auto findings = CheckModel(entries.front(), config.root(), {});
     EXPECT_FALSE(AnyFailure(findings)) << CheckText(entries.front(), findings);
   }
 }

@@ -28,7 +28,7 @@ TEST_F(LaterPlugin, WithLargerStructsAndUnknownHintsWorks) {
   EXPECT_EQ(z, 6.5);
   EXPECT_EQ(sensor->roles()[1].name, "b");
   const auto entries = FindModels(host, Built("later"), "later_sensor");
-  const auto findings = CheckModel(host, entries.front(), Parse("{}").root(), {});
+  const auto findings = CheckModel(entries.front(), Parse("{}").root(), {});
   EXPECT_FALSE(AnyFailure(findings)) << CheckText(entries.front(), findings);
 }
 

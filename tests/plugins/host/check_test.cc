@@ -35,7 +35,7 @@ std::string Joined(const std::vector<std::string>& lines) {
 class CheckTest : public HostTest {
  protected:
   std::vector<Finding> Checked(const std::string& model, const CheckOptions& options = {}) {
-    return CheckModel(host_, FindModels(host_, Built("bad_models").string(), model).at(0),
+    return CheckModel(FindModels(host_, Built("bad_models").string(), model).at(0),
                       Config::FromText("{}", model).root(), options);
   }
   PluginHost host_{{Built("bad_models")}};
@@ -179,7 +179,7 @@ TEST_F(CheckTest, NamesADestroyThatHangsAfterParametersAreRefused) {
   options.timeout_s = 1.0;
   const Config config = Config::FromText("{unread: 1}", "test");
   const auto findings =
-      CheckModel(host_, FindModels(host_, Built("bad_models").string(), "hangs_in_destroy").at(0),
+      CheckModel(FindModels(host_, Built("bad_models").string(), "hangs_in_destroy").at(0),
                  config.root(), options);
   EXPECT_EQ(Joined(Failures(findings)),
             "create: the check took longer than 1 s (--timeout); it was in destroy\n");
@@ -236,7 +236,7 @@ TEST_F(CheckTest, ParametersThatDoNotFitAreErrorsOfTheConfig) {
   const auto stereo = FindModels(host_, "stereo_disparity").at(0);
   const auto check = [&](const std::string& parameters) {
     const Config config = Parse(parameters);
-    CheckModel(host_, stereo, config.root());
+    CheckModel(stereo, config.root());
   };
   ExpectError(ExitCode::kBadConfig, {"test.yaml:1:1 sigma_px: missing", "focal_px: missing"},
               [&] { check("{baseline_m: 0.1}"); });
@@ -287,7 +287,7 @@ TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   CheckOptions options;
   for (const std::uint64_t seed : {9, 99, 119, 124, 139}) {
     options.seed = seed;
-    EXPECT_EQ(Joined(Failures(CheckModel(host_, odometry, config.root(), options))), "") << seed;
+    EXPECT_EQ(Joined(Failures(CheckModel(odometry, config.root(), options))), "") << seed;
   }
 }
 
@@ -336,7 +336,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
     EXPECT_NE(first, last) << "no parameters here for " << entry.name;
     for (auto row = first; row != last; ++row, ++checked) {
       const Config config = Parse(row->second);
-      EXPECT_EQ(Joined(Failures(CheckModel(host_, entry, config.root()))), "")
+      EXPECT_EQ(Joined(Failures(CheckModel(entry, config.root()))), "")
           << entry.name << ' ' << row->second;
     }
   }

@@ -3,6 +3,7 @@
 
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/source_plugin.h"
+#include "alidade/plugin/create.h"
 #include "alidade/plugin/plugin_file.h"
 #include "host_fixture.h"
 
@@ -32,10 +33,10 @@ TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
               [&] { CreateSource(host, incomplete, 1); });
   const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
                                     [](const PluginEntry& e) { return e.name == "counter"; });
-  const std::vector<ParamInfo> schema = SourceSchema(host, *counter);
+  const std::vector<ParamInfo> schema = SourceSchema(*counter);
   EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
   EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
-  EXPECT_THROW(host.Schema(*counter), ContractViolation);
+  EXPECT_THROW(ModelSchema(*counter), ContractViolation);
 }
 
 TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {

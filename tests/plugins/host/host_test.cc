@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "alidade/plugin/cpp_plugin.h"
+#include "alidade/plugin/create.h"
 #include "host_fixture.h"
 
 namespace alidade {
@@ -333,7 +334,7 @@ TEST_F(HostTest, AModelReadsTexts) {
               [&] { host.CreateSensor("titled", control.root()); });
   const auto titled = std::ranges::find(host.entries(), "titled", &PluginEntry::name);
   ASSERT_NE(titled, host.entries().end());
-  const std::vector<ParamInfo> schema = host.Schema(*titled);
+  const std::vector<ParamInfo> schema = ModelSchema(*titled);
   const auto title = std::ranges::find(schema, "title", &ParamInfo::key);
   ASSERT_NE(title, schema.end());
   EXPECT_EQ(title->type, "text");
@@ -362,7 +363,7 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
     const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
     const auto entry = std::find_if(host.entries().begin(), host.entries().end(), has_name);
     ASSERT_NE(entry, host.entries().end());
-    EXPECT_TRUE(host.Schema(*entry).empty()) << name;
+    EXPECT_TRUE(ModelSchema(*entry).empty()) << name;
   }
 }
 
@@ -407,7 +408,7 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
   const PluginHost host;
   const auto schema = [&](const std::string& name) {
     const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
-    return host.Schema(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
+    return ModelSchema(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
   };
   const std::vector<ParamInfo> scale = schema("scale_2d");
   EXPECT_EQ(Param(scale, "noise_model").type, "choice");
@@ -428,7 +429,7 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
 
 TEST_F(HostTest, DescribesRolesAndMeasurement) {
   const PluginHost host({Built("range_rate")});
-  const std::vector<std::string> lines = host.Describe(host.entries().front());
+  const std::vector<std::string> lines = DescribeModel(host.entries().front());
   ASSERT_EQ(lines.size(), 4u);
   EXPECT_EQ(lines[0], "role position: vector(2), m; of the point");
   EXPECT_EQ(lines[2], "measurement range_rate: vector(1), m/s; closing is negative");
@@ -440,7 +441,7 @@ TEST_F(HostTest, DescribesWhatAModelCanDo) {
   const auto behind_the_blocks = [&](const std::string& name, std::size_t blocks) {
     const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
     const std::vector<std::string> lines =
-        host.Describe(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
+        DescribeModel(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
     return std::vector<std::string>(lines.begin() + std::ptrdiff_t(blocks), lines.end());
   };
   using Lines = std::vector<std::string>;

@@ -2,6 +2,7 @@
 //
 // FAULTS 58: exceptions of plugins that are written against the C header, which forbids them.
 #include "alidade/io/log.h"
+#include "alidade/plugin/create.h"
 #include "host_fixture.h"
 
 namespace alidade {
@@ -37,8 +38,8 @@ TEST_F(ThrowsTest, InCreateIsAnErrorOfThePlugin) {
               [&] { Sensor("throws_int_in_create"); });
   for (const PluginEntry& entry : host_.entries()) {
     if (!entry.is_model()) continue;
-    EXPECT_NO_THROW(host_.Schema(entry)) << entry.name;
-    EXPECT_NO_THROW(host_.Describe(entry)) << entry.name;
+    EXPECT_NO_THROW(ModelSchema(entry)) << entry.name;
+    EXPECT_NO_THROW(DescribeModel(entry)) << entry.name;
   }
 }
 

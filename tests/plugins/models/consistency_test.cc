@@ -19,7 +19,7 @@
 #include "alidade/base/statistics.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/experiment/run.h"
-#include "alidade/plugin/plugin_host.h"
+#include "alidade/plugin/create.h"
 #include "alidade/state/dense_algebra.h"
 #include "support/sanitized.h"
 
@@ -194,7 +194,7 @@ std::string With(const PluginEntry& model, const ParamInfo& param, const std::st
 
 /// The choices of a model, but for the lens of a camera, which is not its own.
 std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
-  std::vector<ParamInfo> choices = AllModels().Schema(model);
+  std::vector<ParamInfo> choices = ModelSchema(model);
   std::erase_if(choices, [](const ParamInfo& param) {
     return param.choices.empty() || param.key.starts_with("camera.");
   });

@@ -53,12 +53,12 @@ std::string EndWords(const ChildEnd& end, const internal::CallRecord& record, do
 }
 
 /// One check, in a child process.
-Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& entry,
-                 const Node& parameters, const CheckOptions& options, bool& ended) {
+Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& parameters,
+                 const CheckOptions& options, bool& ended) {
   internal::CallRecord record;
   const auto work = [&]() -> std::string {
     try {
-      Context context(host, entry, parameters, options, record);
+      Context context(entry, parameters, options, record);
       const Finding finding = check.run(context);
       context.Close();
       return Encode(finding);
@@ -88,8 +88,8 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
 
 }  // namespace
 
-std::vector<Finding> CheckModel(const PluginHost& host, const PluginEntry& entry,
-                                const Node& parameters, const CheckOptions& options) {
+std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
+                                const CheckOptions& options) {
   ALIDADE_EXPECTS(entry.is_model() && options.states > 0 && options.timeout_s > 0.0);
   std::vector<Finding> findings;
   std::string stopped_by;
@@ -97,7 +97,7 @@ std::vector<Finding> CheckModel(const PluginHost& host, const PluginEntry& entry
     Finding finding = internal::Skip("'" + stopped_by + "' failed");
     if (stopped_by.empty()) {
       bool ended = false;
-      finding = RunCheck(check, host, entry, parameters, options, ended);
+      finding = RunCheck(check, entry, parameters, options, ended);
       const bool failed = finding.verdict == Finding::Verdict::kFail;
       if (failed && (check.needed || ended)) stopped_by = check.name;
     }

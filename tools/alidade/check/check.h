@@ -34,8 +34,8 @@ struct Finding {
 /// Checks the model `entry` of `host` made from `parameters`, each check in a child process with
 /// the limits of `options`. After one on which the rest depends has failed, the rest is skipped.
 /// docs/check.md lists the checks. Errors: kBadConfig where the parameters do not fit.
-std::vector<Finding> CheckModel(const PluginHost& host, const PluginEntry& entry,
-                                const Node& parameters, const CheckOptions& options = {});
+std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
+                                const CheckOptions& options = {});
 
 /// The sensors and motion models of `plugin`: a file, a file's name on the search path without
 /// `alidade_` and `.so`, or the name of a model; of these the one named `model` unless that is "".

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/io/log.h"
+#include "alidade/plugin/create.h"
 
 namespace alidade::internal {
 namespace {
@@ -24,9 +25,9 @@ bool Overflows(const CheckedState& state, const Answer& answer) {
 
 }  // namespace
 
-Context::Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
-                 const CheckOptions& options, CallRecord& record)
-    : host_(host), entry_(entry), parameters_(parameters), options_(options), record_(record) {
+Context::Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
+                 CallRecord& record)
+    : entry_(entry), parameters_(parameters), options_(options), record_(record) {
   model_ = Create();
 }
 
@@ -50,7 +51,7 @@ const std::vector<CheckedState>& Context::states() {
 
 std::unique_ptr<ModelUnderTest> Context::Create() const {
   record_.Enter("create");
-  return std::make_unique<ModelUnderTest>(host_.Create(entry_, parameters_));
+  return std::make_unique<ModelUnderTest>(CreateModel(entry_, parameters_));
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {

@@ -22,8 +22,8 @@ struct CheckedState {
 /// What a check works with, in the child process.
 class Context {
  public:
-  Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
-          const CheckOptions& options, CallRecord& record);
+  Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
+          CallRecord& record);
   /// The destruction of the model is noted as a call.
   ~Context() {
     if (model_) record_.Enter("destroy");
@@ -58,7 +58,6 @@ class Context {
  private:
   std::vector<Space> InputSpaces(const Function& f) const;
 
-  const PluginHost& host_;
   const PluginEntry& entry_;
   const Node& parameters_;
   const CheckOptions& options_;

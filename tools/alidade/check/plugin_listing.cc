@@ -13,6 +13,7 @@
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"
+#include "alidade/plugin/create.h"
 
 namespace alidade {
 namespace {
@@ -58,10 +59,10 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   return keys;
 }
 
-std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) {
-  if (entry.kind == kEstimatorKind) return WithCommonKeys(EstimatorSchema(host, entry));
-  if (entry.kind == kSourceKind) return SourceSchema(host, entry);
-  return entry.is_model() ? host.Schema(entry) : std::vector<ParamInfo>();
+std::vector<ParamInfo> KeysOf(const PluginEntry& entry) {
+  if (entry.kind == kEstimatorKind) return WithCommonKeys(EstimatorSchema(entry));
+  if (entry.kind == kSourceKind) return SourceSchema(entry);
+  return entry.is_model() ? ModelSchema(entry) : std::vector<ParamInfo>();
 }
 
 /// The entries called `name`; there may be none for a built-in estimator only.
@@ -151,10 +152,10 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
     if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
     text += "  plugin: " + entry->plugin.string() + '\n';
     text += '\n';
-    const std::vector<std::string> lines = host.Describe(*entry);
+    const std::vector<std::string> lines = DescribeModel(*entry);
     for (const std::string& line : lines) text += "  " + line + '\n';
     if (!lines.empty()) text += '\n';
-    text += Parameters(KeysOf(host, *entry));
+    text += Parameters(KeysOf(*entry));
   }
   return text;
 }
@@ -169,8 +170,8 @@ std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   }
   for (const PluginEntry* entry : Named(host, name)) {
     Json& one = json.emplace_back(JsonOf(*entry));
-    one["describes"] = host.Describe(*entry);
-    one["parameters"] = JsonOf(KeysOf(host, *entry));
+    one["describes"] = DescribeModel(*entry);
+    one["parameters"] = JsonOf(KeysOf(*entry));
   }
   return internal::JsonText(json);
 }

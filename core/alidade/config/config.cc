@@ -21,28 +21,6 @@ using internal::Origin;
 using internal::PathOf;
 using internal::Quoted;
 
-namespace internal {
-
-std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree) {
-  auto copy = std::make_unique<ConfigTree>();
-  copy->kind = tree.kind;
-  copy->quoted = tree.quoted;
-  copy->place = tree.place;
-  copy->text = tree.text;
-  copy->key = tree.key;
-  copy->index = tree.index;
-  copy->key_line = tree.key_line;
-  copy->key_column = tree.key_column;
-  copy->children.reserve(tree.children.size());
-  for (const auto& child : tree.children) {
-    copy->children.push_back(Clone(*child));
-    copy->children.back()->parent = copy.get();
-  }
-  return copy;
-}
-
-}  // namespace internal
-
 namespace {
 
 bool NamesAnotherModel(const ConfigTree& old, const ConfigTree& next) {
@@ -339,14 +317,12 @@ Config Config::Copy() const {
 
 Config Config::Merged(const Node& overrides) const {
   if (!overrides.is_map()) overrides.Fail("not a map", "a map of keys to override");
-  const auto over = Clone(*overrides.tree_);
-  KeepPaths(*overrides.tree_, *over);
+  const auto over = Clone(overrides.tree());
+  KeepPaths(overrides.tree(), *over);
   Config config = Copy();
   Merge(config.tree_.get(), over.get());
   return config;
 }
-
-std::string Node::ToYaml() const { return internal::ToYaml(*tree_); }
 
 std::string Config::ToYaml() const { return internal::ToYaml(*tree_); }
 

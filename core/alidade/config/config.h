@@ -28,6 +28,7 @@ class Node {
   enum class Kind { kNull, kScalar, kList, kMap };
 
   explicit Node(const ConfigTree* tree) : tree_(tree) {}
+  const ConfigTree& tree() const { return *tree_; }
 
   Kind kind() const;
   bool is_map() const { return kind() == Kind::kMap; }
@@ -62,10 +63,6 @@ class Node {
   int Choice(const std::vector<std::string>& choices) const;
   /// A list of numbers; a bare number counts as a list of one. `size` < 0: any length above zero.
   std::vector<double> Numbers(int size = -1) const;
-  /// A square, symmetric, positive semi-definite matrix of `size`, row-major; given as a list of
-  /// rows. Fails with the smallest eigenvalue where it is not PSD. Asymmetry up to 1e-9 of the
-  /// standard deviations is rounding: the mean of both entries is returned.
-  std::vector<double> Covariance(int size) const;
 
   /// Map: fails on every key that was never asked for, with the nearest asked one; also in the maps
   /// below of which a key was asked for.
@@ -83,7 +80,6 @@ class Node {
                          std::string_view suggestion = {}) const;
 
  private:
-  friend class Config;
   const ConfigTree* tree_;
 };
 

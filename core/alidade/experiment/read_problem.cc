@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "alidade/base/words.h"
+#include "alidade/config/read_covariance.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/owned_state.h"
 #include "alidade/estimation/time_offset.h"
@@ -43,7 +44,7 @@ Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
     node.Fail("needs its uncertainty once", "sigma or covariance");
   }
   if (covariance) {
-    const std::vector<double> values = covariance->Covariance(size);
+    const std::vector<double> values = internal::ReadCovariance(*covariance, size);
     return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
   }
   std::vector<double> values = sigma->Numbers();

@@ -5,6 +5,8 @@
 #include <limits>
 #include <string>
 
+#include "alidade/config/read_covariance.h"
+
 namespace alidade::internal {
 namespace {
 
@@ -55,7 +57,7 @@ std::vector<double> RootForModel(const Node& covariance, const ModelInstance& mo
   const int n = sensor ? model.space().geometry.tangent : model.c().description->noise_count;
   bool singular = false;
   std::vector<double> root =
-      RootOf(covariance.Covariance(n), static_cast<std::size_t>(n), singular);
+      RootOf(ReadCovariance(covariance, n), static_cast<std::size_t>(n), singular);
   if (sensor && singular) {
     covariance.Fail("singular: a measurement without noise in one direction",
                     "a positive definite covariance");

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/config/read_covariance.h"
 #include "support/comma_locale.h"
 #include "support/config_text.h"
 
@@ -184,11 +185,11 @@ TEST(Node, NumbersHaveTheLengthAsked) {
             "an empty list; expected at least one number");
 }
 
-TEST(Node, CovarianceIsSquareSymmetricAndPositive) {
+TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
   const auto error = [](const std::string& text) {
-    return MessageOf(text, [](const Node& node) { return node.Covariance(2); });
+    return MessageOf(text, [](const Node& node) { return internal::ReadCovariance(node, 2); });
   };
-  EXPECT_EQ(Read("v: [[4, 1], [1, 2]]").root().At("v").Covariance(2),
+  EXPECT_EQ(internal::ReadCovariance(Read("v: [[4, 1], [1, 2]]").root().At("v"), 2),
             (std::vector<double>{4, 1, 1, 2}));
   EXPECT_EQ(error("[[1, 1], [1, 1]]"), "no error");
   EXPECT_EQ(error("[[0, 0], [0, 1e-20]]"), "no error");
@@ -202,7 +203,7 @@ TEST(Node, CovarianceIsSquareSymmetricAndPositive) {
             "not positive semi-definite: its smallest eigenvalue is -1; expected a covariance");
   // So are they where the units of the blocks are far apart.
   const std::string mixed = "[[1e6, 0, 0], [0, 1e-14, 2e-14], [0, 2e-14, 1e-14]]";
-  EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return node.Covariance(3); }),
+  EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return internal::ReadCovariance(node, 3); }),
             "not positive semi-definite: its smallest eigenvalue is -1e-14; expected a covariance");
   // A value that is known has no covariance with another: the eigenvalues are 1 and -1e-18.
   EXPECT_EQ(error("[[0, 1e-9], [1e-9, 1]]"),

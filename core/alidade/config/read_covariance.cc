@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/config/read_covariance.h"
+
+#include <cmath>
+
+#include "alidade/base/number_text.h"
+#include "alidade/state/dense_algebra.h"
+
+namespace alidade::internal {
+namespace {
+
+/// Each entry divided by the standard deviations of its row and column (1 where that is zero), so
+/// that tolerances do not depend on units.
+Eigen::MatrixXd Correlation(const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd sigma = covariance.diagonal().unaryExpr(
+      [](double variance) { return variance > 0 ? std::sqrt(variance) : 1.0; });
+  const Eigen::VectorXd scale = sigma.cwiseInverse();
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
+}
+
+void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
+  constexpr double kTolerance = 1e-9;
+  const Eigen::MatrixXd scaled = Correlation(covariance);
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      if (!(std::abs(scaled(i, j) - scaled(j, i)) > kTolerance)) continue;
+      const auto entry = [&](Eigen::Index row, Eigen::Index column) {
+        return '[' + std::to_string(row) + "][" + std::to_string(column) + "] is " +
+               NumberText(covariance(row, column));
+      };
+      node.Fail("not symmetric: " + entry(j, i) + ", " + entry(i, j), "a covariance");
+    }
+  }
+}
+
+void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
+  const Eigen::Index size = covariance.rows();
+  const double tolerance = 1e-12 * static_cast<double>(size);
+  bool positive = EigenvaluesOf(Correlation(covariance))[0] >= -tolerance;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const double variance = covariance(i, i);
+    if (variance < 0 || (variance == 0 && !covariance.row(i).isZero(0))) positive = false;
+  }
+  if (positive) return;
+  double smallest = EigenvaluesOf(covariance)[0];
+  const bool drowned = smallest >= 0;  // in the rounding of a much larger one
+  if (drowned) smallest = EigenvaluesOf(Correlation(covariance))[0];
+  node.Fail(std::string("not positive semi-definite: ") + (drowned ? "its correlation's" : "its") +
+                " smallest eigenvalue is " + RoundedText(smallest, 6),
+            "a covariance");
+}
+
+}  // namespace
+
+std::vector<double> ReadCovariance(const Node& node, int size) {
+  const std::string expected = std::to_string(size) + " rows of " + std::to_string(size);
+  if (node.kind() != Node::Kind::kList) node.Fail("not a list of rows", expected);
+  const std::vector<Node> rows = node.Items();
+  if (rows.size() != static_cast<std::size_t>(size)) {
+    node.Fail("has " + std::to_string(rows.size()) + (rows.size() == 1 ? " item" : " items"),
+              expected);
+  }
+  Eigen::MatrixXd matrix(size, size);
+  for (int i = 0; i < size; ++i) {
+    const Node& row = rows[static_cast<std::size_t>(i)];
+    if (row.kind() != Node::Kind::kList) row.Fail("not a row of numbers", expected);
+    const std::vector<double> numbers = row.Numbers(size);
+    matrix.row(i) = Eigen::Map<const Eigen::RowVectorXd>(numbers.data(), size);
+  }
+  if (size == 0) return {};
+  CheckSymmetric(node, matrix);
+  matrix = (0.5 * (matrix + matrix.transpose())).eval();
+  CheckPositive(node, matrix);
+  return {matrix.data(), matrix.data() + matrix.size()};
+}
+
+}  // namespace alidade::internal

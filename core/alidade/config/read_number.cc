@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/config/read_number.h"
+
+#include <charconv>
+#include <limits>
+
+#include "alidade/base/number_text.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+std::size_t SkipDigits(std::string_view text, std::size_t at) {
+  while (at < text.size() && IsDigit(text[at])) ++at;
+  return at;
+}
+
+/// The digits of a decimal number: [+-] digits [. digits] [e [+-] digits].
+struct Decimal {
+  bool valid = false;
+  bool integer = false;
+  bool leading_zero = false;
+};
+
+Decimal Scan(std::string_view text) {
+  Decimal decimal;
+  const std::size_t begin = !text.empty() && (text[0] == '-' || text[0] == '+') ? 1 : 0;
+  const std::size_t whole_end = SkipDigits(text, begin);
+  std::size_t end = whole_end;
+  std::size_t digits = whole_end - begin;
+  if (end < text.size() && text[end] == '.') {
+    end = SkipDigits(text, whole_end + 1);
+    digits += end - whole_end - 1;
+  }
+  if (digits == 0) return decimal;
+  if (end < text.size() && (text[end] == 'e' || text[end] == 'E')) {
+    std::size_t exponent = end + 1;
+    if (exponent < text.size() && (text[exponent] == '-' || text[exponent] == '+')) ++exponent;
+    end = SkipDigits(text, exponent);
+    if (end == exponent) return decimal;
+  }
+  decimal.valid = end == text.size();
+  decimal.integer = whole_end == text.size();
+  decimal.leading_zero = whole_end - begin > 1 && text[begin] == '0';
+  return decimal;
+}
+
+std::string Interval(const char* kind, double low, double high, bool low_open, bool high_open) {
+  std::string text = kind;
+  if (low == -kInfinity && high == kInfinity) return text;
+  if (high == kInfinity) return text + (low_open ? " > " : " >= ") + NumberText(low);
+  if (low == -kInfinity) return text + (high_open ? " < " : " <= ") + NumberText(high);
+  return text + " in " + (low_open ? '(' : '[') + NumberText(low) + ", " + NumberText(high) +
+         (high_open ? ')' : ']');
+}
+
+/// The text of a plain scalar that is a decimal number as `expected` says, without a leading '+'.
+std::string_view DecimalText(const ConfigTree& tree, const std::string& expected) {
+  const Node node(&tree);
+  if (tree.kind == Node::Kind::kNull) node.Fail("no value", expected);
+  if (tree.kind == Node::Kind::kList) node.Fail("a list", expected);
+  if (tree.kind == Node::Kind::kMap) node.Fail("a map", expected);
+  const std::string_view text = tree.text;
+  if (tree.quoted) node.Fail("the quoted text " + Quoted(text), expected);
+  const Decimal decimal = Scan(text);
+  if (!decimal.valid) node.Fail(Quoted(text) + " is not a finite number", expected);
+  if (decimal.leading_zero) node.Fail(Quoted(text) + " has a leading zero", expected);
+  return text[0] == '+' ? text.substr(1) : text;
+}
+
+}  // namespace
+
+double ReadNumber(const ConfigTree& tree, const std::string& expected) {
+  const std::string_view text = DecimalText(tree, expected);
+  double value = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc()) {
+    Node(&tree).Fail(Quoted(tree.text) + " is too large or too small for a number", expected);
+  }
+  return value;
+}
+
+double ReadNumber(const ConfigTree& tree, double low, double high, bool low_open, bool high_open) {
+  const std::string expected = Interval("a number", low, high, low_open, high_open);
+  const double value = ReadNumber(tree, expected);
+  if (value < low || value > high || (low_open && value == low) || (high_open && value == high)) {
+    Node(&tree).Fail(Quoted(tree.text) + " is out of range", expected);
+  }
+  return value;
+}
+
+std::int64_t ReadInteger(const ConfigTree& tree, std::int64_t low, std::int64_t high) {
+  constexpr auto kLowest = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kHighest = std::numeric_limits<std::int64_t>::max();
+  std::string expected = "an integer";
+  if (low != kLowest && high != kHighest) {
+    expected += " in [" + std::to_string(low) + ", " + std::to_string(high) + ']';
+  } else if (low != kLowest) {
+    expected += " >= " + std::to_string(low);
+  } else if (high != kHighest) {
+    expected += " <= " + std::to_string(high);
+  }
+  const std::string_view text = DecimalText(tree, expected);
+  if (!Scan(text).integer) Node(&tree).Fail(Quoted(tree.text) + " is not an integer", expected);
+  std::int64_t value = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc() || value < low || value > high) {
+    Node(&tree).Fail(Quoted(tree.text) + " is out of range", expected);
+  }
+  return value;
+}
+
+}  // namespace alidade::internal

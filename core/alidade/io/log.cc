@@ -129,12 +129,12 @@ bool IsLogged(LogLevel level) {
 }
 
 void Log(LogLevel level, std::string_view text) noexcept {
-  if (log_scope != nullptr) level = std::min(level, log_scope->highest_);
+  if (log_scope != nullptr) level = std::min(level, log_scope->highest());
   if (in_log_sink || !IsLogged(level)) return;
   in_log_sink = true;
   try {
     if (log_scope != nullptr) {
-      Logger::Get().Write(level, log_scope->prefix_ + std::string(text));
+      Logger::Get().Write(level, log_scope->prefix() + std::string(text));
     } else {
       Logger::Get().Write(level, text);
     }

@@ -46,11 +46,13 @@ class LogScope {
   LogScope(const LogScope&) = delete;
   LogScope& operator=(const LogScope&) = delete;
 
+  const std::string& prefix() const { return prefix_; }
+  LogLevel highest() const { return highest_; }
+
  private:
   std::string prefix_;
   LogLevel highest_;
   const LogScope* outer_;
-  friend void Log(LogLevel level, std::string_view text) noexcept;
 };
 
 /// Whether a sink takes messages of that level: texts are composed only if so.

@@ -20,6 +20,8 @@
 
 namespace alidade {
 
+class Filter;
+
 /// What became of one measurement.
 enum class Outcome {
   kAccepted,     ///< also while the frame goes on, as long as nothing speaks against it
@@ -165,6 +167,8 @@ class Estimator {
   /// A copy, whose every result from here on has the bits that this one's would have; null: it
   /// cannot be copied.
   virtual std::unique_ptr<Estimator> Clone() const { return nullptr; }
+  /// This estimator as a recursive filter; null: it is not one.
+  virtual const Filter* AsFilter() const { return nullptr; }
   virtual const State& state() const = 0;
   /// The landmarks in the state, by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }

@@ -119,6 +119,7 @@ class Filter : public Estimator {
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
+  const Filter* AsFilter() const override { return this; }
   const State& state() const override;
   std::vector<LandmarkEstimate> landmarks() const override;
   Timestamp timestamp() const override;

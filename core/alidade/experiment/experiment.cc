@@ -137,7 +137,7 @@ int ReadReference(const Node& root, const std::vector<EstimatorSpec>& estimators
 std::string GuidesOf(const std::vector<EstimatorSpec>& estimators) {
   std::vector<std::string> names;
   for (const EstimatorSpec& one : estimators) {
-    if (dynamic_cast<const Filter*>(one.estimator.get()) != nullptr) names.push_back(one.name);
+    if (one.estimator->AsFilter() != nullptr) names.push_back(one.name);
   }
   return names.empty() ? "none, for `estimators` has no recursive filter, as of type ekf"
                        : "a recursive filter of `estimators`: " + internal::Join(names);
@@ -158,7 +158,7 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
     const std::vector<std::string> names = NamesOf(estimators);
     guide.Fail("no estimator '" + name + "'", GuidesOf(estimators), Nearest(name, names));
   }
-  const auto* const filter = dynamic_cast<const Filter*>(found->estimator.get());
+  const auto* const filter = found->estimator->AsFilter();
   if (filter == nullptr) {
     guide.Fail("estimator '" + name + "' (" + found->type + ") predicts no measurements",
                GuidesOf(estimators));

@@ -12,7 +12,8 @@ namespace {
 class WindowWriter : public MatWriter {
  public:
   explicit WindowWriter(const ImageArguments& arguments)
-      : MatWriter(arguments), window_(arguments.path.string(), arguments.shown) {}
+      : MatWriter(arguments.width, arguments.height),
+        window_(arguments.path.string(), arguments.shown) {}
   void Close() override {}
 
  private:

@@ -23,7 +23,8 @@ namespace {
 /// One PNG for each frame, `000000.png` and so on.
 class ImageSequenceWriter : public MatWriter {
  public:
-  using MatWriter::MatWriter;
+  explicit ImageSequenceWriter(const ImageArguments& arguments)
+      : MatWriter(arguments.width, arguments.height), to_(arguments) {}
   void Close() override {}
 
  private:
@@ -32,27 +33,30 @@ class ImageSequenceWriter : public MatWriter {
     cv::imencode(".png", image, bytes);
     char name[32];
     std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(number));
-    std::ofstream file(to().path / name, std::ios::binary);
+    std::ofstream file(to_.path / name, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));
     file.close();
     if (file) return;
-    throw Error(ExitCode::kIo, ErrorLine({to().shown + '/' + name}, {}, "cannot be written"));
+    throw Error(ExitCode::kIo, ErrorLine({to_.shown + '/' + name}, {}, "cannot be written"));
   }
+
+  ImageArguments to_;
 };
 
 /// A video, MJPG in AVI, of as many frames a second as the first two are apart, to whole numbers
 /// from 1; of a single frame 30. No image leaves no video. Errors: kCannotCreate, kIo.
 class VideoWriter : public MatWriter {
  public:
-  using MatWriter::MatWriter;
+  explicit VideoWriter(const ImageArguments& arguments)
+      : MatWriter(arguments.width, arguments.height), to_(arguments) {}
 
   void Close() override {
     if (first_.empty()) return;
     if (!video_.isOpened()) Open(kRateOfOne);
     video_.release();
     if (IsComplete()) return;
-    throw Error(ExitCode::kIo, ErrorLine({to().shown}, {}, "cannot be written in full"));
+    throw Error(ExitCode::kIo, ErrorLine({to_.shown}, {}, "cannot be written in full"));
   }
 
  private:
@@ -74,8 +78,8 @@ class VideoWriter : public MatWriter {
   }
   void Open(double rate_hz) {
     const int fourcc = cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
-    if (!video_.open(to().path.string(), cv::CAP_OPENCV_MJPEG, fourcc, rate_hz, first_.size())) {
-      throw Error(ExitCode::kCannotCreate, ErrorLine({to().shown}, {}, "cannot be created",
+    if (!video_.open(to_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, rate_hz, first_.size())) {
+      throw Error(ExitCode::kCannotCreate, ErrorLine({to_.shown}, {}, "cannot be created",
                                                      "OpenCV with its writer of Motion JPEG"));
     }
     constexpr double kQuality = 90.0;  // as good as JPEG files of quality 95 by imencode
@@ -91,13 +95,14 @@ class VideoWriter : public MatWriter {
   bool IsComplete() const {
     constexpr std::uintmax_t kHead = 8;  // bytes "RIFF" and the number of those that follow
     unsigned char head[kHead] = {};
-    std::ifstream(to().path, std::ios::binary).read(reinterpret_cast<char*>(head), sizeof head);
+    std::ifstream(to_.path, std::ios::binary).read(reinterpret_cast<char*>(head), sizeof head);
     std::uintmax_t size = 0;
     for (int i = 7; i >= 4; --i) size = size << 8U | head[i];
     std::error_code error;
-    return std::filesystem::file_size(to().path, error) == kHead + size && !error;
+    return std::filesystem::file_size(to_.path, error) == kHead + size && !error;
   }
 
+  ImageArguments to_;
   cv::VideoWriter video_;
   cv::Mat first_;
   Timestamp first_timestamp_ = 0;

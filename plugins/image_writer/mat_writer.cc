@@ -30,7 +30,7 @@ cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>>& pixe
 
 void MatWriter::Add(std::int64_t number, Timestamp timestamp,
                     const std::vector<std::array<double, 2>>& pixels) {
-  Write(number, timestamp, Draw(number, pixels, to_.width, to_.height));
+  Write(number, timestamp, Draw(number, pixels, width_, height_));
 }
 
 void MatWriter::Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <utility>
 #include <vector>
 
 #include "alidade/record/images.h"
@@ -18,19 +17,18 @@ namespace alidade {
 /// (0, 0).
 class MatWriter : public ImageWriter {
  public:
-  explicit MatWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
+  /// px, of the images that are drawn from points
+  MatWriter(int width, int height) : width_(width), height_(height) {}
 
   void Add(std::int64_t number, Timestamp timestamp,
            const std::vector<std::array<double, 2>>& pixels) override;
   void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) override;
   void Add(const RunView& view) override;
 
- protected:
-  virtual void Write(std::int64_t number, Timestamp timestamp, const cv::Mat& image) = 0;
-  const ImageArguments& to() const { return to_; }
-
  private:
-  ImageArguments to_;
+  virtual void Write(std::int64_t number, Timestamp timestamp, const cv::Mat& image) = 0;
+
+  int width_, height_;
 };
 
 }  // namespace alidade

@@ -64,7 +64,7 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   EXPECT_EQ(known->reprojection[0].rms[0], 1.0 / 3.0);
   EXPECT_TRUE(std::isnan(known->reprojection[0].rms[1]));
   ASSERT_EQ(known->estimators.size(), 1u);
-  const SweepEstimator &one = known->estimators[0], &was = expected.estimators[0];
+  const SweepRow &one = known->estimators[0], &was = expected.estimators[0];
   EXPECT_EQ(one.name, was.name);
   EXPECT_TRUE(one.diverged && one.failed && !one.inconsistent);
   EXPECT_EQ(one.units.names(), was.units.names());

@@ -15,7 +15,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 SweepRun RunWithErrors(std::vector<double> rms, bool diverged = false) {
   SweepRun run;
-  SweepEstimator& one = run.estimators.emplace_back();
+  SweepRow& one = run.estimators.emplace_back();
   one.name = "ekf";
   one.diverged = diverged;
   run.reprojection.push_back({"ekf", "pixels", "px", std::move(rms)});

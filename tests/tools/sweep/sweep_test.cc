@@ -34,7 +34,7 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
 using Metrics = std::map<std::string, double>;
 
 /// A run that has these metrics besides.
-SweepEstimator Add(const SweepEstimator& to, const Metrics& more) {
+SweepRow Add(const SweepRow& to, const Metrics& more) {
   EstimatorResult one;
   one.name = to.name;
   one.diverged = to.diverged;
@@ -43,11 +43,11 @@ SweepEstimator Add(const SweepEstimator& to, const Metrics& more) {
   for (std::size_t i = 0; i < to.metrics.names().size(); ++i) {
     one.metrics.try_emplace(to.metrics.names()[i], to.metrics.values()[i]);
   }
-  return SweepEstimator(one);
+  return SweepRow(one);
 }
 
-SweepEstimator Result(double rmse, bool diverged = false, bool inconsistent = false) {
-  SweepEstimator one;
+SweepRow Result(double rmse, bool diverged = false, bool inconsistent = false) {
+  SweepRow one;
   one.name = "ekf";
   one.diverged = diverged;
   one.inconsistent = inconsistent;
@@ -85,9 +85,9 @@ TEST(Summarise, LeavesOutWhatIsNotANumber) {
     run.estimators[0] =
         Add(run.estimators[0], {{"rmse:never", std::numeric_limits<double>::quiet_NaN()}});
   }
-  SweepEstimator& first = result.done[0].estimators[0];
+  SweepRow& first = result.done[0].estimators[0];
   first = Add(first, {{"rmse:x", std::numeric_limits<double>::quiet_NaN()}});
-  SweepEstimator& second = result.done[1].estimators[0];
+  SweepRow& second = result.done[1].estimators[0];
   second = Add(second, {{"rmse:a", 7.0}});  // of one run, before the others' keys
   const std::vector<SweepSummary> summaries = Summarise(result);
   EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
@@ -100,9 +100,9 @@ std::string TableOf(const SweepResult& result) { return SweepTable(result, Summa
 TEST(SweepFolder, RunsHaveTheirValuesInTheColumnsOfAll) {
   SweepResult result = SixRuns();
   result.done.resize(3);
-  SweepEstimator& first = result.done[0].estimators[0];
+  SweepRow& first = result.done[0].estimators[0];
   first = Add(first, {{"rmse:y", 5.0}});
-  SweepEstimator& third = result.done[2].estimators[0];
+  SweepRow& third = result.done[2].estimators[0];
   third = Add(third, {{"rmse:a", 7.0}, {"nis.mean:y", 8.0}});
   const testing::TemporaryFolder temporary;
   SweepFolder(temporary / "out", false)
@@ -142,7 +142,7 @@ TEST(Sweep, ItsRunsShareTheirNames) {
   options.jobs = 2;
   const SweepResult result = Sweep(config, host, options);
   ASSERT_EQ(result.done.size(), 8u);
-  const SweepEstimator& first = result.done[0].estimators.at(0);
+  const SweepRow& first = result.done[0].estimators.at(0);
   EXPECT_FALSE(first.metrics.names().empty());
   for (const SweepRun& run : result.done) {
     EXPECT_EQ(&run.estimators.at(0).metrics.names(), &first.metrics.names()) << run.seed;

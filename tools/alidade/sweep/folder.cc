@@ -106,7 +106,7 @@ RunResult AllKeys(const Parts& parts) {
   };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const SweepEstimator& one : run.estimators) {
+      for (const SweepRow& one : run.estimators) {
         add(one.metrics, keys.metrics);
         add(one.counts, keys.counts);
       }
@@ -156,7 +156,7 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
   header.insert(header.end(), metrics.names().begin(), metrics.names().end());
   header.insert(header.end(), counts.names().begin(), counts.names().end());
   CsvFile csv(folder, "runs.csv", header);
-  const auto write_run = [&](const Part& part, const SweepRun& run, const SweepEstimator& one) {
+  const auto write_run = [&](const Part& part, const SweepRun& run, const SweepRow& one) {
     if (!key.empty()) csv.Text(part.value);
     csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
     csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
@@ -170,7 +170,7 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
   };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const SweepEstimator& one : run.estimators) {
+      for (const SweepRow& one : run.estimators) {
         if (run.Uses(one) || one.diverged) write_run(part, run, one);
       }
     }

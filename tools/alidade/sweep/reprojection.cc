@@ -40,7 +40,7 @@ void AddTo(MeanErrors& sum, const FrameErrors& errors) {
 std::vector<MeanErrors> MeansOf(const SweepResult& result) {
   std::vector<MeanErrors> means;
   for (const SweepRun& run : result.done) {
-    for (const SweepEstimator& estimator : run.estimators) {
+    for (const SweepRow& estimator : run.estimators) {
       if (!run.Uses(estimator)) continue;
       for (const FrameErrors& errors : run.reprojection) {
         if (errors.estimator != estimator.name) continue;

@@ -39,7 +39,7 @@ double NumberOf(const Json& json) {
   return text == "-inf" ? -infinity : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string TextOfEstimator(const SweepEstimator& one) {
+std::string TextOfEstimator(const SweepRow& one) {
   const auto count = [](std::int64_t value) { return std::to_string(value); };
   const auto unit = [](const std::string& value) { return JsonString(value); };
   return "{\"name\":" + JsonString(one.name) + ",\"diverged\":" + TextOfFlag(one.diverged) +
@@ -49,7 +49,7 @@ std::string TextOfEstimator(const SweepEstimator& one) {
          MapText("metrics", one.metrics, TextOfNumber) + '}';
 }
 
-SweepEstimator EstimatorOf(const Json& json) {
+SweepRow EstimatorOf(const Json& json) {
   EstimatorResult one;
   one.name = json.at("name").get<std::string>();
   one.diverged = json.at("diverged").get<bool>();
@@ -58,7 +58,7 @@ SweepEstimator EstimatorOf(const Json& json) {
   one.units = json.at("units").get<std::map<std::string, std::string>>();
   one.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();
   for (const auto& [key, value] : json.at("metrics").items()) one.metrics[key] = NumberOf(value);
-  return SweepEstimator(one);
+  return SweepRow(one);
 }
 
 std::string TextOfErrors(const FrameErrors& errors) {
@@ -102,7 +102,7 @@ std::string RunLine(const std::string& value, const SweepRun& run) {
                      ",\"code\":" + std::to_string(static_cast<int>(run.code)) +
                      ",\"reason\":" + JsonString(run.reason) +
                      ",\"withheld\":" + TextOfFlag(run.withheld) + ",\"estimators\":[";
-  for (const SweepEstimator& one : run.estimators) {
+  for (const SweepRow& one : run.estimators) {
     line += TextOfEstimator(one);
     if (&one != &run.estimators.back()) line += ',';
   }

@@ -219,7 +219,7 @@ SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
   ValuesByName values;
   const std::vector<std::string>* units = nullptr;  // of the run before
   for (const SweepRun& run : result.done) {
-    for (const SweepEstimator& one : run.estimators) {
+    for (const SweepRow& one : run.estimators) {
       if (one.name != name) continue;
       if (&one.units.names() != units) AddUnits(one.units, summary.units);
       units = &one.units.names();

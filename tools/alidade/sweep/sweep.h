@@ -49,10 +49,10 @@ struct FrameErrors {
   std::vector<double> rms;  ///< not a number where a frame has none
 };
 
-/// What became of one estimator in one run: of an EstimatorResult, what all runs together rest on.
-struct SweepEstimator {
-  SweepEstimator() = default;
-  explicit SweepEstimator(const EstimatorResult& result)
+/// A row of runs.csv: the numbers of one EstimatorResult, the names shared with the other rows.
+struct SweepRow {
+  SweepRow() = default;
+  explicit SweepRow(const EstimatorResult& result)
       : name(result.name),
         metrics(result.metrics),
         counts(result.counts),
@@ -76,20 +76,20 @@ struct SweepRun {
   RunStatus status = RunStatus::kOk;
   ExitCode code = ExitCode::kOk;
   std::string reason;
-  std::vector<SweepEstimator> estimators;
+  std::vector<SweepRow> estimators;
   std::vector<FrameErrors> reprojection = {};  ///< of a varied sweep, the first 500 frames
   bool withheld = false;                       ///< no reference to compare with, as in RunResult
 
   /// Lets its estimators have one list of names with all that have the same, of other runs too.
   void ShareNames(SharedNames& with) {
-    for (SweepEstimator& one : estimators) {
+    for (SweepRow& one : estimators) {
       one.metrics.ShareNames(with);
       one.counts.ShareNames(with);
       one.units.ShareNames(with);
     }
   }
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
-  bool Uses(const SweepEstimator& one) const { return status == RunStatus::kOk && !one.diverged; }
+  bool Uses(const SweepRow& one) const { return status == RunStatus::kOk && !one.diverged; }
 };
 
 struct SweepResult {

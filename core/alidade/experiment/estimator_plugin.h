@@ -8,6 +8,7 @@
 
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/support.h"
+#include "alidade/model/params.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 

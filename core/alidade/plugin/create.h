@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/model/params.h"
+#include "alidade/plugin/model_instance.h"
 #include "alidade/plugin/plugin_host.h"
 
 /// Creation of what plugins offer, by the entries of a PluginHost. Safe from several threads: the

@@ -14,6 +14,17 @@ namespace alidade {
 
 struct CppPluginTable;
 
+/// The build tag in the `.alidade` section of a plugin, read from its bytes. Errors: kPlugin (no
+/// build tag, a malformed one, another plugin ABI).
+AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
+
+/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
+/// above it owned by another than root, the caller or the owner of the running program; writable
+/// for the world (sticky folders above excepted) or for a group other than the caller's private
+/// one, which has the caller's name and no other member. Follows symbolic links and checks each
+/// folder on the way. Errors: kNotTrusted.
+void CheckTrusted(const std::filesystem::path& file);
+
 namespace internal {
 
 /// The folders of ALIDADE_PLUGIN_PATH, in its order.

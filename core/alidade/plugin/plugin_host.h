@@ -9,8 +9,7 @@
 
 #include "alidade/config/config.h"
 #include "alidade/estimation/models.h"
-#include "alidade/model/params.h"
-#include "alidade/plugin/model_instance.h"
+#include "alidade/model/plugin_abi.h"
 
 namespace alidade {
 
@@ -103,16 +102,5 @@ class PluginHost {
 
 /// Every place searched and what was found there, and every file refused with the reason.
 std::string PluginPlaces(const PluginHost& host);
-
-/// The build tag in the `.alidade` section of a plugin, read from its bytes. Errors: kPlugin (no
-/// build tag, a malformed one, another plugin ABI).
-AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
-
-/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
-/// above it owned by another than root, the caller or the owner of the running program; writable
-/// for the world (sticky folders above excepted) or for a group other than the caller's private
-/// one, which has the caller's name and no other member. Follows symbolic links and checks each
-/// folder on the way. Errors: kNotTrusted.
-void CheckTrusted(const std::filesystem::path& file);
 
 }  // namespace alidade

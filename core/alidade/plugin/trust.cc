@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "alidade/io/follow_links.h"
-#include "alidade/plugin/plugin_host.h"
+#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace fs = std::filesystem;

@@ -11,6 +11,7 @@
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/run.h"
 #include "alidade/io/sha256.h"
+#include "alidade/plugin/plugin_file.h"
 #include "golden_fixture.h"
 #include "support/recording.h"
 

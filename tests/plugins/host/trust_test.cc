@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "alidade/plugin/plugin_file.h"
 #include "host_fixture.h"
 #include "support/recording.h"
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "alidade/plugin/abi_read.h"
+#include "alidade/plugin/plugin_file.h"
 #include "alidade/plugin/plugin_models.h"
 #include "plugins/golden/golden_fixture.h"
 

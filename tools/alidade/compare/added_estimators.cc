@@ -58,20 +58,15 @@ const std::vector<Variant>& Variants() {
   return variants;
 }
 
-/// Names of the sensors of a system, sorted.
-std::vector<std::string> SensorsOf(const EstimatorSpec& spec) {
-  std::vector<std::string> names = internal::NamesOf(spec.system.sensors);
-  std::ranges::sort(names);
-  return names;
-}
-
 /// Whether `spec` is what the variant would be. A full-information filter does for one of the
 /// data that a filter accepted: another line tells what these two differ by.
 bool IsThere(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
              int filter_index) {
   const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
   if (spec.kind != variant.kind || full_information != variant.full_information) return false;
-  if (spec.overrides != filter.overrides || SensorsOf(spec) != SensorsOf(filter)) return false;
+  const bool same_sensors = std::ranges::is_permutation(
+      spec.system.sensors, filter.system.sensors, {}, &SensorBinding::name, &SensorBinding::name);
+  if (spec.overrides != filter.overrides || !same_sensors) return false;
   if (spec.accepted_by >= 0) return variant.accepted && spec.accepted_by == filter_index;
   return variant.full_information || !variant.accepted;
 }

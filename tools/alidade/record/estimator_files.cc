@@ -7,6 +7,7 @@
 #include <map>
 
 #include "alidade/experiment/frame_innovation.h"
+#include "alidade/experiment/reference_metrics.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/state/element_names.h"
 
@@ -66,11 +67,7 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& 
 }
 
 void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const System& system) {
-  std::vector<StreamInfo> blocks;
-  for (const Block& block : system.layout.blocks()) {
-    blocks.push_back({block.name, block.geometry().ambient});
-  }
-  pose_ = FindPose(blocks);
+  pose_ = FindPose(BlocksOf(system));
   if (!pose_) return;
   trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
   const auto constant = [&](std::size_t id) {

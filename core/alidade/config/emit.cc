@@ -8,7 +8,6 @@ namespace alidade::internal {
 namespace {
 
 bool IsLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
 /// Whether `text` may stand unquoted, inside brackets too, and mean just itself.
 bool PlainSafe(std::string_view text) {

@@ -65,6 +65,7 @@ ConfigTree* Child(const ConfigTree& map, std::string_view key);
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
 std::string ToYaml(const ConfigTree& root);
 
+inline bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 /// With its ASCII letters in lower case, whatever the locale.
 std::string LowerCase(std::string_view text);
 

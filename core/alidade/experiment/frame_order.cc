@@ -195,7 +195,7 @@ void FrameOrder::Merge(Held& held, Held&& received) const {
 void FrameOrder::Replay(std::size_t from) {
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
     if (!snapshots_[e]) continue;
-    NamedEstimator& named = experiment_.estimators[e];
+    EstimatorSpec& named = experiment_.estimators[e];
     std::vector<Frame> frames;
     for (std::size_t i = from; i < held_.size(); ++i) {
       frames.push_back(named.accepted_by < 0 ? held_[i].frame : Accepted(i, named.accepted_by));

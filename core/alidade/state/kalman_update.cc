@@ -55,10 +55,12 @@ Solution KalmanUpdate::Solve(std::span<const MeasurementRows> measurements, bool
 }
 
 void KalmanUpdate::CopyGain(std::span<const int> rows, int column, int count, double* to) const {
-  const int height = update_.panel_rows;
-  for (int j = column; j < column + count; ++j) {
-    const double* const first = update_.gain + std::ptrdiff_t{j} * height;
-    for (const int i : rows) *to++ = i < height ? first[i] : update_.At(update_.gain, i, j);
+  const std::ptrdiff_t height = update_.panel_rows;
+  const double* first = update_.gain + column * height;
+  for (const double* const end = first + count * height; first != end; first += height) {
+    for (const int i : rows) {
+      *to++ = i < height ? first[i] : first[i / height * height * update_.capacity + i % height];
+    }
   }
 }
 

@@ -23,8 +23,8 @@ using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStri
 
 /// The covariance P of a state in its tangent, behind block queries: who uses it names rows by
 /// (offset, size). Dense: one symmetric matrix, the lower triangle authoritative, with spare
-/// capacity in whole cache lines; what corrects all of it takes it from where it lies. Offsets and sizes lie in
-/// [0, size()], as Add gave them; they are not checked, but where said.
+/// capacity in whole cache lines; what corrects all of it takes it from where it lies. Offsets and
+/// sizes lie in [0, size()], as Add gave them; they are not checked, but where said.
 /// Nothing allocates memory in the steady state but what returns a matrix.
 /// P H' and H P H' are made in projection.h.
 class Covariance {

@@ -90,7 +90,8 @@ struct Arithmetic {
     }
     ALIDADE_UNROLL for (; i < n; ++i) y[i] += k * x[i];
   }
-  /// S = L D L' in place, m x m by columns; false unless positive definite. Reads the lower triangle.
+  /// S = L D L' in place, m x m by columns; false unless positive definite. Reads the lower
+  /// triangle.
   ALIDADE_KERNEL bool Factorise(int m, double* s, double* inverse_d) {
     const int stride = PaddedSize(m);
     int at = 0;

@@ -28,6 +28,11 @@ using testing::SensorJacobian;
 using testing::StepResult;
 using testing::StepWithJacobians;
 
+/// Whether outputs are as they were before the call of a plugin: not a number.
+bool NotWritten(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double x) { return std::isnan(x); });
+}
+
 /// q' = q Exp((u + w) dt)
 struct Turn : Motion<3, UnitQuaternion> {
   using Input = Vec<3>;
@@ -85,9 +90,9 @@ TEST(AutodiffMotion, OutOfDomainWritesNothing) {
                    {Pointers(next).data(), jacobian, jacobian == nullptr ? nullptr : g.data()}),
         Status::kOutOfDomain);
   }
-  EXPECT_EQ(next, Filled(turn->blocks(), kPoison));
-  EXPECT_EQ(f, std::vector<double>(9, kPoison));
-  EXPECT_EQ(g, std::vector<double>(9, kPoison));
+  EXPECT_TRUE(NotWritten(next[0]));
+  EXPECT_TRUE(NotWritten(f));
+  EXPECT_TRUE(NotWritten(g));
 }
 
 TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
@@ -162,10 +167,8 @@ TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
       faulty->Step(Pointers(x).data(), nullptr, nullptr, 0.1, {Pointers(next).data(), &f, &g}),
       Status::kError);
   EXPECT_EQ(faulty->SqrtQ(Pointers(x).data(), nullptr, 0.1, &l), Status::kError);
-  EXPECT_EQ(next, Filled(faulty->blocks(), kPoison));
-  EXPECT_EQ(f, kPoison);
-  EXPECT_EQ(g, kPoison);
-  EXPECT_EQ(l, kPoison);
+  EXPECT_TRUE(NotWritten(next[0]));
+  EXPECT_TRUE(NotWritten({f, g, l}));
 }
 
 /// Bearing of a point from a pose: an angle measured, an optional bias role.
@@ -220,7 +223,7 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   roles[0] = unluckier;
   EXPECT_EQ(bearing->Predict(roles, &z), Status::kError);
   EXPECT_EQ(bearing->error_text(), "an exception of unknown type");
-  EXPECT_EQ(z, kPoison);
+  EXPECT_TRUE(NotWritten({z}));
 }
 
 /// z = x, with an analytic Jacobian that throws once it has written, where x < 0.
@@ -250,9 +253,7 @@ TEST(AutodiffSensor, AnAnalyticJacobianThatThrowsWritesNothing) {
   const double* roles[] = {&x, &y};
   double* jacobians[] = {&by_x, &by_y};
   EXPECT_EQ(faulty->Linearise(roles, &z, jacobians, strides), Status::kError);
-  EXPECT_EQ(z, kPoison);
-  EXPECT_EQ(by_x, kPoison);
-  EXPECT_EQ(by_y, kPoison);
+  EXPECT_TRUE(NotWritten({z, by_x, by_y}));
   x = 2.0;
   jacobians[0] = nullptr;
   EXPECT_EQ(faulty->Linearise(roles, &z, jacobians, strides), Status::kOk);

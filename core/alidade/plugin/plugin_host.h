@@ -51,9 +51,9 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Finds and loads plugins. A file is opened only if CheckTrusted accepts it and its build tag, read
-/// from the bytes beforehand, fits this program. Plugins are never unloaded. Const members may be
-/// called from several threads.
+/// Finds and loads plugins. A file is opened only if CheckTrusted accepts it and its build tag,
+/// read from the bytes beforehand, fits this program. Plugins are never unloaded. Const members may
+/// be called from several threads.
 class PluginHost {
  public:
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),

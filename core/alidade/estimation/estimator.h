@@ -76,7 +76,9 @@ class MeasurementReports {
 
   std::span<const MeasurementReport> entries() const { return entries_; }
   std::span<MeasurementReport> entries() { return entries_; }
+  /// One more; references to the others end, unless there is memory for it.
   MeasurementReport& Add() { return entries_.emplace_back(); }
+  /// Memory for that many entries.
   void Reserve(std::size_t count) { entries_.reserve(count); }
   /// Memory for `count` numbers, of any value.
   double* Allocate(std::size_t count) { return numbers_.Take(count); }

@@ -89,9 +89,8 @@ bool IsReady(const FilterState& f, const Row& row) {
 Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
   RolesAt(f, row, f.state.values());
   Roles roles = row.roles;  // then with y
-  Outcome outcome =
-      InvertAt(*row.binding, *row.place, *row.measurement,
-               prior == nullptr ? nullptr : &prior->inverse_distance, roles, inverse);
+  Outcome outcome = InvertAt(*row.binding, *row.place, *row.measurement,
+                             prior == nullptr ? nullptr : &prior->inverse_distance, roles, inverse);
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, roles.data());
   if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
   if (outcome != Outcome::kAccepted) {

@@ -130,8 +130,8 @@ struct Sensor {
 ///                     MatrixRef G) const;      analytic, zeroed; only without control input
 ///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
 ///   NoiseKind noise_kind() const;              default kContinuous; `alidade check` compares
-///   static constexpr int kStepOrder = N;       1 to 8: a step is additive in dt but for an error of
-///                                              order dt^N, 2 by Euler's method; default 0, additive
+///   static constexpr int kStepOrder = N;       1 to 8: additive in dt but for an error of order
+///                                              dt^N, 2 by Euler's method; default 0, additive
 ///
 /// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
 ///

@@ -18,9 +18,9 @@ class Consensus {
   /// Whether the sensor of any of the rows asks for it.
   static bool IsAsked(std::span<Row* const> rows);
   /// Puts those of the rows that support the best hypothesis, and those of which none is asked,
-  /// into `agreed`, in their order, the others into `rest`. No match is tried twice, and the more support one has,
-  /// the fewer are tried: log(1 - confidence) / log(1 - share of support). The same `seed` tries
-  /// them in the same order.
+  /// into `agreed`, in their order, the others into `rest`. No match is tried twice, and the more
+  /// support one has, the fewer are tried: log(1 - confidence) / log(1 - share of support). The
+  /// same `seed` tries them in the same order.
   void Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
              std::vector<Row*>& agreed, std::vector<Row*>& rest);
   /// Whether a row outside the support is close enough to the state after the update by it.

@@ -28,7 +28,7 @@ enum class OnDivergence { kReport, kFail };
 /// from then on, once every sensor of the estimator on it has failed; the run ends.
 enum class OnPluginFailure { kSkip, kDisable, kAbort };
 
-/// One estimator to be run, on its own system (the config with the estimator's overrides merged in).
+/// One estimator to be run, on its own system: the config with the estimator's overrides merged in.
 struct EstimatorSpec {
   std::string name;
   std::string type;

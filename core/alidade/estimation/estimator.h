@@ -43,7 +43,7 @@ Outcome OutcomeOf(Status status);
 
 /// Numbers of a report, which lie in its memory.
 struct Numbers : std::span<const double> {
-  using std::span<const double>::span;
+  using std::span<const double>::span;  // NOLINT(modernize-use-equals-default)
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 

@@ -20,7 +20,7 @@ class Trouble {
  public:
   Trouble() = default;
   Trouble(const char* kind, std::string text)
-      : detail_(std::make_unique<const Detail>(kind, std::move(text))) {}
+      : detail_(std::make_unique<const Detail>(Detail{kind, std::move(text)})) {}
   explicit operator bool() const { return detail_ != nullptr; }
   const char* kind() const { return detail_->kind; }  ///< of the event
   const std::string& text() const { return detail_->text; }

@@ -57,7 +57,7 @@ class Rollback {
    public:
     using Iterator = std::deque<ProcessedFrame>::const_iterator;
 
-    Processed(Iterator begin, Iterator end) : begin_(begin), end_(end) {}
+    Processed(const Iterator& begin, const Iterator& end) : begin_(begin), end_(end) {}
     Iterator begin() const { return begin_; }
     Iterator end() const { return end_; }
     std::size_t size() const { return static_cast<std::size_t>(end_ - begin_); }

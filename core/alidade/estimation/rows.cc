@@ -42,7 +42,7 @@ void Square(const double* l, int m, double* r) {
 void Row::Bind(const SensorPlace& to) {
   place = &to;
   roles_of = nullptr;
-  H.resize(static_cast<std::size_t>(to.dof * to.width));
+  H.resize(static_cast<std::size_t>(to.dof) * static_cast<std::size_t>(to.width));
   for (std::size_t i = 0; i < to.columns.size(); ++i) {
     jacobians[i] = to.columns[i] < 0 ? nullptr : H.data() + to.columns[i];
   }

@@ -97,7 +97,7 @@ class Unscented : public Method {
   Transform TransformOf(Eigen::Index directions, int halvings) const;
   template <class Attempt>
   Outcome Narrow(int& halvings, const Attempt& attempt) const;
-  const Eigen::MatrixXd& Root(FilterState& f);
+  const Eigen::MatrixXd& RootOf(FilterState& f);
   const Eigen::MatrixXd& RootWithoutHeld(const FilterState& f);
   void TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c);
   Outcome StepPoints(FilterState& f, int halvings, double dt_s);
@@ -140,7 +140,7 @@ Outcome Unscented::Narrow(int& halvings, const Attempt& attempt) const {
 }
 
 /// A with P = A A'; repairs P where it is not positive semi-definite.
-const Eigen::MatrixXd& Unscented::Root(FilterState& f) {
+const Eigen::MatrixXd& Unscented::RootOf(FilterState& f) {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
   root_is_current_ = true;
@@ -228,7 +228,7 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
 Outcome Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
   const bool goes_on = f.motions.in_interval();
-  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : Root(f);
+  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : RootOf(f);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
   const Eigen::Index n = root.cols(), noises = f.motions.noise_size(), all = n + noises;
   const Transform transform = TransformOf(all, halvings);
@@ -298,7 +298,7 @@ Trouble Unscented::Step(FilterState& f, double dt_s) {
 Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   const Workspace::Use use(f.work);
   const Geometry& geometry = row.model->measurement().geometry;
-  const Eigen::MatrixXd& root = Root(f);
+  const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
   Workspace::Vector dx = f.work.Take(n);
@@ -355,7 +355,7 @@ double Unscented::ComputeS(FilterState& f, Row& row) {
   Predicted& predicted = PredictedOf(f, row);
   const Eigen::Index m = row.report->dof;
   Workspace::Matrix s(row.s, m, m);
-  MomentsOf(TransformOf(Root(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
+  MomentsOf(TransformOf(RootOf(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
   s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
   row.report->s = {row.s, row.R.size()};
   return ComputeNis(row, f.work);
@@ -390,7 +390,7 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
 
 Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   const Workspace::Use use(f.work);
-  const Eigen::MatrixXd& root = Root(f);
+  const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols(), m = TotalDof(rows);
   int halvings = 0;  // of the narrowest
   for (const Row* row : rows) {

@@ -12,12 +12,12 @@ namespace alidade {
 /// Allocates whole cache lines.
 template <class T>
 struct CacheLines {
-  using value_type = T;
+  using value_type = T;  // NOLINT(readability-identifier-naming): of an allocator
   static constexpr std::align_val_t kLine{64};
 
   CacheLines() = default;
   template <class U>
-  CacheLines(const CacheLines<U>& /*other*/) {}
+  CacheLines(const CacheLines<U>& /*other*/) {}  // NOLINT(google-explicit-constructor): as well
   T* allocate(std::size_t count) {
     return static_cast<T*>(::operator new(count * sizeof(T), kLine));
   }

@@ -242,7 +242,7 @@ struct Arithmetic {
       const int count = std::min(kAtOnce, width - first);
       const double* from[kAtOnce];
       for (int c = 0; c < count; ++c) {
-        from[c] = &At(u, u.w, one.h.columns[static_cast<std::size_t>(first + c)], 0);
+        from[c] = &At(u, u.w, one.h.columns.data()[first + c], 0);
       }
       for (int r = 0; r < rows; ++r) {
         const double* const h = one.h.data + r * width + first;

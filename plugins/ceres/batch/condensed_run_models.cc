@@ -164,7 +164,9 @@ Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
   const internal::SensorPlace& place = PlaceOf(factor);
   h.resize(static_cast<std::size_t>(place.ambient));
-  if (jacobian != nullptr) jacobian->resize(static_cast<std::size_t>(place.dof * place.width));
+  if (jacobian != nullptr) {
+    jacobian->resize(static_cast<std::size_t>(place.dof) * static_cast<std::size_t>(place.width));
+  }
   return internal::EvaluateAt(ModelOf(factor), place, factor.measurement, RolesOf(factor, x),
                               {h.data(), jacobian == nullptr ? nullptr : jacobian->data()});
 }

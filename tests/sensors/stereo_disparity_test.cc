@@ -55,8 +55,8 @@ TEST(StereoDisparity, BehindTheCameraIsOutOfDomainAndWritesNothing) {
     const int stride = 1;
     EXPECT_EQ(stereo->Linearise(roles, &z, jacobians, &stride), Status::kOutOfDomain);
     EXPECT_EQ(stereo->Predict(roles, &z), Status::kOutOfDomain);
-    EXPECT_TRUE(std::isnan(z));
-    EXPECT_TRUE(std::isnan(j));
+    EXPECT_EQ(z, kPoison);
+    EXPECT_EQ(j, kPoison);
   }
 }
 
@@ -84,7 +84,7 @@ TEST(StereoDisparity, InitialisesTheDepth) {
   depth_m = kPoison;
   EXPECT_EQ(stereo->Initialise(roles, {&negative_px}, nullptr, {.y = &depth_m, .jx = jx}),
             Status::kOutOfDomain);
-  EXPECT_TRUE(std::isnan(depth_m));
+  EXPECT_EQ(depth_m, kPoison);
 }
 
 TEST(StereoDisparity, DescribesItself) {

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <span>
 
 namespace alidade::internal {
+
+inline constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 /// 0; not a number if one of the values is infinite or not a number.
 [[gnu::always_inline]] inline double ZeroIfFinite(std::span<const double> values) {

@@ -23,7 +23,9 @@ void AddRole(SensorPlace& place, const Block& block, bool known, bool considered
 
 SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   SensorPlace place;
+  place.binding = &sensor;
   place.ambient = sensor.model->measurement().geometry.ambient;
+  place.known_size = sensor.model->known_size();
   place.dof = sensor.model->measurement().geometry.tangent;
   place.has_landmark = sensor.model->has_landmark();
   for (const RoleBinding& role : sensor.roles) {
@@ -35,18 +37,35 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   return place;
 }
 
+/// Adds the value of a block of this geometry at `at` of x; a vector to the one it follows.
+void AddValues(std::vector<MotionPlace::Values>& to, const Geometry& geometry, int at) {
+  const bool curved = geometry.kind != GeometryKind::kVector;
+  const bool follows = !to.empty() && !curved && to.back().geometry == nullptr &&
+                       to.back().at + to.back().size == at;
+  if (follows) {
+    to.back().size += geometry.ambient;
+  } else {
+    to.push_back({at, geometry.ambient, curved ? &geometry : nullptr});
+  }
+}
+
 MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
   MotionPlace place;
   place.holds = motion.model->discrete_noise() && motion.model->noise_size() > 0;
-  for (const BlockId id : motion.blocks) {
-    const Block& block = layout[id];
-    const int size = block.geometry().tangent, offset = block.tangent_offset;
+  for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
+    const Block& block = layout[motion.blocks[i]];
+    const Geometry& geometry = motion.model->blocks()[i].geometry;
+    const int size = geometry.tangent, offset = block.tangent_offset;
     place.values.push_back(block.value_offset);
-    place.sizes.push_back(block.geometry().ambient);
-    place.constant.push_back(block.status == BlockStatus::kConstant ? 1 : 0);
+    AddValues(place.all, geometry, block.value_offset);
+    if (block.status != BlockStatus::kConstant) {
+      AddValues(place.moved, geometry, block.value_offset);
+    }
     for (int k = 0; k < size; ++k) {
       place.at.push_back(offset < 0 ? -1 : offset + k);
-      if (offset >= 0) place.rows.push_back(offset + k);
+      if (offset < 0) continue;
+      place.rows.push_back(offset + k);
+      place.present.push_back(static_cast<int>(place.at.size()) - 1);
     }
   }
   return place;
@@ -70,6 +89,8 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
       stream_of_sensor(system.sensors.size(), -1) {
   for (const SensorBinding& sensor : system.sensors) {
     sensor_places.push_back(PlaceOf(sensor, initial));
+    sensor_places.back().sensor = static_cast<int>(sensor_places.size()) - 1;
+    considers |= sensor_places.back().considers;
   }
   for (const MotionBinding& motion : system.motions) {
     motion_places.push_back(PlaceOf(motion, initial.layout()));

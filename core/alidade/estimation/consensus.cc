@@ -25,8 +25,9 @@ bool Consensus::IsAsked(std::span<Row* const> rows) {
       rows, [](const Row* row) { return row->binding->outlier_rejection.has_value(); });
 }
 
-void Consensus::Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
-                      std::vector<Row*>& agreed, std::vector<Row*>& rest) {
+[[gnu::noinline]] void Consensus::Split(FilterState& f, std::span<Row* const> rows,
+                                        std::uint64_t seed, std::vector<Row*>& agreed,
+                                        std::vector<Row*>& rest) {
   matches_.clear();
   for (Row* const row : rows) {
     (row->binding->outlier_rejection ? matches_ : agreed).push_back(row);
@@ -35,7 +36,7 @@ void Consensus::Split(FilterState& f, std::span<Row* const> rows, std::uint64_t 
   for (std::size_t i = 0; i < matches_.size(); ++i) {
     (best_[i] != 0 ? agreed : rest).push_back(matches_[i]);
   }
-  std::ranges::sort(agreed, {}, &Row::column);
+  std::ranges::sort(agreed, {}, [](const Row* row) { return row->linearised.column; });
 }
 
 /// The best support, in best_.
@@ -76,7 +77,7 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
   s = Eigen::Map<const RowMajor>(own.s.data(), m, m);
-  f.update.CopyColumns(one.column, pht);  // P H', as the gate left it
+  f.update.CopyColumns(one.linearised.column, pht);  // P H', as the gate left it
   y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
   ForEachConsidered(f, itself, [&](int offset, int size, int at, int k) {
     pht.block(offset, at, size, k).setZero();

@@ -28,7 +28,7 @@ namespace alidade {
 /// Where S is not positive definite because P is not positive semi-definite, P is repaired (event
 /// `repaired`: negative pivots of its L D L' count as zero); after `max_covariance_repairs` of that
 /// the next ends the filter.
-/// Its method is internal::Linear (filter/linear.cc).
+/// Its method is internal::Linear (linear.h).
 class Ekf : public Filter {
  public:
   /// All there is.

@@ -6,20 +6,6 @@
 
 namespace alidade {
 
-Outcome OutcomeOf(Status status) {
-  switch (status) {
-    case Status::kOk:
-      return Outcome::kAccepted;
-    case Status::kOutOfDomain:
-      return Outcome::kOutOfDomain;
-    case Status::kInvalid:
-      return Outcome::kInvalid;
-    case Status::kError:
-      break;
-  }
-  return Outcome::kFailed;
-}
-
 const char* ToString(Outcome outcome) {
   constexpr const char* kNames[] = {"accepted",  "initialised", "gated",  "out_of_domain",
                                     "invalid",   "not_finite",  "not_pd", "stale",
@@ -31,19 +17,28 @@ const char* ToString(Outcome outcome) {
 MeasurementReports& MeasurementReports::operator=(const MeasurementReports& other) {
   if (this == &other) return *this;
   Clear();
-  for (const MeasurementReport& from : other.entries_) {
-    MeasurementReport& entry = entries_.emplace_back(from);
-    for (auto* part : {&entry.z, &entry.h, &entry.innovation, &entry.s, &entry.gain}) {
-      *part = Copy(*part);
+  entries_ = other.entries_;
+  constexpr Numbers MeasurementReport::*kParts[] = {
+      &MeasurementReport::z, &MeasurementReport::h, &MeasurementReport::innovation,
+      &MeasurementReport::s, &MeasurementReport::gain};
+  std::size_t count = 0;
+  for (const MeasurementReport& entry : entries_) {
+    for (const auto part : kParts) count += (entry.*part).size();
+  }
+  double* next = numbers_.emplace_back(count).data();
+  for (MeasurementReport& entry : entries_) {
+    for (const auto part : kParts) {
+      Numbers& values = entry.*part;
+      std::ranges::copy(values, next);
+      values = {next, values.size()};
+      next += values.size();
     }
   }
   return *this;
 }
 
 Numbers MeasurementReports::Copy(Numbers values) {
-  double* const copy = numbers_.Take(values.size());
-  std::ranges::copy(values, copy);
-  return {copy, values.size()};
+  return numbers_.emplace_back(values.begin(), values.end());
 }
 
 }  // namespace alidade

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <span>
@@ -15,7 +16,6 @@
 #include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/model/status.h"
-#include "alidade/state/arena.h"
 #include "alidade/state/state.h"
 
 namespace alidade {
@@ -39,16 +39,29 @@ enum class Outcome {
 inline constexpr int kOutcomes = static_cast<int>(Outcome::kEnded) + 1;
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
-Outcome OutcomeOf(Status status);
+inline Outcome OutcomeOf(Status status) {
+  switch (status) {
+    case Status::kOk:
+      return Outcome::kAccepted;
+    case Status::kOutOfDomain:
+      return Outcome::kOutOfDomain;
+    case Status::kInvalid:
+      return Outcome::kInvalid;
+    case Status::kError:
+      break;
+  }
+  return Outcome::kFailed;
+}
 
-/// Numbers of a report, which lie in its memory.
+/// Numbers of a report.
 struct Numbers : std::span<const double> {
   using std::span<const double>::span;  // NOLINT(modernize-use-equals-default)
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 
 /// All that is known of one measurement; m = dof, its tangent size. The numbers lie in the memory
-/// of the UpdateReport, as long as its entries do. Empty: not reached.
+/// of the estimator until its next frame, those of a copy in that of its UpdateReport. Empty: not
+/// reached.
 struct MeasurementReport {
   int sensor = -1;  ///< index into System::sensors
   Outcome outcome = Outcome::kAccepted;
@@ -63,8 +76,7 @@ struct MeasurementReport {
   Numbers gain;
 };
 
-/// Entries of measurements, and the memory of their numbers, which is kept from one frame to the
-/// next. A copy has its own.
+/// Entries of measurements, and memory for numbers that lie nowhere else. A copy has all of its own.
 class MeasurementReports {
  public:
   MeasurementReports() = default;
@@ -76,22 +88,20 @@ class MeasurementReports {
 
   std::span<const MeasurementReport> entries() const { return entries_; }
   std::span<MeasurementReport> entries() { return entries_; }
-  /// One more; references to the others end, unless there is memory for it.
-  MeasurementReport& Add() { return entries_.emplace_back(); }
-  /// Memory for that many entries.
-  void Reserve(std::size_t count) { entries_.reserve(count); }
-  /// Memory for `count` numbers, of any value.
-  double* Allocate(std::size_t count) { return numbers_.Take(count); }
-  /// A copy of the values in that memory.
+  /// One more; references to the others end.
+  MeasurementReport& Add(int sensor, Outcome outcome, std::int64_t landmark, int dof) {
+    return entries_.emplace_back(sensor, outcome, landmark, dof);
+  }
+  /// A copy of the values in that memory, until Clear.
   Numbers Copy(Numbers values);
   void Clear() {
     entries_.clear();
-    numbers_.Reset();
+    numbers_.clear();
   }
 
  private:
   std::vector<MeasurementReport> entries_;
-  Arena numbers_;
+  std::deque<std::vector<double>> numbers_;
 };
 
 /// Something that happened to the filter, worth a line to its user.
@@ -112,11 +122,10 @@ class UpdateReport {
   std::span<const MeasurementReport> measurements() const { return measurements_.entries(); }
   std::span<MeasurementReport> measurements() { return measurements_.entries(); }
   /// One more; references to the others end.
-  MeasurementReport& Add() { return measurements_.Add(); }
-  /// Memory for that many: references stay as long as there are no more.
-  void Reserve(std::size_t count) { measurements_.Reserve(count); }
-  /// Memory for `count` numbers of the entries, of any value.
-  double* Allocate(std::size_t count) { return measurements_.Allocate(count); }
+  MeasurementReport& Add(int sensor = -1, Outcome outcome = Outcome::kAccepted,
+                         std::int64_t landmark = -1, int dof = 0) {
+    return measurements_.Add(sensor, outcome, landmark, dof);
+  }
   /// A copy of the values in that memory.
   Numbers Copy(Numbers values) { return measurements_.Copy(values); }
   void Clear() {

@@ -6,32 +6,8 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/rows.h"
 
 namespace alidade::internal {
-namespace {
-
-/// `block = value, ...` for the given blocks that have one.
-std::string Describe(const State& state, std::span<const BlockId> blocks) {
-  std::string text;
-  for (const BlockId id : blocks) {
-    if (id < 0 || !state.layout()[id].present) continue;
-    const Block& block = state.layout()[id];
-    text += (text.empty() ? "" : ", ") + block.name + " =";
-    for (int i = 0; i < block.geometry().ambient; ++i) {
-      text += ' ' + RoundedText(state.value(id)[i], 6);
-    }
-  }
-  return text;
-}
-
-void NoteDivergence(FilterState& f, const char* kind, std::string text) {
-  f.health.diverged = true;
-  Note(f, kind, std::move(text)).divergence = true;
-}
-
-}  // namespace
-
 FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates)
     : binding(std::move(of)),
       state(binding->initial),
@@ -72,29 +48,30 @@ void FilterState::KeepFirstEstimates() {
   }
 }
 
-Event& Note(FilterState& f, const char* kind, std::string text) {
+[[gnu::noinline]] Event& Note(FilterState& f, const char* kind, std::string text) {
   f.report.events.push_back({f.timestamp, kind, std::move(text)});
   return f.report.events.back();
 }
 
-void NotePluginFailure(FilterState& f, const Row& row) {
-  Note(f, "plugin_failed", "sensor '" + row.binding->name + "': " + row.model->error_text());
+std::string Describe(const State& state, std::span<const BlockId> blocks) {
+  std::string text;
+  for (const BlockId id : blocks) {
+    if (id < 0 || !state.layout()[id].present) continue;
+    const Block& block = state.layout()[id];
+    text += (text.empty() ? "" : ", ") + block.name + " =";
+    for (int i = 0; i < block.geometry().ambient; ++i) {
+      text += ' ' + RoundedText(state.value(id)[i], 6);
+    }
+  }
+  return text;
 }
 
-void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
-  const SensorBinding& sensor = *row.binding;
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
-  char& said = f.health.out_of_domain[static_cast<std::size_t>(row.sensor)];
-  // A landmark behind the camera, say, is no divergence.
-  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;
-  said = 1;
-  std::vector<BlockId> blocks;
-  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
-  NoteDivergence(f, "diverged",
-                 "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
+void NoteDivergence(FilterState& f, const char* kind, std::string text) {
+  f.health.diverged = true;
+  Note(f, kind, std::move(text)).divergence = true;
 }
 
-void End(FilterState& f, const char* kind, const std::string& what) {
+[[gnu::noinline]] void End(FilterState& f, const char* kind, const std::string& what) {
   f.health.ended = true;
   std::vector<BlockId> all(f.binding->system.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);

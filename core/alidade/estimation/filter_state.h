@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,6 @@
 #include "alidade/state/workspace.h"
 
 namespace alidade::internal {
-
-struct Row;  // in alidade/estimation/rows.h
 
 /// How a filter is, and what it has said of that, so that it says it once.
 struct Health {
@@ -68,10 +67,10 @@ struct FilterState {
 
 /// An event of the frame; the end of the frame gives it its timestamp.
 Event& Note(FilterState& f, const char* kind, std::string text);
-/// Tells why h of a row could not be had; outside its domain, by which the filter counts as
-/// diverged, once until the sensor is accepted again.
-void NoteRefusal(FilterState& f, const Row& row, Outcome outcome);
-void NotePluginFailure(FilterState& f, const Row& row);
+/// The same of an event by which the filter counts as diverged.
+void NoteDivergence(FilterState& f, const char* kind, std::string text);
+/// `block = value, ...` of the given blocks that have one.
+std::string Describe(const State& state, std::span<const BlockId> blocks);
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
 void End(FilterState& f, const char* kind, const std::string& what);
 

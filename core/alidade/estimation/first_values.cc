@@ -107,7 +107,7 @@ Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, In
   return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
-void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
   Inverse inverse;
   for (bool progress = true; progress;) {
     progress = false;

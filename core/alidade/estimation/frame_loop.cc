@@ -46,18 +46,19 @@ void FrameLoop::Process(const Frame& frame) {
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 
-/// What a frame goes through. Flat: its parts are small, and a call of each would cost as much.
+/// What a frame goes through. Flat, for its parts are small and a call of each would cost as much;
+/// what is large or seldom is marked `noinline`.
 [[gnu::flatten]] void FrameLoop::Run(const Frame& frame) {
   if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.health.ended) StepTo(frame.timestamp);
   Spent(FramePart::kStep);
-  std::optional<Outcome> refused;
-  if (f.health.ended) refused = Outcome::kEnded;
-  if (f.report.stale) refused = Outcome::kStale;
+  const Outcome refused = f.report.stale   ? Outcome::kStale
+                          : f.health.ended ? Outcome::kEnded
+                                           : Outcome::kAccepted;
   rows_.Collect(frame, *f.binding, f.report, refused);
-  if (refused) return;
+  if (refused != Outcome::kAccepted) return;
   const std::span<Row> all = rows_.all();
   for (const Row& row : all) {
     if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, row);
@@ -65,7 +66,8 @@ void FrameLoop::Process(const Frame& frame) {
   if (f.blocks.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);
   UpdateInGroups(all);
-  recovery_.RepairCovariance(f, all);
+  const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
+  if (std::ranges::any_of(all, is_not_pd)) recovery_.RepairCovariance(f);
   if (f.health.ended) return;
   for (Row& row : all) {
     if (landmarks && row.binding->model->has_landmark()) continue;  // its rejections do not count
@@ -107,12 +109,13 @@ void FrameLoop::StepTo(Timestamp timestamp) {
 void FrameLoop::UpdateInGroups(std::span<Row> all) {
   std::vector<Row*>& group = groups_.group;
   group.clear();
+  const auto is_apart = [&](const Row& row) {
+    return options_.fuse == Fuse::kPerMeasurement ||
+           (!group.empty() && group.back()->sensor != row.sensor);
+  };
   for (Row& row : all) {
     if (row.report->outcome != Outcome::kAccepted) continue;
-    const bool apart =
-        options_.fuse == Fuse::kPerMeasurement ||
-        (options_.fuse == Fuse::kPerSensor && !group.empty() && group.back()->sensor != row.sensor);
-    if (apart) {
+    if (options_.fuse != Fuse::kJoint && is_apart(row)) {
       Update(group);
       group.clear();
     }
@@ -121,17 +124,22 @@ void FrameLoop::UpdateInGroups(std::span<Row> all) {
   Update(group);
 }
 
-/// One update by those of a group that pass; with a consensus a second one by those it rescues.
-void FrameLoop::Update(std::span<Row* const> group) {
-  PredictAndGate(group, groups_.passed);
-  if (!landmarks || !Consensus::IsAsked(groups_.passed)) {
-    Correct(groups_.passed);
-    return;
+/// One update by those of a group that pass.
+void FrameLoop::Update(std::vector<Row*>& group) {
+  PredictAndGate(group);
+  if (landmarks && Consensus::IsAsked(group)) {
+    UpdateByConsensus(group);
+  } else {
+    Correct(group);
   }
+}
+
+/// One update by those that agree, and a second one by those that it rescues.
+[[gnu::noinline]] void FrameLoop::UpdateByConsensus(std::span<Row* const> group) {
   groups_.agreed.clear();
   groups_.rest.clear();
-  consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
-                   groups_.agreed, groups_.rest);
+  consensus_.Split(f, group, static_cast<std::uint64_t>(landmarks->frame()), groups_.agreed,
+                   groups_.rest);
   Spent(FramePart::kGate);
   if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
     for (Row* const row : groups_.rest) {
@@ -139,20 +147,19 @@ void FrameLoop::Update(std::span<Row* const> group) {
     }
     return;
   }
-  PredictAndGate(groups_.rest, groups_.passed);
-  std::erase_if(groups_.passed, [&](const Row* row) {
+  PredictAndGate(groups_.rest);
+  std::erase_if(groups_.rest, [&](const Row* row) {
     if (consensus_.Rescues(*row)) return false;
     row->report->outcome = Outcome::kGated;
     return true;
   });
-  if (Correct(groups_.passed)) {
-    f.report.landmarks.rescued += static_cast<int>(groups_.passed.size());
+  if (Correct(groups_.rest)) {
+    f.report.landmarks.rescued += static_cast<int>(groups_.rest.size());
   }
 }
 
-/// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
-void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed) {
-  passed.clear();
+/// Predicts all rows of a group at the state, and leaves those that pass the gate, each by itself.
+void FrameLoop::PredictAndGate(std::vector<Row*>& group) {
   int capacity = 0;
   for (Row* const row : group) {
     row->report->outcome = method->Predict(f, *row);
@@ -161,22 +168,24 @@ void FrameLoop::PredictAndGate(std::span<Row* const> group, std::vector<Row*>& p
   Spent(FramePart::kEvaluate);
   method->BeginUpdate(f, capacity);
   int columns = 0;
+  auto passed = group.begin();
   for (Row* const row : group) {
     Outcome& outcome = row->report->outcome;
     if (outcome != Outcome::kAccepted) continue;
-    row->column = columns;
+    row->linearised.column = columns;
     outcome = gate_.Test(f, *row, method->ComputeS(f, *row));
     if (outcome != Outcome::kAccepted) continue;
-    passed.push_back(row);
+    *passed++ = row;
     columns += row->report->dof;
   }
+  group.erase(passed, group.end());
   Spent(FramePart::kGate);
 }
 
 /// False where there is no update.
 bool FrameLoop::Correct(std::span<Row* const> rows) {
   if (rows.empty()) return false;
-  for (Row* const row : rows) Gate::ApplyRobustWeight(*row);
+  gate_.ApplyRobustWeights(rows);
   const Outcome outcome = method->Correct(f, rows);
   Spent(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
@@ -184,15 +193,19 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   } else if (outcome == Outcome::kNotFinite) {
     Note(f, "not_finite", "the update is not finite; rolled back");
   }
-  for (const Row* const row : rows) {
-    if (row->report->outcome == Outcome::kAccepted) row->report->outcome = outcome;
+  if (outcome != Outcome::kAccepted) {
+    for (const Row* const row : rows) {
+      if (row->report->outcome == Outcome::kAccepted) row->report->outcome = outcome;
+    }
+    return false;
   }
-  if (outcome != Outcome::kAccepted) return false;
   f.motions.EndInterval();
   const Row& last = *rows.back();
   f.health.last_used.sensor = last.sensor;
   f.health.last_used.timestamp = last.measurement->timestamp;
-  f.health.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+  std::vector<double>& z = f.health.last_used.z;
+  z.resize(last.report->z.size());
+  for (std::size_t i = 0; i < z.size(); ++i) z[i] = last.z[i];
   return true;
 }
 
@@ -216,7 +229,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
   if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
   const int m = row.report->dof;
   method->BeginUpdate(f, m);
-  row.column = 0;
+  row.linearised.column = 0;
   const Outcome outcome = gate_.Test(f, row, method->ComputeS(f, row));
   // Gated: h at the estimate lies far from its mean.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;

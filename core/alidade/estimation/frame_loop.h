@@ -27,7 +27,7 @@ namespace alidade::internal {
 ///   group        UpdateInGroups     Update of each group by itself, as `fuse` has them:
 ///   predict      PredictAndGate     Method::Predict of each row
 ///   gate                            Method::ComputeS, Gate::Test of each row; Consensus::Split
-///   correct      Correct            Gate::ApplyRobustWeight, Method::Correct
+///   correct      Correct            Gate::ApplyRobustWeights, Method::Correct
 ///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                       LandmarkMap::Maintain
 ///   inputs                          Timeline::TakeInputs: they act from here on
@@ -53,14 +53,15 @@ class FrameLoop {
   void Run(const Frame& frame);
   void StepTo(Timestamp timestamp);
   void UpdateInGroups(std::span<Row> rows);
-  void Update(std::span<Row* const> group);
-  void PredictAndGate(std::span<Row* const> group, std::vector<Row*>& passed);
+  void Update(std::vector<Row*>& group);
+  void UpdateByConsensus(std::span<Row* const> group);
+  void PredictAndGate(std::vector<Row*>& group);
   bool Correct(std::span<Row* const> rows);
   void Spent(FramePart part);
 
   /// One group of rows, and what becomes of it.
   struct Groups {
-    std::vector<Row*> group, passed, agreed, rest;
+    std::vector<Row*> group, agreed, rest;
   };
 
   EkfOptions options_;

@@ -22,33 +22,36 @@ bool IsRejected(const MeasurementReport& entry) {
 }  // namespace
 
 Gate::Gate(const System& system, const EkfOptions& options)
-    : warned_(system.sensors.size(), false),
+    : gates_(options.gate < 1.0),
+      warned_(system.sensors.size(), false),
       rejections_(system.sensors.size(), 0),
       most_rejections_(options.rejection_recovery == RejectionRecovery::kNone
                            ? 0
                            : options.rejection_recovery_after) {
   for (const SensorBinding& sensor : system.sensors) {
+    weighs_ |= sensor.loss.kind != LossKind::kNone;
     thresholds_.push_back(
-        options.gate < 1.0
-            ? ChiSquareQuantile(options.gate, sensor.model->measurement().geometry.tangent)
-            : std::numeric_limits<double>::infinity());
+        gates_ ? ChiSquareQuantile(options.gate, sensor.model->measurement().geometry.tangent)
+               : std::numeric_limits<double>::max());
   }
 }
 
-Outcome Gate::Test(FilterState& f, Row& row, double nis) {
+/// Of a row whose NIS is too large, infinite or not a number.
+[[gnu::noinline]] Outcome Gate::Refuse(FilterState& f, Row& row, double nis) {
   if (!std::isfinite(nis)) {
     const Outcome outcome = Defect(f, row);
     if (outcome != Outcome::kAccepted) return outcome;
+    if (!gates_ && !std::isnan(nis)) return Pass(f, row, nis);
   }
   CheckConditioning(f, row);
   row.report->nis = std::isnan(nis) ? 0.0 : nis;
-  if (std::isnan(nis)) {
-    Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
-    return Outcome::kNotPd;
-  }
-  if (!(nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
-  const RobustLoss& loss = row.binding->loss;
-  row.weight = loss.kind == LossKind::kNone ? 1.0 : Weight(loss, std::sqrt(nis));
+  if (!std::isnan(nis)) return Outcome::kGated;
+  Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
+  return Outcome::kNotPd;
+}
+
+[[gnu::noinline]] Outcome Gate::Weigh(Row& row, double nis) {
+  row.weight = Weight(row.binding->loss, std::sqrt(nis));
   if (row.weight == 1.0) return Outcome::kAccepted;
   const double widest = *std::ranges::max_element(row.R) / row.weight;
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
@@ -69,17 +72,20 @@ Outcome Gate::Defect(FilterState& f, Row& row) {
   return Outcome::kNotFinite;
 }
 
-void Gate::ApplyRobustWeight(Row& row) {
-  if (row.weight == 1.0) return;
-  for (std::size_t i = 0; i < row.R.size(); ++i) {
-    const double widened = row.R[i] / row.weight;
-    row.s[i] += widened - row.R[i];
-    row.R[i] = widened;
+void Gate::ApplyRobustWeights(std::span<Row* const> rows) const {
+  if (!weighs_) return;
+  for (Row* const row : rows) {
+    if (row->weight == 1.0) continue;
+    for (std::size_t i = 0; i < row->R.size(); ++i) {
+      const double widened = row->R[i] / row->weight;
+      row->s[i] += widened - row->R[i];
+      row->R[i] = widened;
+    }
   }
 }
 
 /// Of a measurement that was not accepted. Whether its sensor has to recover.
-bool Gate::CountRejection(const MeasurementReport& entry) {
+[[gnu::noinline]] bool Gate::CountRejection(const MeasurementReport& entry) {
   if (most_rejections_ == 0 || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
   if (++count < most_rejections_) return false;
@@ -87,12 +93,8 @@ bool Gate::CountRejection(const MeasurementReport& entry) {
   return true;
 }
 
-/// Warns once for each sensor whose noise vanishes compared with H P H'.
-void Gate::CheckConditioning(FilterState& f, const Row& row) {
-  const auto m = static_cast<std::size_t>(row.place->dof);
-  std::size_t i = 0;  // on the diagonals of R and S
-  while (i < m * m && row.R[i] > 1e-13 * row.s[i] && row.R[i] > 0.0) i += m + 1;
-  if (i >= m * m) return;
+/// Once for each sensor whose noise vanishes compared with H P H'.
+[[gnu::noinline]] void Gate::WarnOfConditioning(FilterState& f, const Row& row, std::size_t i) {
   const auto sensor = static_cast<std::size_t>(row.sensor);
   if (warned_[sensor]) return;
   warned_[sensor] = true;

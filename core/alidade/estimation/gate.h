@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "alidade/estimation/filter.h"
@@ -18,9 +19,12 @@ class Gate {
 
   /// Takes the NIS of a row with r, R and S, finds w, and returns whether it passes: kAccepted, or
   /// why not. What lies so far out that its R / w is not finite does not.
-  Outcome Test(FilterState& f, Row& row, double nis);
-  /// R <- R / w in R and in S.
-  static void ApplyRobustWeight(Row& row);
+  Outcome Test(FilterState& f, Row& row, double nis) {
+    return nis <= thresholds_[static_cast<std::size_t>(row.sensor)] ? Pass(f, row, nis)
+                                                                    : Refuse(f, row, nis);
+  }
+  /// R <- R / w in R and in S, of rows that passed.
+  void ApplyRobustWeights(std::span<Row* const> rows) const;
 
   /// Counts what became of one measurement. Whether its sensor was rejected so often in a row that
   /// it has to recover; from there it counts anew.
@@ -35,11 +39,28 @@ class Gate {
   }
 
  private:
+  Outcome Pass(FilterState& f, Row& row, double nis) {
+    CheckConditioning(f, row);
+    row.report->nis = nis;
+    row.weight = 1.0;
+    return row.binding->loss.kind == LossKind::kNone ? Outcome::kAccepted : Weigh(row, nis);
+  }
+  Outcome Refuse(FilterState& f, Row& row, double nis);
   static Outcome Defect(FilterState& f, Row& row);
-  void CheckConditioning(FilterState& f, const Row& row);
+  static Outcome Weigh(Row& row, double nis);
+  void CheckConditioning(FilterState& f, const Row& row) {
+    const int m = row.place->dof;
+    for (int i = 0; i < m; ++i) {  // on the diagonals of R and S
+      const auto at = static_cast<std::size_t>(i * (m + 1));
+      if (!(row.R[at] > 1e-13 * row.s[at])) return WarnOfConditioning(f, row, at);
+    }
+  }
+  void WarnOfConditioning(FilterState& f, const Row& row, std::size_t i);
   bool CountRejection(const MeasurementReport& entry);
 
-  std::vector<double> thresholds_;  ///< on r' S^-1 r, by sensor
+  bool gates_;                      ///< whether there is a gate: else what overflows passes too
+  std::vector<double> thresholds_;  ///< on r' S^-1 r, by sensor; finite
+  bool weighs_ = false;             ///< whether a sensor has a robust loss
   std::vector<bool> warned_;        ///< by sensor
   std::vector<int> rejections_;     ///< consecutive, by sensor
   int most_rejections_;             ///< in a row; 0: without bound

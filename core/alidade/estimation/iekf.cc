@@ -165,10 +165,7 @@ double Iterated::PartThatLowersTheCost(FilterState& f, std::span<Row* const> row
 }
 
 /// Puts the iterate at prior (+) dx. False where that is not finite.
-bool Iterated::MoveTo(FilterState& f, const double* dx) {
-  f.state.Retract(dx, iterate_);
-  return AllFinite(iterate_);
-}
+bool Iterated::MoveTo(FilterState& f, const double* dx) { return f.state.Retract(dx, iterate_); }
 
 /// z (-) h at the iterate, of all rows; false where one is not defined or not finite.
 bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,

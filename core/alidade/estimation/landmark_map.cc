@@ -177,7 +177,7 @@ const double* LandmarkMap::CameraOf(const State& state, const Row& row) const {
   return id < 0 ? nullptr : state.value(id);
 }
 
-void LandmarkMap::Attach(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void LandmarkMap::Attach(FilterState& f, std::span<Row> rows) {
   bool any = false;
   for (Row& row : rows) {
     if (!Has(row)) continue;
@@ -205,7 +205,7 @@ void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& l
   if (landmark.representation != family.representation) row.model = row.binding->xyz.get();
 }
 
-void LandmarkMap::Maintain(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void LandmarkMap::Maintain(FilterState& f, std::span<Row> rows) {
   Count(f, rows);
   CheckDepths(f);
   Prune(f);

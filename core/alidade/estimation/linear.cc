@@ -6,14 +6,15 @@
 #include <optional>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/estimation/ekf.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
+
+// What is flat here is as FrameLoop::Run: of small parts; what is large or seldom is `noinline`.
+
 [[gnu::flatten]] Trouble Linear::Step(FilterState& f, double dt_s) {
   if (Trouble trouble = f.motions.Evaluate(f.state, dt_s)) return trouble;
-  if (f.motions.Apply(f.state)) return {};
-  return {"not_finite", "the covariance steps to what is not finite"};
+  return f.motions.Apply(f.state);
 }
 
 void Linear::BeginUpdate(FilterState& f, int capacity) {
@@ -21,13 +22,12 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
 }
 
 [[gnu::flatten]] Outcome Linear::Predict(FilterState& f, Row& row) {
-  MeasurementReport& entry = *row.report;
-  RolesAt(f, row, f.state.values());
+  const double* const* const roles = RolesAt(f, row, f.state.values());
   const bool elsewhere =
       (row.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, row);
-  Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
-  if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h = {};
+  const Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(row, roles);
   if (outcome != Outcome::kAccepted) {
+    if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) row.report->h = {};
     NoteRefusal(f, row, outcome);
     return outcome;
   }
@@ -38,7 +38,7 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
 
 /// Puts where H is taken into at_: the roles in row.roles, but first estimates, and what the
 /// measurement implies for the role that asks for it. Whether that is elsewhere than h.
-bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
+[[gnu::noinline]] bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
   const std::vector<RoleBinding>& bound = row.binding->roles;
   at_ = row.roles;
   implied_.clear();
@@ -59,7 +59,7 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
 }
 
 /// h at row.roles, H at at_.
-Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
+[[gnu::noinline]] Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   row.report->h = {row.h, static_cast<std::size_t>(row.place->ambient)};
   Outcome outcome = PredictAt(f, row, f.state.values(), row.h);
@@ -91,27 +91,23 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
 
 double Linear::ComputeS(FilterState& f, Row& row) {
   row.report->s = {row.s, row.R.size()};
-  std::ranges::copy(row.R, row.s);
-  return f.update.Gate(row.linearised());
+  return f.update.Gate(row.linearised);
 }
 
 void Linear::Stack(FilterState& f, std::span<Row* const> rows) {
   stacked_.clear();
   int column = 0;
   for (Row* const row : rows) {
-    const int m = row->report->dof;
-    if (row->column != column) f.update.MoveColumns(row->column, column, m);
-    row->column = column;
-    stacked_.push_back(row->linearised());
-    column += m;
+    MeasurementRows& one = row->linearised;
+    if (one.column != column) f.update.MoveColumns(one.column, column, one.h.rows);
+    one.column = column;
+    stacked_.push_back(&one);
+    column += one.h.rows;
   }
 }
 
 /// The rows of P that are considered, in considered_.
-void Linear::FindConsidered(const FilterState& f, std::span<Row* const> rows) {
-  considered_.clear();
-  const auto considers = [](const Row* row) { return row->place->considers; };
-  if (!f.blocks.considering && std::ranges::none_of(rows, considers)) return;
+[[gnu::noinline]] void Linear::FindConsidered(const FilterState& f, std::span<Row* const> rows) {
   ForEachConsidered(f, rows, [&](int offset, int size, int, int) {
     for (int i = 0; i < size; ++i) considered_.push_back(offset + i);
   });
@@ -120,8 +116,9 @@ void Linear::FindConsidered(const FilterState& f, std::span<Row* const> rows) {
 }
 
 /// K is K* with zeros for what is considered: takes it, and its dx, into the update.
-Linear::Considered Linear::ConsiderCorrection(FilterState& f, std::span<Row* const> rows,
-                                              bool recorded) {
+[[gnu::noinline]] Linear::Considered Linear::ConsiderCorrection(FilterState& f,
+                                                                std::span<Row* const> rows,
+                                                                bool recorded) {
   const Eigen::Index count = std::ssize(considered_), m = f.update.rows();
   Considered found{f.work.Take(count, m), f.work.Take(count, m)};
   Workspace::Matrix &gain = found.gain, &e = found.e, l = f.work.Take(m, m);
@@ -154,8 +151,8 @@ Linear::Considered Linear::ConsiderCorrection(FilterState& f, std::span<Row* con
 
 /// P by any gain, that of considered rows as given, without a difference that would cancel. False
 /// where a variance would be negative.
-bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
-                    const Workspace::Matrix* considered) {
+[[gnu::noinline]] bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
+                                      const Workspace::Matrix* considered) {
   const Eigen::Index n = f.size(), m = f.update.rows();
   Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);
   f.update.CopyFactor(l);
@@ -179,11 +176,13 @@ bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
   const Solution solution = update.Solve(stacked_, recorded);
   if (solution == Solution::kNotPositiveDefinite) return Outcome::kNotPd;
   if (solution == Solution::kNotFinite) return Outcome::kNotFinite;
-  FindConsidered(f, rows);
   std::optional<Considered> considered;
+  considered_.clear();
+  if (f.blocks.considering || f.binding->considers) FindConsidered(f, rows);
   if (!considered_.empty()) considered = ConsiderCorrection(f, rows, recorded);
-  f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved);
-  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  if (!f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved)) {
+    return Outcome::kNotFinite;
+  }
   if (solution == Solution::kCancels) {
     if (!Joseph(f, rows, considered ? &considered->gain : nullptr)) return Outcome::kNotPd;
   } else {
@@ -202,10 +201,3 @@ bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
 }
 
 }  // namespace alidade::internal
-
-namespace alidade {
-
-Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(std::move(system), options, streams, std::make_unique<internal::Linear>()) {}
-
-}  // namespace alidade

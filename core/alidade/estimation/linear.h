@@ -41,8 +41,8 @@ class Linear : public Method {
   Roles at_{};                            ///< where H is taken
   Scratch<std::vector<double>> implied_;  ///< of the role that is linearised at what z implies
   Scratch<std::vector<double>> h_there_;  ///< h where H is taken
-  Scratch<std::vector<MeasurementRows>> stacked_;  ///< the rows of the update
-  Scratch<std::vector<int>> considered_;           ///< rows of P whose gain is not the optimal one
+  Scratch<std::vector<const MeasurementRows*>> stacked_;  ///< of the update
+  Scratch<std::vector<int>> considered_;  ///< rows of P whose gain is not the optimal one
 };
 
 }  // namespace alidade::internal

@@ -13,7 +13,7 @@
 namespace alidade::internal {
 
 // A motion model at any values x of the whole state: that of a filter, a sigma point, a point of a
-// batch. What it does not write is not a number. n_w: noise inputs.
+// batch. n_w: noise inputs.
 
 /// Why a step cannot be done; empty: it can. As small as a pointer, for every step returns one.
 class Trouble {
@@ -46,7 +46,12 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
 /// What an outcome of it that is not kAccepted means.
 Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
 /// x <- x' of its blocks that are not constant, brought back to their manifolds.
-void TakeStep(const MotionBinding& motion, const MotionPlace& place, const double* next, double* x);
+inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
+  for (const auto& [at, size, geometry] : place.moved) {
+    for (int i = at; i < at + size; ++i) x[i] = next[i];
+    if (geometry != nullptr) geometry->Normalise(x + at);
+  }
+}
 
 /// What the motion models of a system make of the state over one step: x', F and G Lq.
 /// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,
@@ -59,8 +64,9 @@ class Motions {
     std::vector<double> u;      ///< control input; empty: the model takes none
     std::vector<double> f, g;   ///< F, G
     std::vector<double> l, gl;  ///< L of Qw, G L
-    std::vector<double> q;      ///< what is added to F P F' (lower triangle)
+    std::vector<double> cross;  ///< C = A N', where `carries`
     std::vector<double> m;      ///< M, where its noise is discrete
+    bool carries = false;       ///< noise that the step before held
   };
 
   explicit Motions(const Binding& binding);
@@ -73,8 +79,8 @@ class Motions {
 
   /// x', F, G and Lq of all active models; without `derivatives` x' and Lq alone.
   Trouble Evaluate(const State& state, double dt_s, bool derivatives = true);
-  /// P <- F P F' + Q and x <- x'; false, and nothing changed, where P would not be finite.
-  bool Apply(State& state);
+  /// P <- F P F' + N N', N = G Lq, and x <- x': all of it, or nothing, and why.
+  Trouble Apply(State& state);
 
   /// Whether noise that the last step held goes on being held.
   bool in_interval() const { return holds_ && interval_steps_ > 0; }
@@ -96,11 +102,13 @@ class Motions {
   void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
   bool IsBounded(const Covariance& p) const;
   bool Propagate(Covariance& p);
+  bool PropagatePart(Covariance& p, const MotionPlace& place, const Step& step, int width);
+  Trouble WhyNotFinite() const;
 
   const Binding* binding_;
   std::vector<Step> steps_;  ///< as in System::motions
   std::vector<double> next_;
-  int active_ = 0;  ///< steps that are
+  std::vector<std::size_t> active_;  ///< steps that are
   bool holds_ = false;
   Scratch<Workspace> memory_;
   Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else

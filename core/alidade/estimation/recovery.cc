@@ -55,7 +55,7 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     const RowMajor inflation = kInflation * RowMajor::Identity(n, n);
     std::vector<int> rows(static_cast<std::size_t>(n));
     std::iota(rows.begin(), rows.end(), block.tangent_offset);
-    f.state.covariance().Propagate(rows, inflation.data(), nullptr);
+    f.state.covariance().Propagate(rows, inflation.data());
     any = true;
   }
   if (any) f.motions.EndInterval();
@@ -64,10 +64,8 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
 
 }  // namespace
 
-void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void Recovery::RepairCovariance(FilterState& f) {
   constexpr double kRounding = 1e-12;
-  const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
-  if (std::ranges::none_of(rows, is_not_pd)) return;
   Covariance& p = f.state.covariance();
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   Eigen::MatrixXd root;
@@ -86,7 +84,7 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
            std::to_string(options_.max_covariance_repairs) + ")");
 }
 
-void Recovery::Recover(FilterState& f, Row& row) {
+[[gnu::noinline]] void Recovery::Recover(FilterState& f, Row& row) {
   const SensorBinding& sensor = *row.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +
                           std::to_string(options_.rejection_recovery_after) + " times in a row: ";

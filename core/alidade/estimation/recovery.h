@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <span>
-
 #include "alidade/estimation/filter.h"
 #include "alidade/estimation/rows.h"
 
@@ -17,7 +15,7 @@ class Recovery {
 
   /// After an update that left S not positive definite: where that is P's fault, negative pivots of
   /// its L D L' count as zero (event `repaired`). Ends the filter where it needed that too often.
-  void RepairCovariance(FilterState& f, std::span<Row> rows);
+  void RepairCovariance(FilterState& f);
   /// Once the sensor of a row was rejected too often, one frame after the other (event
   /// `rejection_recovery`): resets what it determines from its measurement, with the blocks that
   /// move with it at their prior uncertainty, or theirs where that is larger; where that cannot be,

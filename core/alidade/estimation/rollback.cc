@@ -74,9 +74,8 @@ Rollback::Processed Rollback::Process(Frame frame) {
 /// The report of a stale frame, by a copy of the filter.
 Rollback::Processed Rollback::Refuse(Frame frame) {
   const Timestamp newest = snapshots_.frames().back().frame.timestamp;
-  const std::unique_ptr<Estimator> copy = filter_->Clone();
   ProcessedFrame refused{std::move(frame), {}, filter_->Clone()};
-  refused.report = copy->Process(refused.frame);
+  refused.report = refused.after->Process(refused.frame);
   refused.report.inputs.clear();
   refused.report.events = {
       {refused.frame.timestamp, "stale",

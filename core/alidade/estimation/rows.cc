@@ -22,102 +22,111 @@ void ForEachPlace(std::span<Row* const> rows, const Take& take) {
   }
 }
 
-/// R = L L', m x m, row-major.
-void Square(const double* l, int m, double* r) {
-  if (m == 1) {
-    r[0] = l[0] * l[0];
-    return;
-  }
-  for (int i = 0; i < m; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (int k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
-      r[i * m + j] = r[j * m + i] = sum;
-    }
-  }
-}
-
 }  // namespace
 
-void Row::Bind(const SensorPlace& to) {
+[[gnu::noinline]] void Row::Bind(const SensorPlace& to) {
   place = &to;
+  sensor = to.sensor;
+  binding = to.binding;
+  model = binding->model.get();
   roles_of = nullptr;
-  H.resize(static_cast<std::size_t>(to.dof) * static_cast<std::size_t>(to.width));
+  const auto a = static_cast<std::size_t>(to.ambient), m = static_cast<std::size_t>(to.dof),
+             width = static_cast<std::size_t>(to.width);
+  numbers.resize(2 * a + m + 3 * m * m);
+  z = numbers.data();
+  h = z + a;
+  innovation = h + a;
+  s = innovation + m;
+  R = {s + m * m, m * m};
+  root = s + 2 * m * m;
+  std::fill(h, numbers.data() + numbers.size(), kNotANumber);  // whatever a model leaves out
+  H.assign(m * width, kNotANumber);
   for (std::size_t i = 0; i < to.columns.size(); ++i) {
     jacobians[i] = to.columns[i] < 0 ? nullptr : H.data() + to.columns[i];
   }
+  linearised = {{H.data(), to.dof, to.rows}, innovation, R.data(), s};
 }
 
-void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
-                   std::optional<Outcome> refused) {
-  count_ = 0;
-  report.ClearMeasurements();
-  report.Reserve(frame.measurements.size() * binding.sensor_places.size());  // rows point to them
-  for (std::size_t sensor = 0, sensors = binding.sensor_places.size(); sensor < sensors; ++sensor) {
-    for (const Measurement& m : frame.measurements) {
-      if (m.stream != binding.stream_of_sensor[sensor]) continue;
-      const Row& row = Add(m, static_cast<int>(sensor), binding, report);
-      row.report->outcome = refused ? *refused : Check(row);
-    }
-  }
-}
-
-Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
-                      UpdateReport& report) {
-  count_ = 0;
-  report.ClearMeasurements();
-  return Add(measurement, sensor, binding, report);
-}
-
-Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& binding,
-               UpdateReport& report) {
-  const auto index = static_cast<std::size_t>(sensor);
-  const SensorBinding& bound = binding.system.sensors[index];
-  const SensorPlace& place = binding.sensor_places[index];
-  const auto ambient = static_cast<std::size_t>(place.ambient),
-             m = static_cast<std::size_t>(place.dof);
-  ALIDADE_EXPECTS(measurement.values.size() == ambient);
-  ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model->known_size());
-  ALIDADE_EXPECTS(measurement.covariance.empty() || measurement.covariance.size() == m * m);
-  if (count_ == rows_.size()) rows_.emplace_back();
-  Row& row = rows_[count_++];
-  row.measurement = &measurement;
-  row.sensor = sensor;
-  row.binding = &bound;
-  row.model = bound.model.get();
+/// The row of a measurement.
+[[gnu::always_inline]] inline Row& Rows::Add(const Measurement& measurement,
+                                             const SensorPlace& place) {
+  const std::ptrdiff_t ambient = place.ambient;
+  ALIDADE_EXPECTS(std::ssize(measurement.values) == ambient);
+  if (rows_.begin() + count_ == rows_.end()) rows_.emplace_back();
+  Row& row = rows_[static_cast<std::size_t>(count_++)];
   if (row.place != &place) row.Bind(place);
-  row.z = report.Allocate(2 * ambient + m + 3 * m * m);
-  row.h = row.z + ambient;
-  row.innovation = row.h + ambient;
-  row.s = row.innovation + m;
-  row.R = {row.s + m * m, m * m};
-  row.root = row.s + 2 * m * m;
-  for (std::size_t i = 0; i < ambient; ++i) row.z[i] = measurement.values[i];
-  MeasurementReport& entry = report.Add();
-  entry.sensor = sensor;
-  entry.landmark = measurement.landmark;
-  entry.dof = place.dof;
-  entry.z = {row.z, ambient};
-  row.report = &entry;
+  row.measurement = &measurement;
+  const double* const values = measurement.values.data();
+  double* const z = row.z;
+  for (std::ptrdiff_t i = 0; i < ambient; ++i) z[i] = values[i];
   return row;
 }
 
+/// Its entry in the report.
+[[gnu::always_inline]] inline void Rows::Report(const Row& row, Outcome outcome,
+                                                UpdateReport& report) {
+  MeasurementReport& entry =
+      report.Add(row.sensor, outcome, row.measurement->landmark, row.place->dof);
+  entry.z = {row.z, static_cast<std::size_t>(row.place->ambient)};
+}
+
+/// Once there are no more.
+void Rows::PointToReports(UpdateReport& report) {
+  MeasurementReport* entry = report.measurements().data();
+  for (Row& row : all()) row.report = entry++;
+}
+
 /// The outcome of a measurement by itself: kAccepted, or why it is of no use.
-Outcome Rows::Check(const Row& row) {
+[[gnu::always_inline]] inline Outcome Rows::Check(const Row& row) {
   const Measurement& m = *row.measurement;
-  if (!AllFinite(m.values) || !AllFinite(m.known) || !AllFinite(m.covariance)) {
-    return Outcome::kNotFinite;
-  }
-  if (!m.covariance.empty() && !IsCovariance(m.covariance, row.place->dof)) {
-    return Outcome::kInvalid;
+  if (!AllFinite(m.values)) return Outcome::kNotFinite;
+  if (!m.known.empty() || !m.covariance.empty() || row.place->known_size > 0) {
+    const Outcome outcome = CheckRest(row);
+    if (outcome != Outcome::kAccepted) return outcome;
   }
   return OutcomeOf(row.model->Valid({m.values.data(), m.known.data()}));
+}
+
+/// The same of what comes with its values.
+[[gnu::noinline]] Outcome Rows::CheckRest(const Row& row) {
+  const Measurement& m = *row.measurement;
+  const int dof = row.place->dof;
+  ALIDADE_EXPECTS(std::ssize(m.known) == row.place->known_size);
+  ALIDADE_EXPECTS(m.covariance.empty() || std::ssize(m.covariance) == dof * dof);
+  if (!AllFinite(m.known) || !AllFinite(m.covariance)) return Outcome::kNotFinite;
+  const bool refused = !m.covariance.empty() && !IsCovariance(m.covariance, dof);
+  return refused ? Outcome::kInvalid : Outcome::kAccepted;
 }
 
 bool Rows::IsCovariance(const std::vector<double>& covariance, int size) {
   constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
   const Eigen::Map<const Eigen::MatrixXd> r(covariance.data(), size, size);
   return r.isApprox(r.transpose(), kSymmetric) && SquareRootOf(r, ldlt_, root_) >= -kRounding;
+}
+
+[[gnu::noinline]] void Rows::Collect(const Frame& frame, const Binding& binding,
+                                     UpdateReport& report, Outcome refused) {
+  count_ = 0;
+  report.ClearMeasurements();
+  for (const SensorPlace& place : binding.sensor_places) {
+    const int stream = binding.stream_of_sensor[static_cast<std::size_t>(place.sensor)];
+    for (const Measurement& m : frame.measurements) {
+      if (m.stream != stream) continue;
+      const Row& row = Add(m, place);
+      Report(row, refused != Outcome::kAccepted ? refused : Check(row), report);
+    }
+  }
+  PointToReports(report);
+}
+
+Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
+                      UpdateReport& report) {
+  count_ = 0;
+  report.ClearMeasurements();
+  Row& row = Add(measurement, binding.sensor_places[static_cast<std::size_t>(sensor)]);
+  Report(row, Outcome::kAccepted, report);
+  PointToReports(report);
+  return row;
 }
 
 void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles) {
@@ -154,41 +163,12 @@ Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measur
   return outcome;
 }
 
-const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x) {
-  const double* const values = f.state.values().data();
-  if (x.data() == values && row.roles_of == values) return row.roles.data();
-  RolesAt(*row.place, x.data(), values, row.roles);
-  row.roles_of = x.data() == values ? values : nullptr;
-  return row.roles.data();
-}
-
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h) {
   return EvaluateAt(*row.model, *row.place, *row.measurement, RolesAt(f, row, x), {.h = h});
 }
 
-Outcome LineariseAt(Row& row, const double* const* roles) {
-  const SensorPlace& place = *row.place;
-  const Measurement& measurement = *row.measurement;
-  const bool has_noise = !measurement.covariance.empty();
-  row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
-  const Outcome outcome = OutcomeOf(row.model->Evaluate(
-      {measurement.values.data(), measurement.known.data()}, roles,
-      {row.h, row.jacobians.data(), place.strides.data(), has_noise ? nullptr : row.root}));
-  if (has_noise) {
-    std::ranges::copy(measurement.covariance, row.R.begin());
-  } else {
-    Square(row.root, place.dof, row.R.data());
-  }
-  return outcome;
-}
-
 Outcome NoiseAt(Row& row, const double* const* roles) {
   return NoiseAt(*row.model, *row.place, *row.measurement, roles, row.root, row.R.data());
-}
-
-void ComputeInnovation(Row& row) {
-  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.place->dof)};
-  row.model->measurement().geometry.Minus(row.z, row.h, row.innovation);
 }
 
 double ComputeNis(const Row& row, Workspace& work) {
@@ -225,7 +205,7 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
   own = chained;
 }
 
-void RecordGain(FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain) {
+void RecordGain(const FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain) {
   RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
     for (int j = column; j < column + count; ++j) {
       for (const int i : kept) *to++ = gain(i, j);
@@ -247,7 +227,7 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
   Workspace::Matrix h = f.work.Take(TotalDof(rows), f.size());
   h.setZero();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    const JacobianRows own = row.jacobian();
+    const JacobianRows& own = row.linearised.h;
     const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.width());
     for (int c = 0; c < own.width(); ++c) {
       h.col(own.columns[static_cast<std::size_t>(c)]).segment(at, own.rows) += compact.col(c);
@@ -272,6 +252,23 @@ Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
     std::ranges::copy(row.report->innovation, innovation.data() + at);
   });
   return innovation;
+}
+
+[[gnu::noinline]] void NotePluginFailure(FilterState& f, const Row& row) {
+  Note(f, "plugin_failed", "sensor '" + row.binding->name + "': " + row.model->error_text());
+}
+
+[[gnu::noinline]] void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
+  const SensorBinding& sensor = *row.binding;
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  char& said = f.health.out_of_domain[static_cast<std::size_t>(row.sensor)];
+  // A landmark behind the camera, say, is no divergence.
+  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;
+  said = 1;
+  std::vector<BlockId> blocks;
+  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
+  NoteDivergence(f, "diverged",
+                 "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
 }
 
 }  // namespace alidade::internal

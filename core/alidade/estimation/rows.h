@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,53 +24,55 @@ struct Row {
   const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
   const SensorPlace* place = nullptr;  ///< the sensor's, or `own`; set by Bind
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
-  // Numbers in the memory of the report; m x m, row-major.
-  double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;
-  std::span<double> R;                         ///< R
-  double* root = nullptr;                      ///< L of R = L L'
+  std::vector<double> numbers;  ///< z, h, the innovation, S, R and L; the report points to them
+  double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;  ///< s: m x m, row-major
+  std::span<double> R;                                                     ///< R, m x m, row-major
+  double* root = nullptr;                                                  ///< L of R = L L'
   std::vector<double> H;                       ///< H, m rows of the place's width
+  std::vector<double> gain;                    ///< as in the report
   std::array<double*, kMaxRoles> jacobians{};  ///< in H, by role
   Roles roles{};                               ///< as RolesAt last had them
   const double* roles_of = nullptr;            ///< the values of the filter, if roles are those
   double weight = 1.0;                         ///< w of the robust loss; R is divided by it
-  int column = 0;  ///< its first one in the update, if it passes the gate
+  MeasurementRows linearised;  ///< H, innovation, R and S; its column, if it passes the gate
 
   /// Gives it another place.
   void Bind(const SensorPlace& to);
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
-  JacobianRows jacobian() const { return {H.data(), place->dof, place->rows}; }
-  MeasurementRows linearised() const { return {jacobian(), innovation, s, column}; }
 };
 
-/// The rows of a frame, in memory that is kept from one to the next.
+/// The rows of a frame, in memory that is kept from one to the next; the numbers of their reports lie
+/// there.
 class Rows {
  public:
   /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
-  /// its entry in the report: kAccepted as long as nothing speaks against it. With `refused` all
-  /// have that outcome, and no model is asked.
+  /// its entry in the report: kAccepted as long as nothing speaks against it. Unless `refused` is
+  /// kAccepted all have that outcome, and no model is asked.
   void Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
-               std::optional<Outcome> refused = {});
+               Outcome refused = Outcome::kAccepted);
   /// The same of one measurement and one sensor, whatever their streams. kAccepted.
   Row& CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
                   UpdateReport& report);
-  std::span<Row> all() { return {rows_.data(), count_}; }
+  std::span<Row> all() { return std::span(rows_).first(static_cast<std::size_t>(count_)); }
 
  private:
-  Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
-           UpdateReport& report);
+  Row& Add(const Measurement& measurement, const SensorPlace& place);
+  void Report(const Row& row, Outcome outcome, UpdateReport& report);
+  void PointToReports(UpdateReport& report);
   Outcome Check(const Row& row);
+  Outcome CheckRest(const Row& row);
   bool IsCovariance(const std::vector<double>& covariance, int size);
 
   std::vector<Row> rows_;  ///< the first count_ are in use
-  std::size_t count_ = 0;
+  std::ptrdiff_t count_ = 0;
   // Memory.
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
   Scratch<Eigen::MatrixXd> root_;
 };
 
 // A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point, a
-// point of a batch. What it does not write is not a number. m: tangent size of the measurement.
+// point of a batch. m: tangent size of the measurement.
 
 /// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
 /// Null: the role has no place.
@@ -87,6 +89,21 @@ Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
                    const EvaluationOutput& to);
 
+/// R = L L', m x m, row-major.
+inline void Square(const double* l, int m, double* r) {
+  if (m == 1) {
+    r[0] = l[0] * l[0];
+    return;
+  }
+  for (int i = 0; i < m; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
+      r[i * m + j] = r[j * m + i] = sum;
+    }
+  }
+}
+
 /// R at the roles, or as the measurement itself says, m x m, row-major. `l` is memory, m x m.
 Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
                 const double* const* roles, double* l, double* r);
@@ -95,15 +112,38 @@ Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measur
 
 /// What fills its roles at x; roles that the sensor knows have their value in f. Until the next
 /// call.
-const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x);
+inline const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x) {
+  const double* const values = f.state.values().data();
+  if (x.data() == values && row.roles_of == values) return row.roles.data();
+  RolesAt(*row.place, x.data(), values, row.roles);
+  row.roles_of = x.data() == values ? values : nullptr;
+  return row.roles.data();
+}
 /// h at x, ambient, in `h`.
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h);
 /// h at the roles, in the report; H and R, in the row.
-Outcome LineariseAt(Row& row, const double* const* roles);
+[[gnu::always_inline]] inline Outcome LineariseAt(Row& row, const double* const* roles) {
+  const SensorPlace& place = *row.place;
+  const Measurement& measurement = *row.measurement;
+  const bool has_noise = !measurement.covariance.empty();
+  row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
+  const Status status = row.model->Evaluate(
+      {measurement.values.data(), measurement.known.data()}, roles,
+      {row.h, row.jacobians.data(), place.strides.data(), has_noise ? nullptr : row.root});
+  if (has_noise) {
+    std::ranges::copy(measurement.covariance, row.R.begin());
+  } else {
+    Square(row.root, place.dof, row.R.data());
+  }
+  return OutcomeOf(status);
+}
 /// R at the roles, or as the measurement itself says, in the row.
 Outcome NoiseAt(Row& row, const double* const* roles);
 /// z (-) h of the h in the report, in the report.
-void ComputeInnovation(Row& row);
+inline void ComputeInnovation(Row& row) {
+  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.place->dof)};
+  row.model->measurement().geometry.Minus(row.z, row.h, row.innovation);
+}
 /// r' S^-1 r of the S and the innovation in the report; not a number unless S is positive definite.
 double ComputeNis(const Row& row, Workspace& work);
 /// H <- H J in the columns of one role, J size x size, row-major.
@@ -111,6 +151,11 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
 
 /// r' S^-1 r by S = L D L', m x m, row-major; not a number unless S is positive definite.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
+
+/// Tells why h of a row could not be had; outside its domain, by which the filter counts as
+/// diverged, once until the sensor is accepted again.
+void NoteRefusal(FilterState& f, const Row& row, Outcome outcome);
+void NotePluginFailure(FilterState& f, const Row& row);
 
 // The rows of an update below one another: m rows in all, n = size of P.
 
@@ -121,22 +166,22 @@ int TotalDof(std::span<Row* const> rows);
 inline bool GainIsRecorded(const Row& row) { return !row.place->has_landmark; }
 /// Gives the reports of the rows their columns of K: copy(rows of P, column, count, to).
 template <class Copy>
-void RecordGainBy(FilterState& f, std::span<Row* const> rows, const Copy& copy) {
+void RecordGainBy(const FilterState& f, std::span<Row* const> rows, const Copy& copy) {
   const std::vector<int>& kept = f.blocks.gain_rows;
   int column = 0;
-  for (const Row* row : rows) {
+  for (Row* const row : rows) {
     const int m = row->place->dof;
     if (GainIsRecorded(*row)) {
       const std::size_t count = kept.size() * static_cast<std::size_t>(m);
-      double* const to = f.report.Allocate(count);
-      row->report->gain = {to, count};
-      copy(kept, column, m, to);
+      if (row->gain.size() < count) row->gain.resize(count);
+      row->report->gain = {row->gain.data(), count};
+      copy(kept, column, m, row->gain.data());
     }
     column += m;
   }
 }
 /// The same of K as a matrix.
-void RecordGain(FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain);
+void RecordGain(const FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain);
 
 struct Stacked {
   Workspace::Matrix h, noise;    ///< H (m x n), R (m x m)

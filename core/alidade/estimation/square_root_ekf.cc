@@ -148,8 +148,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   l = array.topLeftCorner(m, m).transpose();
   Divide(l, gain);
   dx.noalias() = gain * all.innovation;
-  f.state.Retract(dx.data(), f.moved);
-  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  if (!f.state.Retract(dx.data(), f.moved)) return Outcome::kNotFinite;
   const Workspace::Matrix transport = TransportTo(f.state, f.moved, f.work);
   f.state.MoveTo(f.moved);
   root_.setZero();

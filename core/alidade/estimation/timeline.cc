@@ -75,7 +75,8 @@ Trouble Timeline::First(Timestamp from, Timestamp to, std::vector<Event>& events
                                      RoundedText(static_cast<double>(kMostSteps)) + " steps of " +
                                      RoundedText(max_dt_s_) + " s"};
   }
-  piece.dt_s = Seconds(elapsed) / static_cast<double>(piece.steps);
+  piece.dt_s = Seconds(elapsed);
+  if (piece.steps > 1) piece.dt_s /= static_cast<double>(piece.steps);
   if (piece.steps >= 2 * most_steps_) {
     events.push_back({from, "substeps",
                       "a gap of " + RoundedText(Seconds(elapsed)) +
@@ -84,11 +85,6 @@ Trouble Timeline::First(Timestamp from, Timestamp to, std::vector<Event>& events
     most_steps_ = piece.steps;
   }
   return {};
-}
-
-bool Timeline::InputsAct(Timestamp from, Timestamp to) const {
-  return std::ranges::all_of(
-      held_, [&](const Held& held) { return Acts(held, from) && to <= held.until; });
 }
 
 std::string Timeline::WhyNone(const Held& held) {
@@ -122,7 +118,7 @@ void Timeline::UseInputs(Timestamp from, Motions& motions, std::vector<Event>& e
   }
 }
 
-void Timeline::TakeInputs(const Frame& frame, UpdateReport& report) {
+[[gnu::noinline]] void Timeline::TakeInputs(const Frame& frame, UpdateReport& report) {
   for (Held& held : held_) {
     for (const Measurement& m : frame.measurements) {
       if (m.stream != held.stream || frame.timestamp < held.timestamp) continue;

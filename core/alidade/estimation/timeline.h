@@ -48,12 +48,9 @@ class Timeline {
   /// as any noted before is noted as the event `substeps`. What is not empty: it would need too
   /// many.
   Trouble First(Timestamp from, Timestamp to, std::vector<Event>& events, Piece& piece);
-  double max_dt_s() const { return max_dt_s_; }
 
   /// Whether a model takes a control input.
   bool has_inputs() const { return !held_.empty(); }
-  /// Whether all of those models have one that acts from `from` to `to`.
-  bool InputsAct(Timestamp from, Timestamp to) const;
   /// u (ambient) over the piece that starts at `from`, for System::motions[motion]; empty where it
   /// takes none. Where none acts, an event `input_stale`, once until one does. Good until the next
   /// TakeInputs.

@@ -218,7 +218,7 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
       return outcome;
     }
     if (outcome != Outcome::kAccepted) return Outcome::kOutOfDomain;
-    TakeStep(motion, place, next.data(), to);
+    TakeStep(place, next.data(), to);
     noise += inputs;
   }
   return Outcome::kAccepted;
@@ -344,6 +344,7 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
     std::ranges::copy(predicted.innovation, row.innovation);
     row.report->h = {row.h, predicted.h.size()};
     row.report->innovation = {row.innovation, predicted.innovation.size()};
+    row.H.clear();  // there is none
   } else if (!too_wide) {
     NoteRefusal(f, row, outcome);
   }
@@ -421,8 +422,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   spread.setZero();
   AddProduct(spread, gain, all.noise);
   AddProductWithTransposed(p, spread, gain);
-  f.state.Retract(step.data(), f.moved);
-  if (!AllFinite(f.moved) || !p.allFinite()) return Outcome::kNotFinite;
+  if (!f.state.Retract(step.data(), f.moved) || !p.allFinite()) return Outcome::kNotFinite;
   f.state.covariance().SetBlock(0, 0, p);
   f.state.MoveTo(f.moved);
   root_is_current_ = false;

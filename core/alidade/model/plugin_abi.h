@@ -30,7 +30,7 @@
  * Calls. Buffers are the caller's: outputs never overlap inputs or one another, pointers are
  * aligned to 8 bytes, payloads to 64. On entry outputs hold anything. A call that returns
  * ALIDADE_OK has written every element of its outputs, zeros included: both triangles of L, all of
- * F, G, B and each Jacobian; what it leaves out counts as not a number. A call that returns another
+ * F, G, B and each Jacobian; `alidade check` finds what it leaves out. A call that returns another
  * code has written none. Codes 4 to 15 are reserved; a host takes a code that it does not know as
  * ALIDADE_ERROR. Inputs are not written. No call throws. Calls are made with rounding to nearest,
  * without traps, subnormal numbers kept, and leave that as it is. All calls on an instance end

@@ -60,14 +60,10 @@ bool GoodStride(std::uint32_t stride) {
 }
 
 /// A measurement as a plugin is shown it: its values, null if a prediction alone is asked for, and
-/// the numbers that are known with it. Copied, which takes less than filling one with zeros.
+/// the numbers that are known with it.
 inline AlidadeObservation Shown(const double* z, const double* known) {
-  constexpr AlidadeObservation kUnseen = [] {
-    AlidadeObservation unseen{};
-    unseen.struct_size = sizeof(unseen);
-    return unseen;
-  }();
-  AlidadeObservation shown = kUnseen;
+  AlidadeObservation shown{};
+  shown.struct_size = sizeof(shown);
   shown.z = z;
   shown.known = known;
   return shown;

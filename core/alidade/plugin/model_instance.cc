@@ -269,7 +269,6 @@ void ModelInstance::ReadRoles() {
     if (role.geometry == ALIDADE_PRODUCT) {
       Refuse(": role '" + spaces_.back().name + "' is a product: each part is a role of its own");
     }
-    tangents_.push_back(role.tangent);
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
     if (std::count_if(spaces_.begin(), spaces_.end(), same) > 1) {
       Refuse("has two roles named '" + spaces_.back().name + "'");

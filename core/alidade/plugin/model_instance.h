@@ -31,8 +31,7 @@ class ModelInstance {
   const AlidadeInstance& c() const { return instance_; }
   const std::string& name() const { return name_; }
   const std::string& plugin() const { return plugin_; }
-  const std::vector<Space>& spaces() const { return spaces_; }             ///< roles, or blocks
-  const std::vector<std::int32_t>& tangents() const { return tangents_; }  ///< of the spaces
+  const std::vector<Space>& spaces() const { return spaces_; }  ///< roles, or blocks
   /// By role, if the model says.
   const std::map<std::size_t, OwnedRole>& owned() const { return owned_; }
   /// The measurement of a sensor, the control input of a motion model (empty name: none).
@@ -68,7 +67,6 @@ class ModelInstance {
   AlidadeMotion motion_{};
   std::string name_, plugin_;
   std::vector<Space> spaces_;
-  std::vector<std::int32_t> tangents_;
   std::map<std::size_t, OwnedRole> owned_;
   Space space_, known_;
   std::vector<double> given_noise_;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/plugin/plugin_models.h"
 
-#include <limits>
-#include <span>
 #include <utility>
 
 #include "alidade/base/error.h"
@@ -68,26 +66,6 @@ MotionModel::Description MotionDescriptionOf(const ModelInstance& instance) {
   return description;
 }
 
-constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
-
-/// Fills an output, of which a plugin may leave out elements, with what is not a number; null: not
-/// wanted.
-void NotWritten(double* to, int count) {
-  if (to == nullptr) return;
-  for (double* const end = to + count; to != end; ++to) *to = kNotANumber;
-}
-void NotWritten(double* to, int rows, int columns, int stride) {
-  if (to == nullptr) return;
-  for (int r = 0; r < rows; ++r, to += stride) NotWritten(to, columns);
-}
-
-/// Of spaces: how many elements each has.
-std::vector<int> SizesOf(const std::vector<Space>& spaces, int Geometry::*size) {
-  std::vector<int> sizes;
-  for (const Space& space : spaces) sizes.push_back(space.geometry.*size);
-  return sizes;
-}
-
 }  // namespace
 
 PluginSensor::PluginSensor(std::shared_ptr<const ModelInstance> instance)
@@ -95,17 +73,18 @@ PluginSensor::PluginSensor(std::shared_ptr<const ModelInstance> instance)
       instance_(std::move(instance)),
       calls_(instance_->c().sensor),
       self_(instance_->c().self),
-      tangents_(SizesOf(roles(), &Geometry::tangent)) {}
+      unseen_(internal::Shown(nullptr, nullptr)) {}
+
+inline AlidadeObservation PluginSensor::Show(const Observation& seen) const {
+  AlidadeObservation shown = unseen_;
+  shown.z = seen.z;
+  shown.known = seen.known;
+  return shown;
+}
 
 Status PluginSensor::DoEvaluate(const Observation& seen, const double* const* roles,
                                 const Output& out) const {
-  const int m = measurement().geometry.tangent;
-  NotWritten(out.h, measurement().geometry.ambient);
-  for (std::size_t i = 0, count = tangents_.size(); out.jacobians != nullptr && i < count; ++i) {
-    NotWritten(out.jacobians[i], m, tangents_[i], out.strides[i]);
-  }
-  NotWritten(out.sqrt_noise, m * m);
-  const AlidadeObservation shown = internal::Shown(seen.z, seen.known);
+  const AlidadeObservation shown = Show(seen);
   Status status = Status::kOk;
   if (out.h != nullptr) {
     status = StatusOf(this, *instance_, "Predict", [&] {
@@ -113,32 +92,19 @@ Status PluginSensor::DoEvaluate(const Observation& seen, const double* const* ro
     });
   }
   if (status != Status::kOk || out.sqrt_noise == nullptr) return status;
-  return StatusOf(this, *instance_, "SqrtNoise",
-                  [&] { return calls_->sqrt_noise(self_, &shown, roles, out.sqrt_noise, m); });
+  return StatusOf(this, *instance_, "SqrtNoise", [&] {
+    return calls_->sqrt_noise(self_, &shown, roles, out.sqrt_noise, measurement().geometry.tangent);
+  });
 }
 
 Status PluginSensor::DoValid(const Observation& seen) const {
-  const AlidadeObservation shown = internal::Shown(seen.z, seen.known);
+  const AlidadeObservation shown = Show(seen);
   return StatusOf(this, *instance_, "Valid", [&] { return calls_->valid(self_, &shown); });
 }
 
 Status PluginSensor::DoInitialise(const double* const* roles, const Observation& seen,
                                   const double* prior, const InverseOutput& out) const {
-  const std::span<const Space> targets = std::span(this->roles())
-                                             .subspan(static_cast<std::size_t>(inverse().role),
-                                                      static_cast<std::size_t>(inverse().count));
-  int rows = 0, size = 0;
-  for (const Space& target : targets) {
-    rows += target.geometry.tangent;
-    size += target.geometry.ambient;
-  }
-  NotWritten(out.y, size);
-  for (std::size_t i = 0; out.jx != nullptr && i < tangents_.size(); ++i) {
-    NotWritten(out.jx[i], rows, tangents_[i], out.strides[i]);
-  }
-  NotWritten(out.jz, rows * measurement().geometry.tangent);
-  NotWritten(out.jp, rows * inverse().prior_size);
-  const AlidadeObservation shown = internal::Shown(seen.z, seen.known);
+  const AlidadeObservation shown = Show(seen);
   return StatusOf(this, *instance_, "Initialise", [&] {
     return calls_->initialise(self_, &shown, roles, prior, out.y, out.jx, out.strides, out.jz,
                               measurement().geometry.tangent, out.jp, inverse().prior_size);
@@ -149,17 +115,10 @@ PluginMotion::PluginMotion(std::shared_ptr<const ModelInstance> instance)
     : MotionModel(MotionDescriptionOf(*instance)),
       instance_(std::move(instance)),
       calls_(instance_->c().motion),
-      self_(instance_->c().self),
-      sizes_(SizesOf(blocks(), &Geometry::ambient)) {}
+      self_(instance_->c().self) {}
 
 Status PluginMotion::DoStep(const double* const* blocks, const double* input, const double* w,
                             double dt_s, const Output& out) const {
-  for (std::size_t k = 0, count = sizes_.size(); out.next != nullptr && k < count; ++k) {
-    NotWritten(out.next[k], sizes_[k]);
-  }
-  NotWritten(out.f, tangent_size() * tangent_size());
-  NotWritten(out.g, tangent_size() * noise_size());
-  NotWritten(out.sqrt_q, noise_size() * noise_size());
   Status status = Status::kOk;
   if (out.next != nullptr) {
     status = StatusOf(this, *instance_, "Step", [&] {

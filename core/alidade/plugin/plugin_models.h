@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "alidade/estimation/models.h"
 #include "alidade/plugin/model_instance.h"
@@ -23,11 +22,12 @@ class PluginSensor final : public SensorModel {
   Status DoValid(const Observation& seen) const override;
   Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
                       const InverseOutput& out) const override;
+  AlidadeObservation Show(const Observation& seen) const;
 
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* calls_;
   const void* self_;
-  std::vector<int> tangents_;  ///< of the roles
+  AlidadeObservation unseen_;  ///< to be copied, which is faster than filling one with zeros
 };
 
 /// A motion model by the calls of plugin_abi.h. An exception of a call is an error of the model.
@@ -44,7 +44,6 @@ class PluginMotion final : public MotionModel {
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeMotion* calls_;
   const void* self_;
-  std::vector<int> sizes_;  ///< of the blocks, ambient
 };
 
 }  // namespace alidade

@@ -29,12 +29,6 @@ void Covariance::Reserve(int rows) {
   capacity_ = capacity;
 }
 
-void Covariance::Clear() {
-  p().topLeftCorner(size_, size_).setZero();
-  size_ = 0;
-  gaps_.clear();
-}
-
 /// Takes `rows` rows from the smallest gap that has them, and returns their offset; -1: none has.
 int Covariance::TakeGap(int rows) {
   auto best = gaps_.end();
@@ -128,17 +122,13 @@ void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& own,
 
 internal::SymmetricView Covariance::view() { return {p_.data(), size_, capacity_}; }
 
-bool Covariance::Propagate(std::span<const int> rows, const double* f, const double* q) {
+bool Covariance::Propagate(std::span<const int> rows, const double* f, const double* noise,
+                           int width, const double* cross) {
   const internal::SymmetricView p = view();
-  const Eigen::Index k = std::ssize(rows);
-  const Workspace::Use use(memory_);
-  Workspace::Vector memory = memory_.Take(2 * k * internal::PaddedSize(size_));
-  if (q == nullptr) {
-    Workspace::Vector zero = memory_.Take(k * k);
-    zero.setZero();
-    q = zero.data();
-  }
-  return internal::KernelsFor(p).propagate(p, {rows, f, q, memory.data()});
+  const std::size_t needed =
+      internal::Transition::MemoryOf(size_, static_cast<int>(rows.size()), width);
+  if (step_memory_.size() < needed) step_memory_.resize(needed);
+  return internal::KernelsFor(p).propagate(p, {rows, f, noise, width, cross, step_memory_.data()});
 }
 
 Eigen::MatrixXd Covariance::Dense() const {

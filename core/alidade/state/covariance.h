@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/state/arena.h"
 #include "alidade/state/eigen_alignment.h"
 #include "alidade/state/jacobian_rows.h"
 #include "alidade/state/workspace.h"
@@ -55,10 +54,11 @@ class Covariance {
   /// Sets k rows: `own` (k x k) among them, `cross` (n x k, n = size()) elsewhere.
   void SetRows(std::span<const int> rows, const ConstMatrix& own, const ConstMatrix& cross);
 
-  /// x' = F x + w of k rows, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai, F and Q k x k,
-  /// row-major, of Q the lower triangle; null: zero. O(n k). False, and nothing has changed, if a
-  /// variance would not be finite.
-  bool Propagate(std::span<const int> rows, const double* f, const double* q);
+  /// x' = F x + N v of k rows, v ~ N(0, I), C = Cov(F x, N v): P_aa <- F P_aa F' + N N' + C + C',
+  /// P_ai <- F P_ai. Row-major: F k x k, N k x width, C k x k; null: zero. O(n k). False, and nothing
+  /// has changed, if a variance would not be finite.
+  bool Propagate(std::span<const int> rows, const double* f, const double* noise = nullptr,
+                 int width = 0, const double* cross = nullptr);
 
   /// P where it lies.
   LowerTriangle lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(capacity_)}; }
@@ -68,9 +68,6 @@ class Covariance {
   internal::SymmetricView view();
   /// The whole matrix, mirrored.
   Eigen::MatrixXd Dense() const;
-
-  /// Gives all rows back; the memory is kept.
-  void Clear();
 
  private:
   int TakeGap(int rows);
@@ -82,6 +79,7 @@ class Covariance {
   int size_ = 0, capacity_ = 0;
   std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)
   Scratch<Workspace> memory_;
+  Scratch<AlignedNumbers> step_memory_;
   Scratch<std::vector<int>> moved_;  ///< rows
 };
 

@@ -47,14 +47,16 @@ void KalmanUpdate::MoveColumns(int from, int to, int count) {
   }
 }
 
-Solution KalmanUpdate::Solve(std::span<const MeasurementRows> measurements, bool wants_gain) {
+Solution KalmanUpdate::Solve(std::span<const MeasurementRows* const> measurements,
+                             bool wants_gain) {
   update_.measurements = measurements;
-  update_.m = measurements.back().column + measurements.back().h.rows;
+  update_.m = measurements.back()->column + measurements.back()->h.rows;
   update_.gain = wants_gain ? gain_ : nullptr;
   return Kernels::For(kernels_->solve, update_.m)(update_);
 }
 
-void KalmanUpdate::CopyGain(std::span<const int> rows, int column, int count, double* to) const {
+void KalmanUpdate::CopyGainOfPanels(std::span<const int> rows, int column, int count,
+                                    double* to) const {
   const std::ptrdiff_t height = update_.panel_rows;
   const double* first = update_.gain + column * height;
   for (const double* const end = first + count * height; first != end; first += height) {

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "alidade/state/arena.h"
 #include "alidade/state/covariance.h"
 #include "alidade/state/kernels.h"
 
@@ -26,21 +25,23 @@ class KalmanUpdate {
   void MoveColumns(int from, int to, int count);
   /// L, D, W, dx and, if wanted, K of the update by `measurements`, whose columns follow one
   /// another.
-  Solution Solve(std::span<const MeasurementRows> measurements, bool wants_gain);
+  Solution Solve(std::span<const MeasurementRows* const> measurements, bool wants_gain);
   /// P - W D^-1 W' in place of P.
   void Downdate() { Kernels::For(kernels_->downdate, update_.m)(update_); }
 
   int rows() const { return update_.m; }  ///< m of Solve
   double* dx() { return update_.dx; }
-  /// y = L^-1 r and D^-1.
+  /// L^-1 r.
   std::span<const double> y() const { return {update_.y, static_cast<std::size_t>(update_.m)}; }
-  std::span<const double> inverse_d() const {
-    return {update_.inverse_d, static_cast<std::size_t>(update_.m)};
-  }
   /// K, if it was wanted.
   double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
   /// Elements of K, if it was wanted: of some rows in `count` columns, by columns.
-  void CopyGain(std::span<const int> rows, int column, int count, double* to) const;
+  void CopyGain(std::span<const int> rows, int column, int count, double* to) const {
+    if (update_.p.size > update_.panel_rows) return CopyGainOfPanels(rows, column, count, to);
+    for (int j = column; j < column + count; ++j) {
+      for (const int i : rows) *to++ = update_.gain[j * update_.panel_rows + i];
+    }
+  }
   /// Columns of P H' before Solve, of W after it: n x their number.
   void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const;
   double w(int i, int j) const { return update_.At(update_.w, i, j); }
@@ -49,6 +50,7 @@ class KalmanUpdate {
 
  private:
   void Allocate();
+  void CopyGainOfPanels(std::span<const int> rows, int column, int count, double* to) const;
 
   const Kernels* kernels_ = nullptr;
   Update update_{};

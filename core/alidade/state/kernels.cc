@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "alidade/base/all_finite.h"
+
 #pragma GCC diagnostic ignored "-Wpsabi"  // vectors are inlined, never passed
 
 #define ALIDADE_KERNEL [[gnu::always_inline]] static inline
@@ -22,8 +24,6 @@ constexpr double kCancelled = 1e-10;
 
 /// Finite too.
 inline bool IsPositive(double x) { return x > 0.0 && x < std::numeric_limits<double>::infinity(); }
-
-constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 /// All N states of a small filter, number by number: what has just been written is not read as a
 /// vector, which would wait for the store.
@@ -171,15 +171,16 @@ struct Arithmetic {
     }
     return column;
   }
-  /// P H' of `rows` rows of H, a multiple of kAtOnce, in the columns of w from `at` on.
+  /// P H' of rows [first, last) of H, kAtOnce of them at a time, in the columns of w from `at` on.
   template <int kAtOnce>
-  ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int at) {
+  ALIDADE_KERNEL void ProjectRows(const Update& u, const JacobianRows& rows, int first, int last,
+                                  int at) {
     const SymmetricView p = Sized(u.p);
     const int width = rows.width();
     const int* const columns = rows.columns.data();
     for (int i = 0; i < p.size; i += kRows) {
       double* const pht = &At(u, u.w, i, at);
-      for (int r = 0; r < m; r += kAtOnce) {
+      for (int r = first; r < last; r += kAtOnce) {
         Column sum[kAtOnce]{};
         for (int c = 0; c < width; ++c) {
           const Column column = ColumnOf(p, columns[c], i);
@@ -191,15 +192,22 @@ struct Arithmetic {
       }
     }
   }
+  ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int at) {
+    if (M > 0) return ProjectRows<std::max(M, 1)>(u, rows, 0, m, at);
+    constexpr int kAtOnce = kStates > 0 ? 1 : 3;  // most measurements of more than two have three
+    const int most = m - m % kAtOnce;
+    ProjectRows<kAtOnce>(u, rows, 0, most, at);
+    if (kAtOnce > 1) ProjectRows<1>(u, rows, most, m, at);
+  }
   ALIDADE_KERNEL double Gate(const Update& u, const MeasurementRows& one) {
     const int m = Rows(one.h.rows), width = one.h.width();
     const double* const h = one.h.data;
     const int* const columns = one.h.columns.data();
     double* const s = one.s;
-    Project<std::max(M, 1)>(u, one.h, m, one.column);
+    Project(u, one.h, m, one.column);
     ALIDADE_UNROLL for (int i = 0; i < m; ++i) {
       ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
-        double sum = s[i * m + j];
+        double sum = one.noise[i * m + j];
         for (int c = 0; c < width; ++c) {
           sum += h[i * width + c] * At(u, u.w, columns[c], one.column + j);
         }
@@ -223,9 +231,10 @@ struct Arithmetic {
   /// The lower triangle of S, and the innovations.
   ALIDADE_KERNEL void Stack(const Update& u, int m) {
     const int stride = PaddedSize(m);
-    for (const MeasurementRows& one : u.measurements) {
+    for (const MeasurementRows* const each : u.measurements) {
+      const MeasurementRows& one = *each;
       const int at = one.column, rows = one.h.rows;
-      StackBefore(u, one, stride);
+      if (at > 0) StackBefore(u, one, stride);
       for (int r = 0; r < rows; ++r) {
         for (int j = 0; j <= r; ++j) {
           u.s[std::ptrdiff_t{at + j} * stride + at + r] = one.s[r * rows + j];
@@ -238,11 +247,20 @@ struct Arithmetic {
   ALIDADE_KERNEL void StackBefore(const Update& u, const MeasurementRows& one, int stride) {
     constexpr int kAtOnce = 16;
     const int at = one.column, rows = one.h.rows, width = one.h.width();
-    for (int first = 0; first < width && at > 0; first += kAtOnce) {
+    const int* const columns = one.h.columns.data();
+    for (int r = 0; kStates > 0 && r < rows; ++r) {
+      const double* const h = one.h.data + r * width;
+      for (int j = 0; j < at; ++j) {
+        double sum = 0.0;
+        for (int c = 0; c < width; ++c) sum += h[c] * At(u, u.w, columns[c], j);
+        u.s[std::ptrdiff_t{j} * stride + at + r] = sum;
+      }
+    }
+    for (int first = 0; kStates == 0 && first < width; first += kAtOnce) {
       const int count = std::min(kAtOnce, width - first);
       const double* from[kAtOnce];
       for (int c = 0; c < count; ++c) {
-        from[c] = &At(u, u.w, one.h.columns.data()[first + c], 0);
+        from[c] = &At(u, u.w, columns[first + c], 0);
       }
       for (int r = 0; r < rows; ++r) {
         const double* const h = one.h.data + r * width + first;
@@ -392,91 +410,160 @@ struct Arithmetic {
     }
   }
 
-  /// K: k, or 0 if it is known at run time alone.
+  /// For up to two rows of a small state, K of them, all in registers.
   template <int K>
-  ALIDADE_KERNEL bool PropagateRows(const SymmetricView& whole, const Transition& step) {
+  ALIDADE_KERNEL bool PropagateFew(const SymmetricView& whole, const Transition& step) {
     const SymmetricView p = Sized(whole);
-    const int n = p.size, stride = PaddedSize(n);
-    const int k = K > 0 ? K : static_cast<int>(step.rows.size());
+    constexpr int n = kStates;
     const int* const rows = step.rows.data();
-    double few[K > 0 ? 2 * K * kSmall : 1];
-    double* const before = K > 0 ? few : step.memory;  // P_a
-    double* const moved = before + std::ptrdiff_t{k} * stride;
-    ALIDADE_UNROLL for (int c = 0; c < k; ++c) {
-      ALIDADE_UNROLL for (int i = 0; i < n; ++i) before[c * stride + i] = p(rows[c], i);
+    double before[K * n], moved[K * n], own[K * K], defect = 0.0;  // P_a, F P_a
+    ALIDADE_UNROLL for (int c = 0; c < K; ++c) {
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) before[c * n + i] = p(rows[c], i);
     }
-    for (int i = 0; i < n; i += kRows) {  // F P_a
-      ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
-        Column sum{};
-        ALIDADE_UNROLL for (int c = 0; c < k; ++c) {
-          Column row;
-          row.Load(before + c * stride + i);
-          sum.Add(step.f[r * k + c], row);
-        }
-        sum.Store(moved + r * stride + i);
+    ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
+      Column sum{};
+      ALIDADE_UNROLL for (int c = 0; c < K; ++c) {
+        Column row;
+        row.Load(before + c * n);
+        sum.Add(step.f[r * K + c], row);
       }
+      sum.Store(moved + r * n);
     }
-    double own[K > 0 ? K * K : 1], defect = 0.0;
-    double* const q = K > 0 ? own : before;  // P_a is not needed any more
-    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
+    ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
       ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
-        double sum = step.q[r * k + c];
-        ALIDADE_UNROLL for (int j = 0; j < k; ++j) {
-          sum += moved[r * stride + rows[j]] * step.f[c * k + j];
+        double sum = NoiseOf(step, r, c);
+        ALIDADE_UNROLL for (int j = 0; j < K; ++j) {
+          sum += moved[r * n + rows[j]] * step.f[c * K + j];
         }
-        q[r * k + c] = sum;
+        own[r * K + c] = sum;
       }
-      defect += 0.0 * q[r * k + r];
+      defect += 0.0 * own[r * K + r];
     }
     if (defect != 0.0) return false;
-    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
-      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p(rows[r], i) = moved[r * stride + i];
+    ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p(rows[r], i) = moved[r * n + i];
     }
-    ALIDADE_UNROLL for (int r = 0; r < k; ++r) {
-      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = q[r * k + c];
+    ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
+      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = own[r * K + c];
+    }
+    return true;
+  }
+  /// Element (r, c) of N N' + C + C'.
+  ALIDADE_KERNEL double NoiseOf(const Transition& step, int r, int c) {
+    const int width = step.width;
+    const double *const a = step.noise + r * width, *const b = step.noise + c * width;
+    double sum = width > 0 ? a[0] * b[0] : 0.0;
+    for (int k = 1; k < width; ++k) sum += a[k] * b[k];
+    if (step.cross == nullptr) return sum;
+    const int k = static_cast<int>(step.rows.size());
+    return sum + step.cross[r * k + c] + step.cross[c * k + r];
+  }
+  /// c += a b for row-major a (rows x inner), b (inner x PaddedSize(k)) and c (rows x PaddedSize(k)).
+  ALIDADE_KERNEL void AddProduct(int rows, int inner, int k, const double* a, const double* b,
+                                 double* c) {
+    for (int i = 0; i < k; i += kRows) {
+      int r = 0;
+      for (; r + 3 <= rows; r += 3) AddRows<3>(r, inner, i, PaddedSize(k), a, b, c);
+      for (; r < rows; ++r) AddRows<1>(r, inner, i, PaddedSize(k), a, b, c);
+    }
+  }
+  /// The same of kAtOnce rows from r on, which share what they read of b, and columns from i on.
+  template <int kAtOnce>
+  ALIDADE_KERNEL void AddRows(int r, int inner, int i, int stride, const double* a, const double* b,
+                              double* c) {
+    double* const to = c + std::ptrdiff_t{r} * stride + i;
+    Column sum[kAtOnce];
+    ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Load(to + t * stride);
+    for (int j = 0; j < inner; ++j) {
+      Column row;
+      row.Load(b + std::ptrdiff_t{j} * stride + i);
+      ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Add(a[(r + t) * inner + j], row);
+    }
+    ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Store(to + t * stride);
+  }
+  /// Row `row` of P to `to`, PaddedSize(n) numbers.
+  ALIDADE_KERNEL void CopyRow(const SymmetricView& p, int row, double* to) {
+    for (int i = 0; i < p.size; i += kRows) ColumnOf(p, row, i).Store(to + i);
+  }
+  ALIDADE_KERNEL bool PropagateMany(const SymmetricView& whole, const Transition& step) {
+    const SymmetricView p = Sized(whole);
+    const int n = p.size, k = static_cast<int>(step.rows.size()), w = step.width;
+    const int* const rows = step.rows.data();
+    double* next = step.memory;
+    const auto take = [&](int height, int width) {
+      return std::exchange(next, next + std::ptrdiff_t{height} * width);
+    };
+    double *const before = take(k, PaddedSize(n)), *const moved = take(k, PaddedSize(n)),
+                  *const own = take(k, PaddedSize(k)), *const f_transposed = take(k, PaddedSize(k)),
+                  *const noise_transposed = take(w, PaddedSize(k)), *const among = take(k, k);
+    for (int c = 0; c < k; ++c) CopyRow(p, rows[c], before + std::ptrdiff_t{c} * PaddedSize(n));
+    std::fill(moved, f_transposed, 0.0);
+    AddProduct(k, k, n, step.f, before, moved);
+    for (int r = 0; r < k; ++r) {
+      for (int j = 0; j < k; ++j) {
+        f_transposed[j * PaddedSize(k) + r] = step.f[r * k + j];
+        among[r * k + j] = moved[r * PaddedSize(n) + rows[j]];
+      }
+      for (int j = 0; j < w; ++j) noise_transposed[j * PaddedSize(k) + r] = step.noise[r * w + j];
+    }
+    AddProduct(k, w, k, step.noise, noise_transposed, own);
+    for (int r = 0; step.cross != nullptr && r < k; ++r) {
+      for (int c = 0; c <= r; ++c) {
+        own[r * PaddedSize(k) + c] += step.cross[r * k + c];
+        own[r * PaddedSize(k) + c] += step.cross[c * k + r];
+      }
+    }
+    AddProduct(k, k, k, among, f_transposed, own);
+    double defect = 0.0;
+    for (int r = 0; r < k; ++r) defect += 0.0 * own[r * (PaddedSize(k) + 1)];
+    if (defect != 0.0) return false;
+    for (int r = 0; r < k; ++r) {
+      const double* const from = moved + std::ptrdiff_t{r} * PaddedSize(n);
+      double* const column = p.data + std::ptrdiff_t{rows[r]} * p.stride;
+      for (int i = 0; i < rows[r]; ++i) p.data[std::ptrdiff_t{i} * p.stride + rows[r]] = from[i];
+      for (int i = rows[r]; i < n; ++i) column[i] = from[i];
+    }
+    for (int r = 0; r < k; ++r) {
+      for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = own[r * PaddedSize(k) + c];
     }
     return true;
   }
   ALIDADE_KERNEL bool Propagate(const SymmetricView& p, const Transition& step) {
     if constexpr (kStates >= 1) {
-      if (step.rows.size() == 1) return PropagateRows<1>(p, step);
+      if (step.rows.size() == 1) return PropagateFew<1>(p, step);
     }
     if constexpr (kStates >= 2) {
-      if (step.rows.size() == 2) return PropagateRows<2>(p, step);
+      if (step.rows.size() == 2) return PropagateFew<2>(p, step);
     }
-    return PropagateRows<0>(p, step);
+    return PropagateMany(p, step);
   }
 };
 
 /// The table of one Column, compiled for an instruction set.
-#define ALIDADE_KERNEL_TABLE(table, target, text)                                    \
-  template <class Column>                                                            \
-  struct table {                                                                     \
-    template <int M>                                                                 \
-    target static double Gate(const Update& u, const MeasurementRows& one) {         \
-      return Arithmetic<Column, M>::Gate(u, one);                                    \
-    }                                                                                \
-    template <int M>                                                                 \
-    target static Solution Solve(const Update& u) {                                  \
-      return Arithmetic<Column, M>::Solve(u);                                        \
-    }                                                                                \
-    template <int M>                                                                 \
-    target static void Downdate(const Update& u) {                                   \
-      Arithmetic<Column, M>::Downdate(u);                                            \
-    }                                                                                \
-    target static void Project(const Update& u, const JacobianRows& h, int column) { \
-      Arithmetic<Column, 0>::template Project<1>(u, h, h.rows, column);              \
-    }                                                                                \
-    target static bool Propagate(const SymmetricView& p, const Transition& step) {   \
-      return Arithmetic<Column, 0>::Propagate(p, step);                              \
-    }                                                                                \
-    static constexpr Kernels kTable{text,                                            \
-                                    Column::kRows,                                   \
-                                    {Gate<1>, Gate<2>, Gate<0>},                     \
-                                    {Solve<1>, Solve<2>, Solve<0>},                  \
-                                    {Downdate<1>, Downdate<2>, Downdate<0>},         \
-                                    Project,                                         \
-                                    Propagate};                                      \
+#define ALIDADE_KERNEL_TABLE(table, target, text)                                  \
+  template <class Column>                                                          \
+  struct table {                                                                   \
+    template <int M>                                                               \
+    target static double Gate(const Update& u, const MeasurementRows& one) {       \
+      return Arithmetic<Column, M>::Gate(u, one);                                  \
+    }                                                                              \
+    template <int M>                                                               \
+    target static Solution Solve(const Update& u) {                                \
+      return Arithmetic<Column, M>::Solve(u);                                      \
+    }                                                                              \
+    template <int M>                                                               \
+    target static void Downdate(const Update& u) {                                 \
+      Arithmetic<Column, M>::Downdate(u);                                          \
+    }                                                                              \
+    target static bool Propagate(const SymmetricView& p, const Transition& step) { \
+      return Arithmetic<Column, 0>::Propagate(p, step);                            \
+    }                                                                              \
+    static constexpr Kernels kTable{text,                                          \
+                                    Column::kRows,                                 \
+                                    {Gate<1>, Gate<2>, Gate<0>},                   \
+                                    {Solve<1>, Solve<2>, Solve<0>},                \
+                                    {Downdate<1>, Downdate<2>, Downdate<0>},       \
+                                    Propagate};                                    \
   };
 ALIDADE_KERNEL_TABLE(Baseline, , "baseline")
 #if defined(__x86_64__)

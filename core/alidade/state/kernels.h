@@ -31,7 +31,8 @@ struct SymmetricView {
 struct MeasurementRows {
   JacobianRows h;
   const double* innovation;  ///< m
-  double* s;                 ///< m x m: R, after Kernels::gate S = H P H' + R
+  const double* noise;       ///< R, m x m
+  double* s;                 ///< m x m, of Kernels::gate: S = H P H' + R
   int column = 0;            ///< its first one in the update
 };
 
@@ -43,7 +44,7 @@ struct MeasurementRows {
 /// P H', W and K are n x m in panels of Kernels::panel_rows rows, each panel by columns: see At().
 struct Update {
   SymmetricView p;
-  std::span<const MeasurementRows> measurements;  ///< one after the other
+  std::span<const MeasurementRows* const> measurements;  ///< one after the other
   int m;
   int capacity;  ///< columns that a panel has room for
   int panel_rows;
@@ -71,12 +72,21 @@ enum class Solution {
   kNotFinite,
 };
 
-/// x' = F x + w, w ~ N(0, Q), of the k states in `rows`.
+/// x' = F x + N v, v ~ N(0, I), C = Cov(F x, N v), of the k states in `rows`.
 struct Transition {
   std::span<const int> rows;
-  const double* f;  ///< k x k by rows
-  const double* q;  ///< k x k by rows, its lower triangle
-  double* memory;   ///< 2 k PaddedSize(n)
+  const double* f;      ///< F, k x k by rows
+  const double* noise;  ///< N, k x width by rows
+  int width;
+  const double* cross;  ///< C, k x k by rows; null: zero
+  double* memory;       ///< MemoryOf(n, k, width)
+
+  /// How many numbers a step of k of n states needs.
+  static std::size_t MemoryOf(int n, int k, int width) {
+    return static_cast<std::size_t>(k) *
+               static_cast<std::size_t>(2 * PaddedSize(n) + 2 * PaddedSize(k) + k) +
+           static_cast<std::size_t>(width) * static_cast<std::size_t>(PaddedSize(k));
+  }
 };
 
 struct Kernels {
@@ -90,8 +100,6 @@ struct Kernels {
   Solution (*solve[3])(const Update& update);
   /// P' in place of P.
   void (*downdate[3])(const Update& update);
-  /// P H' of H alone, in columns of w.
-  void (*project)(const Update& update, const JacobianRows& h, int column);
   /// P of x' in place of P. False, and P is as it was, if it would not be finite.
   bool (*propagate)(const SymmetricView& p, const Transition& step);
 

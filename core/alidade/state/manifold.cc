@@ -205,7 +205,7 @@ void Geometry::Normalise(double* x) const {
   }
 }
 
-void WrapAngles(const Geometry& geometry, double* x) {
+void internal::WrapAnglesOf(const Geometry& geometry, double* x) {
   geometry.ForEachPart([&](const Geometry& part, int a, int) {
     if (part.kind == GeometryKind::kAngle) x[a] = alidade::Angle::Wrap(x[a]);
   });

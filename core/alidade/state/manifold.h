@@ -76,8 +76,13 @@ void PlusJacobian(const Geometry& geometry, const double* x, const double* d, do
 /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
 /// that of the farthest part for products.
 double DistanceFrom(const Geometry& geometry, const double* x);
+namespace internal {
+void WrapAnglesOf(const Geometry& geometry, double* x);
+}
 /// Wraps what is an angle, and leaves the rest.
-void WrapAngles(const Geometry& geometry, double* x);
+inline void WrapAngles(const Geometry& geometry, double* x) {
+  if (geometry.kind != GeometryKind::kVector) internal::WrapAnglesOf(geometry, x);
+}
 
 /// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`, `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/state/projection.h"
 
@@ -51,6 +52,12 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
   return id;
 }
 
+void StateLayout::Drop(BlockId id) {
+  (*this)[id].present = false;
+  (*this)[id].name.clear();  // what is assigned to it next has its memory
+  dropped_.push_back(id);
+}
+
 BlockId StateLayout::Find(std::string_view name) const {
   const auto found = std::find_if(blocks_.begin(), blocks_.end(),
                                   [name](const Block& b) { return b.name == name; });
@@ -74,7 +81,7 @@ BlockEstimate State::Estimate(BlockId id) const {
 }
 
 void State::Reserve(BlockId id) {
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  Block& block = layout_[id];
   if (block.value_offset >= 0) return;
   block.value_offset = TakeValues(values_, value_gaps_, block.geometry().ambient);
   if (block.status == BlockStatus::kConstant) {
@@ -89,7 +96,7 @@ void State::Reserve(BlockId id) {
 
 void State::PlaceValue(BlockId id, const double* value) {
   Reserve(id);
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  Block& block = layout_[id];
   block.present = true;
   std::copy_n(value, block.geometry().ambient, values_.data() + block.value_offset);
 }
@@ -142,7 +149,7 @@ int State::FindRows(std::span<const BlockId> blocks) {
 
 /// Gives the place of a block back.
 void State::Release(BlockId id) {
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  Block& block = layout_[id];
   value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
   if (block.tangent_offset >= 0) {
     covariance_.Release(block.tangent_offset, block.geometry().tangent);
@@ -159,7 +166,7 @@ void State::FillGaps() {
     const auto found = std::ranges::max_element(
         placed_, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
     if (found == placed_.end()) return;
-    Block& last = At(*found);
+    Block& last = layout_[*found];
     const int rows = last.geometry().tangent;
     const int gap = covariance_.MoveToGap(last.tangent_offset, rows);
     if (gap < 0) return;
@@ -170,41 +177,53 @@ void State::FillGaps() {
 
 void State::Drop(BlockId id) {
   if (layout_[id].value_offset >= 0) Release(id);
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  block.present = false;
-  block.name.clear();  // what is assigned to it next has its memory
-  layout_.dropped_.push_back(id);
+  layout_.Drop(id);
 }
 
-void State::Retract(const double* dx, std::vector<double>& moved) const {
-  if (flat_) {
-    moved.resize(values_.size());
-    const auto n = static_cast<std::size_t>(covariance_.size());
-    for (std::size_t i = 0; i < n; ++i) moved[i] = values_[i] + dx[i];
-    for (std::size_t i = n; i < moved.size(); ++i) moved[i] = values_[i];
-    return;
+bool State::Retract(const double* dx, std::vector<double>& moved) const {
+  moved.resize(values_.size());
+  if (!flat_) return RetractBlocks(dx, moved);
+  const double* const from = values_.data();
+  double* const to = moved.data();
+  const std::size_t n = static_cast<std::size_t>(covariance_.size()), all = moved.size();
+  double defect = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    to[i] = from[i] + dx[i];
+    defect += 0.0 * to[i];
   }
-  moved.assign(values_.begin(), values_.end());
+  for (std::size_t i = n; i < all; ++i) to[i] = from[i];
+  return defect == 0.0;
+}
+
+/// Retract block by block.
+bool State::RetractBlocks(const double* dx, std::vector<double>& moved) const {
+  std::ranges::copy(values_, moved.begin());
   for (const BlockId id : placed_) {
     const Block& block = layout_[id];
     if (!block.present) continue;
     double* x = moved.data() + block.value_offset;
     block.geometry().Plus(x, dx + block.tangent_offset, x);
   }
+  return internal::AllFinite(moved);
 }
 
 void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
-  for (std::size_t i = 0; !flat_ && i < placed_.size(); ++i) {
-    const Block& block = layout_[placed_[i]];
+  if (!flat_) TurnTangents(values);
+  for (std::size_t i = 0, n = values.size(); i < n; ++i) values_[i] = values[i];
+}
+
+/// P where the tangent basis of a block turns on the way to those values.
+void State::TurnTangents(const std::vector<double>& values) {
+  for (const BlockId id : placed_) {
+    const Block& block = layout_[id];
     if (!block.present || block.geometry().kind != GeometryKind::kUnitVector) continue;
     std::array<double, 4> j;  // a unit vector's tangent has two elements
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
     const std::array rows{block.tangent_offset, block.tangent_offset + 1};
-    covariance_.Propagate(rows, j.data(), nullptr);
+    covariance_.Propagate(rows, j.data());
   }
-  std::copy(values.begin(), values.end(), values_.begin());
 }
 
 Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,

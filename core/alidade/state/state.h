@@ -42,11 +42,13 @@ class StateLayout {
                   BlockStatus status = BlockStatus::kEstimated);
   const std::vector<Block>& blocks() const { return blocks_; }
   const Block& operator[](BlockId id) const { return blocks_[static_cast<std::size_t>(id)]; }
+  Block& operator[](BlockId id) { return blocks_[static_cast<std::size_t>(id)]; }
   /// -1 where there is none.
   BlockId Find(std::string_view name) const;
+  /// Takes a block away: one that is declared later may have its id.
+  void Drop(BlockId id);
 
  private:
-  friend class State;
   std::vector<Block> blocks_;
   std::vector<BlockId> dropped_;  ///< their places wait for the next block
 };
@@ -98,8 +100,8 @@ class State {
   /// covariance.
   void Drop(BlockId id);
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
-  /// indexed like the covariance. Changes nothing: see MoveTo.
-  void Retract(const double* dx, std::vector<double>& moved) const;
+  /// indexed like the covariance. Changes nothing: see MoveTo. Whether they are finite.
+  bool Retract(const double* dx, std::vector<double>& moved) const;
   /// Takes the values over, transporting P where the tangent basis of a block turns with its value.
   /// They stay where they are in memory.
   void MoveTo(const std::vector<double>& values);
@@ -109,7 +111,8 @@ class State {
   int FindRows(std::span<const BlockId> blocks);
   void Release(BlockId id);
   void FillGaps();
-  Block& At(BlockId id) { return layout_.blocks_[static_cast<std::size_t>(id)]; }
+  bool RetractBlocks(const double* dx, std::vector<double>& moved) const;
+  void TurnTangents(const std::vector<double>& values);
 
   StateLayout layout_;
   std::vector<double> values_;

@@ -3,11 +3,32 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cstddef>
+#include <new>
 #include <vector>
 
 #include "alidade/state/eigen_alignment.h"
 
 namespace alidade {
+
+/// Allocates whole cache lines.
+template <class T>
+struct CacheLines {
+  using value_type = T;  // NOLINT(readability-identifier-naming): of an allocator
+  static constexpr std::align_val_t kLine{64};
+
+  CacheLines() = default;
+  template <class U>
+  CacheLines(const CacheLines<U>& /*other*/) {}  // NOLINT(google-explicit-constructor): as well
+  T* allocate(std::size_t count) {
+    return static_cast<T*>(::operator new(count * sizeof(T), kLine));
+  }
+  void deallocate(T* data, std::size_t /*count*/) { ::operator delete(data, kLine); }
+  friend bool operator==(const CacheLines& /*a*/, const CacheLines& /*b*/) { return true; }
+};
+
+/// Numbers in whole cache lines.
+using AlignedNumbers = std::vector<double, CacheLines<double>>;
 
 /// Memory that a copy does not take along.
 template <class T>

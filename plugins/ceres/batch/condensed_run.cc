@@ -233,6 +233,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
 void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
   internal::Rows rows;
   rows.Collect(frame, binding_, epoch.report);
+  epoch.report = UpdateReport(epoch.report);  // whose numbers no longer lie in the rows
   ALIDADE_EXPECTS(rows.all().size() == report.measurements().size());
   for (std::size_t i = 0; i < rows.all().size(); ++i) {
     const internal::Row& row = rows.all()[i];
@@ -242,7 +243,7 @@ void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Ep
     factor.measurement = *row.measurement;
     factor.outcome = first                ? Outcome::kInitialised
                      : epoch.report.stale ? Outcome::kStale
-                                          : row.report->outcome;
+                                          : epoch.report.measurements()[i].outcome;
   }
   AddFirstValues(epoch);
   const auto present = [this](const RoleBinding& role) { return Present(role.block); };

@@ -71,7 +71,7 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
       motion, place, point.x.data(), step.u.data(), w.data(), step.dt_s,
       {next.data(), sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr});
   if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text());
-  internal::TakeStep(motion, place, next.data(), point.x.data());
+  internal::TakeStep(place, next.data(), point.x.data());
   if (!sensitivity) return true;
 
   std::vector<int> own, rows;  // of F and of S: those of blocks that are not constant

@@ -29,9 +29,9 @@ using testing::SensorJacobian;
 using testing::StepResult;
 using testing::StepWithJacobians;
 
-/// Whether outputs are as they were before the call of a plugin: not a number.
+/// Whether outputs are as they were before the call of a plugin.
 bool NotWritten(const std::vector<double>& values) {
-  return std::ranges::all_of(values, [](double x) { return std::isnan(x); });
+  return std::ranges::all_of(values, [](double x) { return x == kPoison; });
 }
 
 /// q' = q Exp((u + w) dt)

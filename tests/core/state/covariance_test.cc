@@ -33,9 +33,8 @@ TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
   const Eigen::MatrixXd before = p.Dense();
   const RowMajor f = RandomMatrix(3, 3, random);
   const Eigen::MatrixXd root = RandomMatrix(3, 1, random);
-  const RowMajor q = root * root.transpose();
   const std::vector<int> rows = {6, 7, 5};
-  EXPECT_TRUE(p.Propagate(rows, f.data(), q.data()));
+  EXPECT_TRUE(p.Propagate(rows, f.data(), root.data(), 1));
   Eigen::MatrixXd whole_f = Eigen::MatrixXd::Identity(8, 8);
   Eigen::MatrixXd whole_q = Eigen::MatrixXd::Zero(8, 8);
   whole_f(rows, rows) = f;

@@ -39,7 +39,7 @@ struct KernelProblem {
       one.h = RandomMatrix(k, std::ssize(one.columns), random);
       const MatrixXd l = RandomMatrix(k, k, random);
       R.block(at, at, k, k) = l * l.transpose() + MatrixXd::Identity(k, k);
-      one.s = R.block(at, at, k, k);
+      one.noise = R.block(at, at, k, k);
       for (std::size_t c = 0; c < one.columns.size(); ++c) {
         H.col(one.columns[c]).segment(at, k) += one.h.col(static_cast<Eigen::Index>(c));
       }
@@ -73,10 +73,14 @@ struct KernelProblem {
     int at = 0;
     for (One& one : ones) {
       const int k = static_cast<int>(one.h.rows());
-      measurements.push_back({{one.h.data(), k, one.columns}, r.data() + at, one.s.data(), at});
+      one.s.resize(k, k);
+      measurements.push_back(
+          {{one.h.data(), k, one.columns}, r.data() + at, one.noise.data(), one.s.data(), at});
       at += k;
     }
-    update.measurements = measurements;
+    all.clear();
+    for (const MeasurementRows& one : measurements) all.push_back(&one);
+    update.measurements = all;
     update.m = at;
     return update;
   }
@@ -89,13 +93,14 @@ struct KernelProblem {
   }
 
   struct One {
-    RowMajor h, s;
+    RowMajor h, noise, s;
     std::vector<int> columns;
   };
   int size, stride, capacity;
   MatrixXd p, H, R, r;
   std::vector<One> ones;
   std::vector<MeasurementRows> measurements;
+  std::vector<const MeasurementRows*> all;
   std::vector<double> memory;
   Update update;
 };
@@ -183,16 +188,22 @@ TEST(Kernels, AStepIsThatOfTheTextbook) {
       Update update = problem.Begin(kernels);
       std::vector<int> rows;
       for (int i = 0; i < k; ++i) rows.push_back((n - 1 + i * (n - 1)) % n);  // not in their order
-      const RowMajor f = RandomMatrix(k, k, random), l = RandomMatrix(k, k, random);
-      const RowMajor q = l * l.transpose();
-      MatrixXd whole = MatrixXd::Identity(n, n), noise = MatrixXd::Zero(n, n);
-      whole(rows, rows) = f;
-      noise(rows, rows) = q;
-      std::vector<double> memory(static_cast<std::size_t>(2 * k * problem.stride));
-      EXPECT_TRUE(kernels.propagate(update.p, {rows, f.data(), q.data(), memory.data()}));
-      EXPECT_LE(
-          RelativeDifference(problem.Covariance(), whole * problem.p * whole.transpose() + noise),
-          kKernelRounding);
+      for (const int width : {0, 1, 3}) {
+        const RowMajor f = RandomMatrix(k, k, random), l = RandomMatrix(k, width, random),
+                       cross = 0.1 * RandomMatrix(k, k, random);
+        MatrixXd whole = MatrixXd::Identity(n, n), noise = MatrixXd::Zero(n, n);
+        whole(rows, rows) = f;
+        noise(rows, rows) = l * l.transpose();
+        if (width == 1) noise(rows, rows) += cross + cross.transpose();
+        std::vector<double> memory(Transition::MemoryOf(n, k, width));
+        const MatrixXd before = problem.Covariance();
+        EXPECT_TRUE(kernels.propagate(
+            update.p,
+            {rows, f.data(), l.data(), width, width == 1 ? cross.data() : nullptr, memory.data()}));
+        EXPECT_LE(
+            RelativeDifference(problem.Covariance(), whole * before * whole.transpose() + noise),
+            kKernelRounding);
+      }
     }
   });
 }
@@ -204,27 +215,10 @@ TEST(Kernels, AStepToWhatIsNotFiniteChangesNothing) {
     Update update = problem.Begin(kernels);
     const MatrixXd before = problem.Covariance();
     const int rows[] = {n - 1};
-    const double f = 1e200, q = 1.0;
-    std::vector<double> memory(static_cast<std::size_t>(2 * problem.stride));
-    EXPECT_FALSE(kernels.propagate(update.p, {rows, &f, &q, memory.data()}));
+    const double f = 1e200;
+    std::vector<double> memory(Transition::MemoryOf(n, 1, 0));
+    EXPECT_FALSE(kernels.propagate(update.p, {rows, &f, nullptr, 0, nullptr, memory.data()}));
     EXPECT_TRUE(problem.Covariance() == before);
-  });
-}
-
-TEST(Kernels, ProjectMakesTheColumnsThatGateDoes) {
-  Random random(4);
-  ForAllKernels([&](const Kernels& kernels, int n) {
-    KernelProblem problem(n, {2, 3}, random);
-    const Update update = problem.Begin(kernels);
-    for (const MeasurementRows& one : problem.measurements) {
-      kernels.project(update, one.h, one.column);
-    }
-    const MatrixXd pht = problem.p * problem.H.transpose();
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < 5; ++j) {
-        EXPECT_NEAR(update.At(update.w, i, j), pht(i, j), kKernelRounding * (1.0 + pht.norm()));
-      }
-    }
   });
 }
 
@@ -235,7 +229,7 @@ TEST(Kernels, WhatIsNotPositiveDefiniteOrNotFiniteIsFound) {
     for (const int m : {1, 2, 3}) {
       for (const double variance : {-1e6, kInfinity, std::nan("")}) {
         KernelProblem problem(n, {m}, random);
-        problem.ones[0].s(m - 1, m - 1) = variance;
+        problem.ones[0].noise(m - 1, m - 1) = variance;
         const Update update = problem.Begin(kernels);
         EXPECT_TRUE(std::isnan(Kernels::For(kernels.gate, m)(update, problem.measurements[0])));
         EXPECT_EQ(Kernels::For(kernels.solve, m)(update), Solution::kNotPositiveDefinite);
@@ -255,7 +249,7 @@ TEST(Kernels, AVarianceThatCancelsIsFound) {
     KernelProblem problem(n, {1}, random);
     problem.ones[0].columns.assign(1, n - 1);
     problem.ones[0].h = RowMajor::Ones(1, 1);
-    problem.ones[0].s(0, 0) = 1e-12 * problem.p(n - 1, n - 1);
+    problem.ones[0].noise(0, 0) = 1e-12 * problem.p(n - 1, n - 1);
     const Update update = problem.Begin(kernels);
     Kernels::For(kernels.gate, 1)(update, problem.measurements[0]);
     EXPECT_EQ(Kernels::For(kernels.solve, 1)(update), Solution::kCancels);

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kOfProducts = 1e-12;  // products of order 10 numbers of order 10
+constexpr double kProductTolerance = 1e-12;  // products of order 10 numbers of order 10
 
 TEST(Projection, EqualsTheDenseProduct) {
   Random random(4);
@@ -26,11 +26,12 @@ TEST(Projection, EqualsTheDenseProduct) {
       const Eigen::MatrixXd expected = p.Dense() * dense.transpose(), s = dense * expected;
       Eigen::MatrixXd pht(p.size(), m), sum = Eigen::MatrixXd::Ones(m, m), alone = sum;
       Project(p, {h.data(), m, columns}, pht.data(), sum.data());
-      EXPECT_LT((pht - expected).norm(), kOfProducts * expected.norm());
-      EXPECT_LT((sum.array() - 1.0 - s.array()).matrix().norm(), kOfProducts * (1.0 + s.norm()));
+      EXPECT_LT((pht - expected).norm(), kProductTolerance * expected.norm());
+      EXPECT_LT((sum.array() - 1.0 - s.array()).matrix().norm(),
+                kProductTolerance * (1.0 + s.norm()));
       AddProjection(p, {h.data(), m, columns}, alone.data());
       EXPECT_EQ(alone, alone.transpose());
-      EXPECT_LT((alone - sum).norm(), kOfProducts * (1.0 + s.norm()));
+      EXPECT_LT((alone - sum).norm(), kProductTolerance * (1.0 + s.norm()));
     }
   }
 }

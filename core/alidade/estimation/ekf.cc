@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/estimation/ekf.h"
+
+#include <utility>
+
+#include "alidade/estimation/linear.h"
+
+namespace alidade {
+
+Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), options, streams, std::make_unique<internal::Linear>()) {}
+
+}  // namespace alidade

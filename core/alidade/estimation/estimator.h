@@ -76,7 +76,8 @@ struct MeasurementReport {
   Numbers gain;
 };
 
-/// Entries of measurements, and memory for numbers that lie nowhere else. A copy has all of its own.
+/// Entries of measurements, and memory for numbers that lie nowhere else. A copy has all numbers of
+/// its own.
 class MeasurementReports {
  public:
   MeasurementReports() = default;

@@ -42,8 +42,8 @@ struct Row {
   bool on_landmark() const { return place == &own; }
 };
 
-/// The rows of a frame, in memory that is kept from one to the next; the numbers of their reports lie
-/// there.
+/// The rows of a frame, in memory that is kept from one to the next: there lie the numbers of their
+/// reports.
 class Rows {
  public:
   /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with

@@ -55,8 +55,8 @@ class Covariance {
   void SetRows(std::span<const int> rows, const ConstMatrix& own, const ConstMatrix& cross);
 
   /// x' = F x + N v of k rows, v ~ N(0, I), C = Cov(F x, N v): P_aa <- F P_aa F' + N N' + C + C',
-  /// P_ai <- F P_ai. Row-major: F k x k, N k x width, C k x k; null: zero. O(n k). False, and nothing
-  /// has changed, if a variance would not be finite.
+  /// P_ai <- F P_ai. Row-major: F k x k, N k x width, C k x k; null: zero. O(n k). False, and
+  /// nothing has changed, if a variance would not be finite.
   bool Propagate(std::span<const int> rows, const double* f, const double* noise = nullptr,
                  int width = 0, const double* cross = nullptr);
 

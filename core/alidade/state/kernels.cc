@@ -458,7 +458,7 @@ struct Arithmetic {
     const int k = static_cast<int>(step.rows.size());
     return sum + step.cross[r * k + c] + step.cross[c * k + r];
   }
-  /// c += a b for row-major a (rows x inner), b (inner x PaddedSize(k)) and c (rows x PaddedSize(k)).
+  /// c += a b, row-major: a rows x inner, b inner x PaddedSize(k), c rows x PaddedSize(k).
   ALIDADE_KERNEL void AddProduct(int rows, int inner, int k, const double* a, const double* b,
                                  double* c) {
     for (int i = 0; i < k; i += kRows) {

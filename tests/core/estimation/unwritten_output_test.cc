@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin writes every element of its outputs. What it never writes is not finite in a filter, at the
-// first measurement as at any other: its memory starts as not a number. `alidade check` finds all of
-// it.
+// A plugin writes every element of its outputs. What it never writes is not finite in a filter, at
+// the first measurement as at any other: its memory starts as not a number. `alidade check` finds
+// all that it leaves out.
 #include <gtest/gtest.h>
 
 #include "alidade/plugin/plugin_models.h"

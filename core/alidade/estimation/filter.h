@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -143,6 +144,13 @@ class Filter : public Estimator {
   const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
     return Push(timestamp, {Reading(sensor, {z})});
   }
+  // A Timestamp is in nanoseconds: TimestampFromSeconds(t_s).
+  template <std::floating_point Seconds, class... Rest>
+  const UpdateReport& Push(Seconds t_s, const Rest&... rest) = delete;
+  template <std::floating_point Seconds>
+  const UpdateReport& Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
+  template <std::floating_point Seconds>
+  State At(Seconds t_s) const = delete;
   /// The estimate of a block that has a value. ContractViolation if it has none yet.
   BlockEstimate Estimate(BlockId block) const;
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave

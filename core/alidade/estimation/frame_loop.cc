@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/estimation/first_values.h"
 
@@ -18,6 +19,23 @@ Event StaleEvent(const Frame& frame, Timestamp state) {
               "rollback, ...}` or, in C++, process frames by alidade::Rollback"};
 }
 
+/// The options. Error kBadConfig if one is out of its range.
+const EkfOptions& Checked(const EkfOptions& options) {
+  const auto expect = [](bool holds, const char* option, double value, const char* range) {
+    if (holds) return;
+    throw Error(ExitCode::kBadConfig, std::string("EkfOptions::") + option + " is " +
+                                          RoundedText(value, 6) + "; expected " + range);
+  };
+  expect(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
+         "a probability in (0, 1], 1: no gate");
+  expect(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "seconds > 0");
+  expect(options.rejection_recovery_after >= 1, "rejection_recovery_after",
+         options.rejection_recovery_after, "at least 1");
+  expect(options.max_covariance_repairs >= 0, "max_covariance_repairs",
+         options.max_covariance_repairs, "at least 0");
+  return options;
+}
+
 }  // namespace
 
 FrameLoop::FrameLoop(System system, const EkfOptions& options,
@@ -25,7 +43,7 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
     : f(std::make_shared<const Binding>(std::move(system), streams),
         options.jacobian == JacobianPolicy::kFirstEstimate),
       method(std::move(equations)),
-      options_(options),
+      options_(Checked(options)),
       time_(f.binding->system, streams, options.max_dt_s),
       gate_(f.binding->system, options),
       consensus_(f.binding->system),

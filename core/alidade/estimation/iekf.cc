@@ -214,7 +214,7 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
              std::make_unique<internal::Iterated>(options.max_iterations, options.tolerance)) {
   ALIDADE_EXPECTS(options.jacobian == JacobianPolicy::kLatest);
   ALIDADE_EXPECTS(options.max_iterations > 1 && options.tolerance > 0.0);
-  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+  CheckSupported("Iekf", this->system(), kSupport);
 }
 
 }  // namespace alidade

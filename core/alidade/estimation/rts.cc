@@ -110,7 +110,7 @@ RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
     : tape_(tape.get()),
       loop_(std::make_unique<internal::FrameLoop>(
           std::move(system), internal::WithoutRecovery(options), streams, std::move(tape))) {
-  ALIDADE_EXPECTS(!FindUnsupported(loop_->f.binding->system, kSupport));
+  CheckSupported("RtsSmoother", loop_->f.binding->system, kSupport);
 }
 
 RtsSmoother::~RtsSmoother() = default;

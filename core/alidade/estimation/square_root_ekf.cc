@@ -165,7 +165,7 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
     : Filter(std::move(system), internal::WithoutRecovery(options), streams,
              std::make_unique<internal::SquareRoot>()) {
-  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+  CheckSupported("SquareRootEkf", this->system(), kSupport);
 }
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/support.h"
 
+#include "alidade/base/error.h"
+
 namespace alidade {
 namespace {
 
@@ -53,6 +55,20 @@ std::optional<Unsupported> FindUnsupported(const System& system, const Support& 
     }
   }
   return std::nullopt;
+}
+
+void CheckSupported(const char* estimator, const System& system, const Support& support) {
+  const auto asked = FindUnsupported(system, support);
+  if (!asked) return;
+  std::string where;
+  if (asked->block >= 0) where = " (block '" + system.layout[asked->block].name + "')";
+  if (asked->sensor >= 0) {
+    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked->sensor)];
+    where = " (sensor '" + sensor.name + "', role '" +
+            sensor.model->roles()[static_cast<std::size_t>(asked->role)].name + "')";
+  }
+  throw Error(ExitCode::kBadConfig, std::string(estimator) + " does not support " + asked->what +
+                                        where + "; expected " + asked->remedy + ", or an Ekf");
 }
 
 }  // namespace alidade

@@ -42,5 +42,7 @@ struct Unsupported {
 /// The first thing that `system` asks for beyond `support`, blocks before sensors; nothing where
 /// all can be done. Recovery is an option of the estimator, and not looked at.
 std::optional<Unsupported> FindUnsupported(const System& system, const Support& support);
+/// Error kBadConfig, by name and with the remedy, if there is such a thing. `estimator`: `Ukf`.
+void CheckSupported(const char* estimator, const System& system, const Support& support);
 
 }  // namespace alidade

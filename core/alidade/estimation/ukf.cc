@@ -443,7 +443,7 @@ Unscented::Predicted& Unscented::PredictedOf(const FilterState& f, const Row& ro
 Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
     : Filter(std::move(system), internal::WithoutRecovery(options.filter), streams,
              std::make_unique<internal::Unscented>(options)) {
-  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+  CheckSupported("Ukf", this->system(), kSupport);
   ALIDADE_EXPECTS(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0 &&
                   options.beta >= 0.0 && options.kappa >= 0.0);
 }

@@ -373,5 +373,33 @@ TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   EXPECT_EQ(same, std::vector<char>(4, 1));
 }
 
+// Time is in nanoseconds: seconds do not compile.
+template <class T>
+concept TakesTime = requires(Filter& filter, T t) {
+  filter.At(t);
+};
+static_assert(TakesTime<Timestamp> && TakesTime<int> && !TakesTime<double>);
+
+TEST(FilterOptions, OutOfTheirRangeAreNamed) {
+  const System system = DepthFilter();
+  const auto refused = [&](const EkfOptions& options, const char* what) {
+    try {
+      Ekf(system, options, StreamsOf(system));
+    } catch (const Error& error) {
+      return std::string(error.what()).find(what) != std::string::npos;
+    }
+    return false;
+  };
+  for (const double gate : {-1.0, 0.0, 2.0, std::nan("")}) {
+    EXPECT_TRUE(refused({.gate = gate}, "EkfOptions::gate is ")) << gate;
+  }
+  for (const double dt_s : {0.0, -1.0, std::nan("")}) {
+    EXPECT_TRUE(refused({.max_dt_s = dt_s}, "EkfOptions::max_dt_s is ")) << dt_s;
+  }
+  EXPECT_TRUE(refused({.rejection_recovery_after = 0}, "rejection_recovery_after is 0"));
+  EXPECT_TRUE(refused({.max_covariance_repairs = -1}, "max_covariance_repairs is -1"));
+  EXPECT_FALSE(refused({}, "EkfOptions"));
+}
+
 }  // namespace
 }  // namespace alidade::testing

@@ -412,10 +412,10 @@ TEST(Iekf, HoldsARoleInEveryIteration) {
 TEST(Iekf, RefusesWhatItCannotDo) {
   System considered = DepthFilter();
   considered.sensors[1].roles[1].mode = RoleMode::kConsider;
-  EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), ContractViolation);
+  EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), Error);
   System measured = DepthFilter();
   measured.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
-  EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), ContractViolation);
+  EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), Error);
   IekfOptions first;
   first.jacobian = JacobianPolicy::kFirstEstimate;
   EXPECT_THROW(Iekf(DepthFilter(), first, {}), ContractViolation);

@@ -196,10 +196,10 @@ TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
                    b.name == considered.layout[id].name ? BlockStatus::kConsider : b.status);
   }
   considered.layout = layout;
-  EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), ContractViolation);
+  EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), Error);
   System waiting = DepthFilter();
   waiting.priors[0].from = "disparity";
-  EXPECT_THROW(RtsSmoother(waiting, {}, StreamsOf(waiting)), ContractViolation);
+  EXPECT_THROW(RtsSmoother(waiting, {}, StreamsOf(waiting)), Error);
 }
 
 }  // namespace

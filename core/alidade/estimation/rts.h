@@ -37,8 +37,8 @@ class RtsSmoother : public Estimator {
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more than
-  /// kSupport.
+  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more
+  /// than kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit RtsSmoother(const System& problem, const EkfOptions& options = {})
       : RtsSmoother(problem, options, problem.streams) {}

@@ -33,8 +33,8 @@ class SquareRootEkf : public Filter {
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more than
-  /// kSupport.
+  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more
+  /// than kSupport.
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit SquareRootEkf(const System& problem, const EkfOptions& options = {})
       : SquareRootEkf(problem, options, problem.streams) {}

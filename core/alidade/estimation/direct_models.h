@@ -55,6 +55,8 @@ SensorModel::Description DescribeSensor(const Model& model, std::string name) {
   static_assert(CheckSensorMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kRoles)> == Blocks<Model>::kCount,
                 "one Quantity in kRoles for each role");
+  static_assert(AreNamed(Model::kRoles) && Model::kMeasurement.name != nullptr,
+                "kMeasurement and each Quantity of kRoles need a name, as in Quantity{\"depth\"}");
   SensorModel::Description description;
   description.name = std::move(name);
   ForEach(
@@ -90,6 +92,8 @@ MotionModel::Description DescribeMotion(const Model& model, std::string name) {
   static_assert(CheckMotionMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kBlocks)> == Blocks<Model>::kCount,
                 "one Quantity in kBlocks for each block");
+  static_assert(AreNamed(Model::kBlocks),
+                "each Quantity of kBlocks needs a name, as in Quantity{\"position\"}");
   MotionModel::Description description;
   description.name = std::move(name);
   ForEach(

@@ -63,6 +63,10 @@ struct Numbers : std::span<const double> {
 /// of the estimator until its next frame, those of a copy in that of its UpdateReport. Empty: not
 /// reached.
 struct MeasurementReport {
+  MeasurementReport() = default;
+  MeasurementReport(int of_sensor, Outcome became, std::int64_t of_landmark, int tangent_size)
+      : sensor(of_sensor), outcome(became), landmark(of_landmark), dof(tangent_size) {}
+
   int sensor = -1;  ///< index into System::sensors
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;

@@ -49,9 +49,9 @@ class Gate {
   static Outcome Defect(FilterState& f, Row& row);
   static Outcome Weigh(Row& row, double nis);
   void CheckConditioning(FilterState& f, const Row& row) {
-    const int m = row.place->dof;
-    for (int i = 0; i < m; ++i) {  // on the diagonals of R and S
-      const auto at = static_cast<std::size_t>(i * (m + 1));
+    const auto m = static_cast<std::size_t>(row.place->dof);
+    for (std::size_t i = 0; i < m; ++i) {  // on the diagonals of R and S
+      const std::size_t at = i * (m + 1);
       if (!(row.R[at] > 1e-13 * row.s[at])) return WarnOfConditioning(f, row, at);
     }
   }

@@ -144,9 +144,6 @@ constexpr bool AreNamed(const Quantities& quantities) {
 /// Always true: the errors are its own.
 template <class Model>
 constexpr bool CheckSensorMembers() {
-  static_assert(
-      Model::kMeasurement.name != nullptr && AreNamed(Model::kRoles),
-      "each Quantity of kRoles and kMeasurement needs a name: Quantity{\"depth\", \"m\"}");
   using Indices = typename Blocks<Model>::Indices;
   using Others = std::make_index_sequence<OtherCount<Model>()>;
   static_assert(HasPredict<Model, Indices>::value,
@@ -186,8 +183,6 @@ constexpr bool StepOrderFits() {
 /// Likewise.
 template <class Model>
 constexpr bool CheckMotionMembers() {
-  static_assert(AreNamed(Model::kBlocks),
-                "each Quantity of kBlocks needs a name: Quantity{\"position\", \"m\"}");
   using Indices = typename Blocks<Model>::Indices;
   static_assert(HasStep<Model, Indices>::value,
                 "a motion model needs template <class T> void Step(const T* block..., [const T* "

@@ -64,8 +64,8 @@ void FrameLoop::Process(const Frame& frame) {
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 
-/// What a frame goes through. Flat, for its parts are small and a call of each would cost as much;
-/// what is large or seldom is marked `noinline`.
+/// The way of a frame. Flattened: its parts are small, and a call of each would cost as much. Large
+/// and rarely called functions are marked `noinline`.
 [[gnu::flatten]] void FrameLoop::Run(const Frame& frame) {
   if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);

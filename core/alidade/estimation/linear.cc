@@ -10,7 +10,7 @@
 
 namespace alidade::internal {
 
-// What is flat here is as FrameLoop::Run: of small parts; what is large or seldom is `noinline`.
+// Flattened functions here: see FrameLoop::Run.
 
 [[gnu::flatten]] Trouble Linear::Step(FilterState& f, double dt_s) {
   if (Trouble trouble = f.motions.Evaluate(f.state, dt_s)) return trouble;

@@ -171,7 +171,7 @@ Trouble Motions::Apply(State& state) {
   return {};
 }
 
-/// Whose fault it is that P steps to what is not finite.
+/// Why P after the step is not finite.
 [[gnu::noinline]] Trouble Motions::WhyNotFinite() const {
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];

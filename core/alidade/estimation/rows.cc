@@ -87,7 +87,7 @@ void Rows::PointToReports(UpdateReport& report) {
   return OutcomeOf(row.model->Valid({m.values.data(), m.known.data()}));
 }
 
-/// The same of what comes with its values.
+/// The same of its known numbers and its covariance.
 [[gnu::noinline]] Outcome Rows::CheckRest(const Row& row) {
   const Measurement& m = *row.measurement;
   const int dof = row.place->dof;

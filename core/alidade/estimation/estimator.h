@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <span>
@@ -106,7 +105,7 @@ class MeasurementReports {
 
  private:
   std::vector<MeasurementReport> entries_;
-  std::deque<std::vector<double>> numbers_;
+  std::vector<std::vector<double>> numbers_;
 };
 
 /// Something that happened to the filter, worth a line to its user.

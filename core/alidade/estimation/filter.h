@@ -151,6 +151,9 @@ class Filter : public Estimator {
   const UpdateReport& Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
   template <std::floating_point Seconds>
   State At(Seconds t_s) const = delete;
+  template <std::floating_point Seconds, class... Rest>
+  std::optional<Prediction> Expect(std::string_view sensor, Seconds t_s,
+                                   const Rest&... rest) const = delete;
   /// The estimate of a block that has a value. ContractViolation if it has none yet.
   BlockEstimate Estimate(BlockId block) const;
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave

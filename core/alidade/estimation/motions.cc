@@ -236,17 +236,14 @@ bool Motions::Propagate(Covariance& p) {
 
 int Motions::noise_size() const {
   int size = 0;
-  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
-    if (steps_[i].active) size += binding_->system.motions[i].model->noise_size();
-  }
+  for (const std::size_t i : active_) size += binding_->system.motions[i].model->noise_size();
   return size;
 }
 
 Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   Workspace::Matrix transition = work.Take(n, n);
   transition.setIdentity();
-  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
-    if (!steps_[i].active) continue;
+  for (const std::size_t i : active_) {
     const double* f = steps_[i].f.data();
     for (const int row : binding_->motion_places[i].at) {
       for (const int column : binding_->motion_places[i].at) {
@@ -263,10 +260,9 @@ Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Worksp
   Workspace::Matrix input = work.Take(n, noise_size());
   input.setZero();
   Eigen::Index columns = 0;
-  for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
+  for (const std::size_t i : active_) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
-    if (!step.active) continue;
     const MotionModel& model = *binding_->system.motions[i].model;
     const Eigen::Index width = model.noise_size();
     for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {

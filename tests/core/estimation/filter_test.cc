@@ -378,7 +378,12 @@ template <class T>
 concept TakesTime = requires(Filter& filter, T t) {
   filter.At(t);
 };
+template <class T>
+concept ExpectsAt = requires(Filter& filter, T t) {
+  filter.Expect("disparity", t);
+};
 static_assert(TakesTime<Timestamp> && TakesTime<int> && !TakesTime<double>);
+static_assert(ExpectsAt<Timestamp> && ExpectsAt<int> && !ExpectsAt<double>);
 
 TEST(FilterOptions, OutOfTheirRangeAreNamed) {
   const System system = DepthFilter();

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "alidade/io/output_folder.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/plugin_folders.h"
 #include "command.h"
 #include "console.h"
 

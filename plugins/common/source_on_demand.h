@@ -5,7 +5,7 @@
 #include <string>
 
 #include "alidade/experiment/source_plugin.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/load.h"
 
 namespace alidade {
 

@@ -12,7 +12,6 @@
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/given_noise.h"
 #include "alidade/plugin/param_reader.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace {

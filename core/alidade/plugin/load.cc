@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/load.h"
+
 #define BOOST_DLL_USE_STD_FS
 #include <boost/dll/shared_library.hpp>
 #include <cstring>
@@ -8,7 +10,10 @@
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/instruction_sets.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/plugin_folders.h"
+#include "alidade/plugin/plugin_sections.h"
+#include "alidade/plugin/table_defect.h"
+#include "alidade/plugin/trust.h"
 
 namespace alidade::internal {
 namespace {

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/plugin/plugin_host.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
-#include <cstdlib>
 #include <optional>
 #include <set>
 
@@ -13,8 +10,12 @@
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/create.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/load.h"
+#include "alidade/plugin/plugin_folders.h"
 #include "alidade/plugin/plugin_models.h"
+#include "alidade/plugin/plugin_sections.h"
+#include "alidade/plugin/table_defect.h"
+#include "alidade/plugin/trust.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
@@ -23,14 +24,6 @@ namespace {
 using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
-
-std::optional<fs::path> UserFolder() {
-  const fs::path data = Text(secure_getenv("XDG_DATA_HOME"));
-  if (data.is_absolute()) return data / "alidade/plugins";
-  const fs::path home = Text(secure_getenv("HOME"));
-  if (home.is_absolute()) return home / ".local/share/alidade/plugins";
-  return std::nullopt;
-}
 
 /// The origin of places that are given.
 constexpr const char* kGiven = "given";
@@ -68,26 +61,6 @@ void AddEntries(const internal::OpenedPlugin& plugin, std::vector<PluginEntry>& 
 
 }  // namespace
 
-std::vector<fs::path> internal::PluginFoldersOfEnvironment() {
-  std::vector<fs::path> folders;
-  std::string rest = Text(secure_getenv("ALIDADE_PLUGIN_PATH"));
-  while (!rest.empty()) {
-    const std::size_t colon = std::min(rest.find(':'), rest.size());
-    if (colon > 0) folders.emplace_back(rest.substr(0, colon));
-    rest.erase(0, colon + 1);
-  }
-  return folders;
-}
-
-fs::path internal::FolderOfProgram() {
-  Dl_info info{};
-  const auto* here = reinterpret_cast<const void*>(&CheckTrusted);
-  if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return {};
-  std::error_code error;
-  const fs::path library = fs::canonical(info.dli_fname, error);
-  return error ? fs::path() : library.parent_path() / "alidade";
-}
-
 PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal,
                        const std::optional<std::set<std::string>>& only)
     : given_(files_and_folders), only_(only) {
@@ -96,7 +69,8 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
   for (const fs::path& folder : internal::PluginFoldersOfEnvironment()) {
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }
-  if (const auto folder = UserFolder()) LoadPlace(*folder, "user data folder", false);
+  if (const auto folder = internal::PluginFolderOfUser())
+    LoadPlace(*folder, "user data folder", false);
   const fs::path own = internal::FolderOfProgram();
   if (!own.empty()) LoadPlace(own / "plugins", "next to the program", false);
 }

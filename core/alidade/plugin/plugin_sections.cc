@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/plugin_sections.h"
+
 #include <elf.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 #include <vector>
 
 #include "alidade/plugin/abi_read.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace fs = std::filesystem;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/table_defect.h"
+
 #include <cstring>
 #include <set>
 #include <utility>
@@ -6,7 +8,6 @@
 #include "alidade/base/words.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade::internal {
 namespace {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/trust.h"
+
 #include <grp.h>
 #include <pwd.h>
 #include <sys/stat.h>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "alidade/io/follow_links.h"
-#include "alidade/plugin/plugin_file.h"
 
 namespace alidade {
 namespace fs = std::filesystem;

@@ -11,7 +11,7 @@
 #include "alidade/check/plugin_listing.h"
 #include "alidade/experiment/run.h"
 #include "alidade/io/sha256.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/plugin_sections.h"
 #include "golden_fixture.h"
 #include "support/recording.h"
 

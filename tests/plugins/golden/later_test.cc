@@ -3,7 +3,7 @@
 // A plugin of a later minor version, later.c, in this host: what it need not understand it does
 // without, all else it refuses by name.
 #include "alidade/check/check.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/plugin_sections.h"
 #include "plugins/host/host_fixture.h"
 
 namespace alidade {

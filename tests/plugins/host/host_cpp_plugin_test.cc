@@ -4,7 +4,7 @@
 #include "alidade/experiment/estimator_plugin.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/plugin/create.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/load.h"
 #include "host_fixture.h"
 
 namespace alidade {

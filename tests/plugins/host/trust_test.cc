@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin/trust.h"
+
 #include <grp.h>
 #include <pwd.h>
 #include <unistd.h>
 
 #include <fstream>
 
-#include "alidade/plugin/plugin_file.h"
 #include "host_fixture.h"
 #include "support/recording.h"
 

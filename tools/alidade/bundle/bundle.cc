@@ -9,7 +9,7 @@
 #include <set>
 
 #include "alidade/base/words.h"
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/load.h"
 
 namespace alidade {
 namespace {

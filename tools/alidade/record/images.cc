@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/images.h"
 
-#include "alidade/plugin/plugin_file.h"
+#include "alidade/plugin/load.h"
 
 namespace alidade {
 

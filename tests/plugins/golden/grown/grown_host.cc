@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "alidade/plugin/abi_read.h"
-#include "alidade/plugin/plugin_file.h"
 #include "alidade/plugin/plugin_models.h"
+#include "alidade/plugin/plugin_sections.h"
 #include "plugins/golden/golden_fixture.h"
 
 namespace alidade {

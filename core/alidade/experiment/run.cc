@@ -51,34 +51,31 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
   return events.empty() ? otherwise : events.back().text;
 }
 
-/// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
-/// where the whole run has to end.
+/// One frame through one estimator, which sees `visible` of it; false where the whole run has to
+/// end.
 bool Advance(EstimatorRun& one, const FrameWithSegments& seen, const Frame& visible,
-             const Source& source, const ProcessedFrame* passed, const RunOptions& options,
+             const internal::FrameOrder& frames, const Source& source, const RunOptions& options,
              RunResult& result) {
   one.last_report = nullptr;
   if (one.finished) return true;
-  Estimator& estimator = *one.spec.estimator;
   Frame rest;
   const bool all = one.failed_sensors.empty();
   if (!all) rest = one.WithoutFailed(visible, source.streams());
-  const auto started = Clock::now();
-  const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
-  if (!passed) {
-    const double wall_s = SecondsSince(started);
-    one.result.wall_s += wall_s;
+  const auto [after, report, wall_s] =
+      frames.Process(static_cast<std::size_t>(one.index), all ? visible : rest);
+  if (wall_s) {
+    one.result.wall_s += *wall_s;
     std::ranges::transform(one.result.parts_s, report.spent_s, one.result.parts_s.begin(),
                            std::plus<>());
-    for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
+    for (RunObserver* const observer : options.observers) observer->OnTime(one.index, *wall_s);
   }
   one.last_report = &report;
-  one.finished = (passed ? *passed->after : estimator).failed();
-  one.diverged = (passed ? *passed->after : estimator).diverged();
+  one.finished = after.failed();
+  one.diverged = after.diverged();
   one.AddEvents(report.events);
-  if (!one.finished && !estimator.offline()) {
+  if (!one.finished && !after.offline()) {
     const auto takes_since = Clock::now();
-    one.AddEstimate(static_cast<std::size_t>(result.frames), seen,
-                    (passed ? *passed->after : estimator).state(), report, options);
+    one.AddEstimate(static_cast<std::size_t>(result.frames), seen, after.state(), report, options);
     one.result.record_s += SecondsSince(takes_since);
   }
   if (const std::string why = one.HandleFailures(report); !why.empty()) {
@@ -151,8 +148,8 @@ void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& running,
       const int by = running[e].spec.accepted_by;
       Frame accepted;
       if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
-      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, *experiment.source,
-                      frames.processed(e), options, result) &&
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames, *experiment.source,
+                      options, result) &&
               go_on;
     }
     ++result.frames;

@@ -6,7 +6,7 @@
 # Installs the component `estimation` of BUILD into an empty folder, which then has no header of another
 # room, and builds the C++ examples, and the program of late measurements, against it and Eigen (INCLUDE)
 # alone. They must give what they estimate. Then installs the component `testing` too, and builds the tests
-# of tests/install/testing against both.
+# of tests/install/testing against both. Last, ALIDADE_ESTIMATION_ONLY configures without any other package.
 set -euo pipefail
 cmake=$1 build=$2 compiler=$3
 IFS=',' read -ra options <<<"$4"
@@ -67,4 +67,8 @@ awk '{ d = $4 - $9; if (d * d > 16 * $6 * $6 || $6 > 0.01 || $1 < 400) exit 1 }'
     -DCMAKE_CXX_FLAGS="$(printf '%s ' "${only_flags[@]}")" -DCMAKE_PREFIX_PATH="$work/alidade" &&
     "$cmake" --build "$work/testing" && "$work/testing/models_test"
 } >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
+
+without=(yaml-cpp Boost OpenSSL nlohmann_json spdlog CLI11 Ceres OpenCV GTest)
+"$cmake" -S . -B "$work/only" -DCMAKE_CXX_COMPILER="$compiler" -DALIDADE_ESTIMATION_ONLY=ON \
+  $(printf -- '-DCMAKE_DISABLE_FIND_PACKAGE_%s=ON ' "${without[@]}") >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
 echo "the programs build and run on the component alone"

@@ -47,4 +47,10 @@ refused 16 Moved 'a motion model needs void SqrtQ([const double* block...,] doub
 for number in 17 18 19; do
   refused "$number" Moved 'kStepOrder is a static constexpr int from 0 to 8'
 done
+refused 20 Seen 'a sensor needs static constexpr std::array kRoles'
+refused 20 Seen 'a sensor needs static constexpr alidade::Quantity kMeasurement'
+refused 21 Seen 'Predict has to be a template <class T> on the scalar'
+refused 22 Moved 'a motion model needs static constexpr std::array kBlocks'
+refused 23 Moved 'Step has to be a template <class T> on the scalar'
+refused 24 Moved 'noise_kind has to be NoiseKind noise_kind() const'
 echo "all are refused in words"

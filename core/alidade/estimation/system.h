@@ -92,7 +92,8 @@ struct InitialValue {
                BlockStatus status = BlockStatus::kEstimated);
   /// A value that is known exactly.
   static InitialValue Constant(std::string block, std::vector<double> value);
-  /// `sensor` has to have an inverse measurement model of the block.
+  /// `sensor` has to have an inverse measurement model of the block; a filter refuses what cannot
+  /// start so.
   static InitialValue FromMeasurement(std::string block, std::string sensor);
 
   std::string block;
@@ -133,7 +134,7 @@ struct System {
                        const std::vector<InitialValue>& initial,
                        double input_timeout_s = std::numeric_limits<double>::infinity());
   template <class Model>
-  requires requires { Model::kBlocks; }
+  requires requires { Model::kNoise; }
   StateHandle AddState(const std::string& name, Model model,
                        const std::vector<InitialValue>& initial,
                        double input_timeout_s = std::numeric_limits<double>::infinity()) {
@@ -144,7 +145,7 @@ struct System {
   SensorHandle AddSensor(const std::string& name, SharedSensor model,
                          std::vector<RoleBinding> roles, const SensorOptions& options = {});
   template <class Model>
-  requires requires { Model::kRoles; }
+  requires requires { Model::kInitialises; }
   SensorHandle AddSensor(const std::string& name, Model model, std::vector<RoleBinding> roles,
                          const SensorOptions& options = {}) {
     return AddSensor(name, MakeSensor(std::move(model), name), std::move(roles), options);
@@ -164,6 +165,16 @@ struct System {
   std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there if a sensor measures landmarks
 };
+
+/// Why a block cannot start from the measurement that its prior names, and what to do.
+struct InitialDefect {
+  BlockId block = -1;
+  std::string what, remedy;
+  std::string nearest;  ///< the name that may be meant, or ""
+};
+/// The first of them: there is no such sensor, it does not determine the block, or it needs a block
+/// that itself waits for this one. Nothing where all can start.
+std::optional<InitialDefect> FindInitialDefect(const System& system);
 
 namespace internal {
 

@@ -211,16 +211,18 @@ decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
   }
 }
 
-/// Whether Call can be called as (model, pointer for each of Indices..., [known,] rest...).
-template <class Call, class Model, class Indices, class... Rest>
-struct TakesRoles;
-template <class Call, class Model, std::size_t... I, class... Rest>
-struct TakesRoles<Call, Model, std::index_sequence<I...>, Rest...> {
+/// Whether Call can be called as (model, const T* for each of Indices..., [known,] rest...).
+template <class T, class Call, class Model, class Indices, class... Rest>
+struct TakesRolesOf;
+template <class T, class Call, class Model, std::size_t... I, class... Rest>
+struct TakesRolesOf<T, Call, Model, std::index_sequence<I...>, Rest...> {
   static constexpr bool value =
       kHasKnown<Model>
-          ? std::is_invocable_v<Call, const Model&, Pointer<double, I>..., const double*, Rest...>
-          : std::is_invocable_v<Call, const Model&, Pointer<double, I>..., Rest...>;
+          ? std::is_invocable_v<Call, const Model&, Pointer<T, I>..., const double*, Rest...>
+          : std::is_invocable_v<Call, const Model&, Pointer<T, I>..., Rest...>;
 };
+template <class Call, class Model, class Indices, class... Rest>
+struct TakesRoles : TakesRolesOf<double, Call, Model, Indices, Rest...> {};
 
 struct JacobianCall {
   template <class Model, class... A>

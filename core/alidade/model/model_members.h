@@ -5,10 +5,12 @@
 #include <type_traits>
 #include <utility>
 
+#include "alidade/model/jet.h"
 #include "alidade/model/model.h"
 
-/// Compile errors, in words, for optional members of a model that exist but cannot be called: else
-/// they would be left out without a sign. A final struct is not examined.
+/// Compile errors, in words, for members of a model that are missing, and for optional ones that
+/// exist but cannot be called: else they would be left out without a sign. Of a final struct the
+/// optional members are not examined.
 namespace alidade {
 namespace detail {
 
@@ -41,8 +43,24 @@ struct PredictCall {
   auto operator()(const Model& model, A... a) const
       -> std::enable_if_t<std::is_convertible_v<decltype(model.Predict(a...)), bool>>;
 };
-template <class Model, class Indices>
-struct HasPredict : TakesRoles<PredictCall, Model, Indices, double*> {};
+template <class Model, class Indices, class T = double>
+struct HasPredict : TakesRolesOf<T, PredictCall, Model, Indices, T*> {};
+
+/// A scalar of automatic differentiation.
+using AnyJet = Jet<double, 1>;
+
+template <class Model, class = void>
+struct HasRoles : std::false_type {};
+template <class Model>
+struct HasRoles<Model, std::void_t<decltype(Model::kRoles)>> : std::true_type {};
+template <class Model, class = void>
+struct HasMeasurement : std::false_type {};
+template <class Model>
+struct HasMeasurement<Model, std::void_t<decltype(Model::kMeasurement)>> : std::true_type {};
+template <class Model, class = void>
+struct HasBlocks : std::false_type {};
+template <class Model>
+struct HasBlocks<Model, std::void_t<decltype(Model::kBlocks)>> : std::true_type {};
 
 template <class Model, class Indices>
 struct HasSqrtNoise {
@@ -54,18 +72,17 @@ struct StepCall {
   template <class Model, class... A>
   auto operator()(const Model& model, A... a) const -> decltype(model.Step(a...));
 };
-template <std::size_t>
-using Next = double*;
-template <class Model, class Indices>
+template <class T, std::size_t>
+using Next = T*;
+template <class Model, class Indices, class T = double>
 struct HasStep;
-template <class Model, std::size_t... I>
-struct HasStep<Model, std::index_sequence<I...>> {
-  static constexpr bool value =
-      Model::Input::kAmbient > 0
-          ? std::is_invocable_v<StepCall, const Model&, Pointer<double, I>..., const double*,
-                                const double*, double, Next<I>...>
-          : std::is_invocable_v<StepCall, const Model&, Pointer<double, I>..., const double*,
-                                double, Next<I>...>;
+template <class Model, class T, std::size_t... I>
+struct HasStep<Model, std::index_sequence<I...>, T> {
+  static constexpr bool value = Model::Input::kAmbient > 0
+                                    ? std::is_invocable_v<StepCall, const Model&, Pointer<T, I>...,
+                                                          const T*, const T*, double, Next<T, I>...>
+                                    : std::is_invocable_v<StepCall, const Model&, Pointer<T, I>...,
+                                                          const T*, double, Next<T, I>...>;
 };
 
 struct SqrtQCall {
@@ -146,9 +163,20 @@ template <class Model>
 constexpr bool CheckSensorMembers() {
   using Indices = typename Blocks<Model>::Indices;
   using Others = std::make_index_sequence<OtherCount<Model>()>;
+  static_assert(HasRoles<Model>::value,
+                "a sensor needs static constexpr std::array kRoles{alidade::Quantity{\"name\", "
+                "\"unit\", \"meaning\"}, ...}, one for each role: see docs/add_a_sensor.md");
+  static_assert(
+      HasMeasurement<Model>::value,
+      "a sensor needs static constexpr alidade::Quantity kMeasurement{\"name\", \"unit\", "
+      "\"meaning\"}: see docs/add_a_sensor.md");
   static_assert(HasPredict<Model, Indices>::value,
                 "a sensor needs template <class T> bool Predict(const T* role..., [const double* "
                 "known,] T* z) const, with one pointer for each role: see docs/add_a_sensor.md");
+  static_assert(HasJacobian<Model, Indices>::value || !HasPredict<Model, Indices>::value ||
+                    HasPredict<Model, Indices, AnyJet>::value,
+                "Predict has to be a template <class T> on the scalar, for automatic "
+                "differentiation, unless the sensor has Jacobian: see docs/add_a_sensor.md");
   static_assert(HasSqrtNoise<Model, Indices>::value,
                 "a sensor needs template <class T> void SqrtNoise(const T* role..., [const double* "
                 "known,] [const T* z,] T* L) const: see docs/add_a_sensor.md");
@@ -184,10 +212,21 @@ constexpr bool StepOrderFits() {
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;
+  static_assert(HasBlocks<Model>::value,
+                "a motion model needs static constexpr std::array kBlocks{alidade::Quantity{"
+                "\"name\", \"unit\", \"meaning\"}, ...}, one for each block: see "
+                "docs/add_a_motion_model.md");
   static_assert(HasStep<Model, Indices>::value,
                 "a motion model needs template <class T> void Step(const T* block..., [const T* "
                 "u,] const T* w, double dt_s, T* next...) const, with one pointer for each block: "
                 "see alidade/model/model.h");
+  static_assert(HasStepJacobian<Model, Indices>::value || !HasStep<Model, Indices>::value ||
+                    HasStep<Model, Indices, AnyJet>::value,
+                "Step has to be a template <class T> on the scalar, for automatic differentiation, "
+                "unless the model has StepJacobian: see docs/add_a_motion_model.md");
+  static_assert(std::is_same_v<decltype(std::declval<const Model&>().noise_kind()), NoiseKind>,
+                "noise_kind has to be NoiseKind noise_kind() const: see "
+                "docs/add_a_motion_model.md");
   static_assert(HasSqrtQ<Model, Indices>::value,
                 "a motion model needs void SqrtQ([const double* block...,] double dt_s, MatrixRef "
                 "Lq) const: see alidade/model/model.h");

@@ -26,6 +26,7 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
+  static_assert(CheckSensorMembers<Model>());
   constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
   holder->DescribeRoles(roles);
   holder->DescribeMeasurement();

@@ -23,6 +23,20 @@ struct Base : alidade::Sensor<Vec<1>, Vec<1>, Vec<2>> {
   }
 };
 
+#if BAD_MEMBER == 20
+struct Seen : alidade::Sensor<Vec<1>, Vec<1>> {  // no kRoles, no kMeasurement
+  explicit Seen(Params&) {}
+  template <class T>
+  bool Predict(const T* a, T* z) const {
+    z[0] = a[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+#else
 struct Seen : Base {
   using Base::Base;
 #if BAD_MEMBER == 0
@@ -40,7 +54,7 @@ struct Seen : Base {
 #elif BAD_MEMBER == 3
   template <class T>
   void Jacobian(const T*, const T*, T*, T*) const {}
-  void Jacobian(double) const {}                    // neither of the two
+  void Jacobian(double) const {}  // neither of the two
 #elif BAD_MEMBER == 4
  private:
   void Jacobian(const double*, const double*, MatrixRef, MatrixRef) const {}
@@ -70,11 +84,19 @@ struct Seen : Base {
   void SqrtNoise(const T*, const T*, T* l) {  // not const
     l[0] = T(1.0);
   }
+#elif BAD_MEMBER == 21
+  bool Predict(const double* a, const double*, double* z) const {  // no template
+    z[0] = a[0];
+    return true;
+  }
 #endif
 };
+#endif
 
 struct MotionBase : alidade::Motion<1, Vec<1>> {
-  static constexpr std::array kBlocks{Quantity{"x"}};
+#if BAD_MEMBER != 22
+  static constexpr std::array kBlocks{Quantity { "x" }};
+#endif
   explicit MotionBase(Params&) {}
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
@@ -94,6 +116,10 @@ struct Moved : MotionBase {
   template <class T>
   void Step(const T* x, double, T* next) const {  // no noise
     next[0] = x[0];
+  }
+#elif BAD_MEMBER == 23
+  void Step(const double* x, const double* w, double, double* next) const {  // no template
+    next[0] = x[0] + w[0];
   }
 #else
   template <class T>
@@ -118,7 +144,9 @@ struct Moved : MotionBase {
 #elif BAD_MEMBER == 18
   static constexpr double kStepOrder = 2.0;
 #elif BAD_MEMBER == 19
-  int kStepOrder = 2;                 // not of the type
+  int kStepOrder = 2;  // not of the type
+#elif BAD_MEMBER == 24
+  bool noise_kind() const { return true; }
 #endif
 };
 

@@ -4,12 +4,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "alidade/state/jacobian_rows.h"
+
 /// Products and decompositions of dense matrices outside of inner loops, compiled once: Eigen
 /// instantiates each combination of operands anew, which takes most of the time of a build.
 namespace alidade::internal {
-
-/// A matrix or a block of one.
-using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
 Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< A B
 Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b);  ///< A B'

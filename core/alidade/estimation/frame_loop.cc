@@ -36,11 +36,23 @@ const EkfOptions& Checked(const EkfOptions& options) {
   return options;
 }
 
+/// The system. Error kBadConfig if a block of it cannot start as it says.
+System Checked(System system) {
+  if (const auto defect = FindInitialDefect(system)) {
+    throw Error(ExitCode::kBadConfig,
+                "block '" + system.layout[defect->block].name +
+                    "' cannot start from a measurement: " + defect->what + "; expected " +
+                    defect->remedy +
+                    (defect->nearest.empty() ? "" : "; did you mean '" + defect->nearest + "'?"));
+  }
+  return system;
+}
+
 }  // namespace
 
 FrameLoop::FrameLoop(System system, const EkfOptions& options,
                      const std::vector<StreamInfo>& streams, std::unique_ptr<Method> equations)
-    : f(std::make_shared<const Binding>(std::move(system), streams),
+    : f(std::make_shared<const Binding>(Checked(std::move(system)), streams),
         options.jacobian == JacobianPolicy::kFirstEstimate),
       method(std::move(equations)),
       options_(Checked(options)),

@@ -49,7 +49,8 @@ class Snapshots {
 /// It keeps the frames of the last `window_s` seconds, with a copy of the filter after each. For a
 /// frame that is older than the newest, the filter goes back to the copy before it, and processes
 /// it and those after it again. Its state is then, to the last bit, that of the same frames in
-/// order; of frames of equal timestamps the order in which they came counts.
+/// order; of frames of equal timestamps the order in which they came counts. It can be moved, but
+/// not copied; a copy of filter() goes on by itself.
 class Rollback {
  public:
   /// The frames that a call processed, in the order of their timestamps. Good until the next call.

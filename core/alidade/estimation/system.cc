@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
@@ -24,7 +25,8 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   Prior prior{block, initial.mean, {}, initial.from};
   if (!initial.from.empty()) return prior;
   const Geometry& geometry = space.geometry;
-  const std::string value = "the initial value of '" + space.name + "', a " + ToString(geometry);
+  const std::string value =
+      "the initial value of '" + space.name + "', " + internal::WithArticle(ToString(geometry));
   if (std::ssize(prior.mean) != geometry.ambient) {
     Refuse(who, "needs " + std::to_string(geometry.ambient) + " numbers as " + value + ", not " +
                     std::to_string(prior.mean.size()));
@@ -70,7 +72,8 @@ BlockId AddOwnedState(System& system, const std::string& sensor, const Space& ro
 /// Refuses a block that cannot fill a role.
 void CheckRole(const System& system, const Space& role, const RoleBinding& binding,
                const std::string& who) {
-  const std::string its_role = "role '" + role.name + "', a " + ToString(role.geometry);
+  const std::string its_role =
+      "role '" + role.name + "', " + internal::WithArticle(ToString(role.geometry));
   if (binding.block < 0) {
     if (!role.optional()) Refuse(who, "needs a block that fills its " + its_role);
     return;
@@ -78,8 +81,8 @@ void CheckRole(const System& system, const Space& role, const RoleBinding& bindi
   ALIDADE_EXPECTS(binding.block < std::ssize(system.layout.blocks()));
   const Block& block = system.layout[binding.block];
   if (block.geometry() == role.geometry) return;
-  Refuse(who,
-         "has a " + its_role + "; block '" + block.name + "' is a " + ToString(block.geometry()));
+  Refuse(who, "has a " + its_role + "; block '" + block.name + "' is " +
+                  internal::WithArticle(ToString(block.geometry())));
 }
 
 }  // namespace
@@ -124,8 +127,8 @@ StateHandle System::AddState(const std::string& name, SharedMotion model,
   const std::vector<Space>& spaces = motion.model->blocks();
   for (const InitialValue& one : initial) {
     if (std::ranges::count(spaces, one.block, &Space::name) == 0) {
-      Refuse(who, "has no block '" + one.block + "'; those of model '" + motion.model->name() +
-                      "' are " + internal::Join(NamesOf(spaces)));
+      Refuse(who,
+             "has no block '" + one.block + "'; its blocks are " + internal::Join(NamesOf(spaces)));
     }
   }
   std::vector<Prior> added;
@@ -159,8 +162,9 @@ SensorHandle System::AddSensor(const std::string& name, SharedSensor model,
   const auto of_landmark = std::ranges::count_if(spaces, &Space::landmark);
   const auto own = std::ssize(spaces) - of_landmark;
   if (std::ssize(roles) > own) {
-    Refuse(who, "has " + std::to_string(own) +
-                    " roles to be filled: " + internal::Join(NamesOf(spaces)));
+    Refuse(who, "has " + std::to_string(own) + (own == 1 ? " role" : " roles") +
+                    " to be filled, not " + std::to_string(roles.size()) + ": " +
+                    internal::Join(NamesOf(spaces)));
   }
   roles.resize(spaces.size());
   for (std::size_t i = 0; i < spaces.size(); ++i) {
@@ -200,6 +204,50 @@ int System::FindSensor(std::string_view name) const {
   const auto found = std::find_if(sensors.begin(), sensors.end(),
                                   [name](const SensorBinding& s) { return s.name == name; });
   return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
+}
+
+std::optional<InitialDefect> FindInitialDefect(const System& system) {
+  const auto sensor_of = [&](const Prior& prior) -> const SensorBinding& {
+    return system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
+  };
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty()) continue;
+    if (system.FindSensor(prior.from) < 0) {
+      return InitialDefect{prior.block, "no sensor '" + prior.from + "' here",
+                           "a sensor of this estimator",
+                           Nearest(prior.from, NamesOf(system.sensors))};
+    }
+    const SensorBinding& sensor = sensor_of(prior);
+    const int role = sensor.model->inverse().role;
+    if (role < 0 || sensor.roles[static_cast<std::size_t>(role)].block != prior.block) {
+      return InitialDefect{prior.block,
+                           "sensor '" + prior.from + "' does not determine this block",
+                           "a sensor whose inverse measurement model is this block",
+                           {}};
+    }
+  }
+  std::vector<BlockId> chain;  // each needs the next one
+  std::optional<InitialDefect> defect;
+  const std::function<void(BlockId)> follow = [&](BlockId id) {
+    const auto prior = std::ranges::find(system.priors, id, &Prior::block);
+    if (defect || prior == system.priors.end() || prior->from.empty()) return;
+    if (std::ranges::find(chain, id) != chain.end()) {
+      std::string text;
+      for (const BlockId one : chain) text += system.layout[one].name + " <- ";
+      defect = {id,
+                "cyclic: " + text + system.layout[id].name,
+                "one block of the cycle with a mean of its own",
+                {}};
+      return;
+    }
+    chain.push_back(id);
+    for (const RoleBinding& role : sensor_of(*prior).roles) {
+      if (role.block >= 0 && role.block != id) follow(role.block);
+    }
+    chain.pop_back();
+  };
+  for (const Prior& prior : system.priors) follow(prior.block);
+  return defect;
 }
 
 BlockId internal::PositionBlockOf(const System& system) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <utility>
 
@@ -424,53 +423,14 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
   return binding;
 }
 
-/// Checks that every block that starts from a sensor can do so: the sensor measures it, and the
-/// blocks it needs start without waiting for this one.
+/// Checks that every block that starts from a sensor can do so.
 void CheckInitialisation(const Node& root, const System& system) {
-  const auto place = [&](BlockId id) {
-    const Block& block = system.layout[id];
-    const std::string name = block.name.substr(block.owner.size() + 1);
-    return root.At("state").At(block.owner).At("initial").At(name).At("from_measurement");
-  };
-  const auto prior_of = [&](BlockId id) -> const Prior& {
-    return *std::find_if(system.priors.begin(), system.priors.end(),
-                         [id](const Prior& p) { return p.block == id; });
-  };
-  for (const Prior& prior : system.priors) {
-    if (prior.from.empty()) continue;
-    const int sensor = system.FindSensor(prior.from);
-    if (sensor < 0) {
-      place(prior.block)
-          .Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
-                Nearest(prior.from, NamesOf(system.sensors)));
-    }
-    const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
-    const int role = binding.model->inverse().role;
-    if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
-      place(prior.block)
-          .Fail("sensor '" + prior.from + "' does not determine this block",
-                "a sensor whose inverse measurement model is this block");
-    }
-  }
-  std::vector<BlockId> chain;
-  const std::function<void(BlockId)> follow = [&](BlockId id) {
-    const Prior& prior = prior_of(id);
-    if (prior.from.empty()) return;
-    if (std::find(chain.begin(), chain.end(), id) != chain.end()) {
-      std::string text;
-      for (const BlockId b : chain) text += system.layout[b].name + " <- ";
-      place(id).Fail("cyclic: " + text + system.layout[id].name,
-                     "one block of the cycle with a mean of its own");
-    }
-    chain.push_back(id);
-    const SensorBinding& binding =
-        system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
-    for (const RoleBinding& role : binding.roles) {
-      if (role.block >= 0 && role.block != id) follow(role.block);
-    }
-    chain.pop_back();
-  };
-  for (const Prior& prior : system.priors) follow(prior.block);
+  const auto defect = FindInitialDefect(system);
+  if (!defect) return;
+  const Block& block = system.layout[defect->block];
+  const std::string name = block.name.substr(block.owner.size() + 1);
+  const Node entry = root.At("state").At(block.owner).At("initial").At(name);
+  entry.At("from_measurement").Fail(defect->what, defect->remedy, defect->nearest);
 }
 
 /// The system without the state entries that no sensor touches.

@@ -17,19 +17,25 @@ namespace {
 
 using Point = ConstantVelocity<1, false>;
 
+/// What the call throws.
+template <class Call>
+std::string RefusalOf(const Call& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
+    return e.what();
+  }
+  return "nothing";
+}
+
 /// What is thrown when `add` is called with a problem that has the state `target`.
 template <class Add>
 std::string Refusal(const Add& add) {
   System problem;
   const auto target =
       problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
-  try {
-    add(problem, target);
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
-    return e.what();
-  }
-  return "nothing";
+  return RefusalOf([&] { add(problem, target); });
 }
 
 TEST(Problem, OfCodeIsThatOfBindingsByHand) {
@@ -92,7 +98,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](System& p, auto&) {
               p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
             }),
-            "state 'b' has no block 'depth'; those of model 'b' are position, velocity");
+            "state 'b' has no block 'depth'; its blocks are position, velocity");
   EXPECT_EQ(Refusal([](System& p, auto&) {
               p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
             }),
@@ -109,12 +115,34 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([&](System& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"], t["velocity"]});
             }),
-            "sensor 's' has 1 roles to be filled: depth");
+            "sensor 's' has 1 role to be filled, not 2: depth");
   EXPECT_EQ(Refusal([&](System& p, auto&) {
               const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
               p.AddSensor("s", stereo, {wide["value"]});
             }),
             "sensor 's' has a role 'depth', a vector(1); block 'wide.value' is a vector(2)");
+}
+
+TEST(Problem, AFilterRefusesABlockThatCannotStart) {
+  const auto refusal = [](const std::string& block, const std::string& sensor) {
+    System problem;
+    const auto start = [&](const std::string& name) {
+      if (name == block) return InitialValue::FromMeasurement(name, sensor);
+      return InitialValue(name, 0.5, 1.0);
+    };
+    const auto target =
+        problem.AddState("target", Point(1.0), {start("position"), start("velocity")});
+    problem.AddSensor("stereo", StereoDisparity(400.0, 0.065, 1.0), {target["position"]});
+    return RefusalOf([&] { Ekf filter(problem); });
+  };
+  EXPECT_EQ(refusal("position", "stereo"), "nothing");
+  EXPECT_EQ(refusal("position", "stero"),
+            "block 'target.position' cannot start from a measurement: no sensor 'stero' here; "
+            "expected a sensor of this estimator; did you mean 'stereo'?");
+  EXPECT_EQ(refusal("velocity", "stereo"),
+            "block 'target.velocity' cannot start from a measurement: sensor 'stereo' does not "
+            "determine this block; expected a sensor whose inverse measurement model is this "
+            "block");
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ OwnedRole OwnedRoleOf(const Owned& owned, const Space& role);
 
 template <class Model>
 SensorModel::Description DescribeSensor(const Model& model, std::string name) {
-  static_assert(CheckSensorMembers<Model>());
+  static_assert(CheckSensorNames<Model>() && CheckSensorMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kRoles)> == Blocks<Model>::kCount,
                 "one Quantity in kRoles for each role");
   static_assert(AreNamed(Model::kRoles) && Model::kMeasurement.name != nullptr,
@@ -89,7 +89,7 @@ SensorModel::Description DescribeSensor(const Model& model, std::string name) {
 
 template <class Model>
 MotionModel::Description DescribeMotion(const Model& model, std::string name) {
-  static_assert(CheckMotionMembers<Model>());
+  static_assert(CheckMotionNames<Model>() && CheckMotionMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kBlocks)> == Blocks<Model>::kCount,
                 "one Quantity in kBlocks for each block");
   static_assert(AreNamed(Model::kBlocks),

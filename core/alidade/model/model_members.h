@@ -158,11 +158,10 @@ constexpr bool AreNamed(const Quantities& quantities) {
   return true;
 }
 
-/// Always true: the errors are its own.
+/// Always true: the errors are its own. Those of the names that a problem and a plugin have of a
+/// model; a filter composed at compile time needs none.
 template <class Model>
-constexpr bool CheckSensorMembers() {
-  using Indices = typename Blocks<Model>::Indices;
-  using Others = std::make_index_sequence<OtherCount<Model>()>;
+constexpr bool CheckSensorNames() {
   static_assert(HasRoles<Model>::value,
                 "a sensor needs static constexpr std::array kRoles{alidade::Quantity{\"name\", "
                 "\"unit\", \"meaning\"}, ...}, one for each role: see docs/add_a_sensor.md");
@@ -170,6 +169,22 @@ constexpr bool CheckSensorMembers() {
       HasMeasurement<Model>::value,
       "a sensor needs static constexpr alidade::Quantity kMeasurement{\"name\", \"unit\", "
       "\"meaning\"}: see docs/add_a_sensor.md");
+  return true;
+}
+template <class Model>
+constexpr bool CheckMotionNames() {
+  static_assert(HasBlocks<Model>::value,
+                "a motion model needs static constexpr std::array kBlocks{alidade::Quantity{"
+                "\"name\", \"unit\", \"meaning\"}, ...}, one for each block: see "
+                "docs/add_a_motion_model.md");
+  return true;
+}
+
+/// Likewise, of its functions.
+template <class Model>
+constexpr bool CheckSensorMembers() {
+  using Indices = typename Blocks<Model>::Indices;
+  using Others = std::make_index_sequence<OtherCount<Model>()>;
   static_assert(HasPredict<Model, Indices>::value,
                 "a sensor needs template <class T> bool Predict(const T* role..., [const double* "
                 "known,] T* z) const, with one pointer for each role: see docs/add_a_sensor.md");
@@ -212,10 +227,6 @@ constexpr bool StepOrderFits() {
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;
-  static_assert(HasBlocks<Model>::value,
-                "a motion model needs static constexpr std::array kBlocks{alidade::Quantity{"
-                "\"name\", \"unit\", \"meaning\"}, ...}, one for each block: see "
-                "docs/add_a_motion_model.md");
   static_assert(HasStep<Model, Indices>::value,
                 "a motion model needs template <class T> void Step(const T* block..., [const T* "
                 "u,] const T* w, double dt_s, T* next...) const, with one pointer for each block: "

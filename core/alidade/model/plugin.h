@@ -26,7 +26,7 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
-  static_assert(CheckSensorMembers<Model>());
+  static_assert(CheckSensorNames<Model>());
   constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
   holder->DescribeRoles(roles);
   holder->DescribeMeasurement();
@@ -46,7 +46,7 @@ void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
 
 template <class Model>
 void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
-  static_assert(CheckMotionMembers<Model>());
+  static_assert(CheckMotionNames<Model>() && CheckMotionMembers<Model>());
   using U = typename Model::Input;
   constexpr auto blocks = Model::kBlocks;
   holder->DescribeRoles(blocks);

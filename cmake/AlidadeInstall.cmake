@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Installs what is around AlidadeInstallEstimation: the program, core and tools, the plugins.
+# Its variables package_folder and plugin_folder are used here too.
 
 # The plugins that `folder` and the folders below it define.
 function(alidade_plugins_of folder result)

@@ -6,12 +6,18 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <string>
 
+#include "alidade/base/error.h"
 #include "alidade/model/plugin_abi.h"
 
 /// Calls plugins and reads the structs of plugin_abi.h by its rules.
 namespace alidade::internal {
+
+[[noreturn]] inline void Refuse(const std::filesystem::path& plugin, const std::string& why) {
+  throw Error(ExitCode::kPlugin, ErrorLine({plugin.string()}, {}, why));
+}
 
 /// A text that may be null.
 inline std::string Text(const char* text) { return text == nullptr ? "" : text; }

@@ -14,9 +14,9 @@ namespace alidade {
 /// its number is that of the library. Whoever changes the layout or the meaning of an installed
 /// class or function raises it. The classes of a debug standard library have another layout.
 #if defined(_GLIBCXX_DEBUG)
-#define ALIDADE_CPP_ABI "2 with _GLIBCXX_DEBUG"
+#define ALIDADE_CPP_ABI "3 with _GLIBCXX_DEBUG"
 #else
-#define ALIDADE_CPP_ABI "2"
+#define ALIDADE_CPP_ABI "3"
 #endif
 
 /// One implementation of an interface that a plugin offers. The loader does not know the type of

@@ -66,7 +66,7 @@ const void* FactoryOnDemand(const std::string& kind, const std::string& name,
                             const std::filesystem::path& folder, const std::string& missing) {
   std::filesystem::path searched = folder;
   if (searched.empty()) {
-    const std::filesystem::path program = FolderOfProgram();
+    const std::filesystem::path program = FolderOfLibrary();
     if (!program.empty()) searched = program / name;  // never the working folder
   }
   std::vector<std::filesystem::path> files;

@@ -31,9 +31,9 @@ std::optional<fs::path> PluginFolderOfUser() {
   return std::nullopt;
 }
 
-fs::path FolderOfProgram() {
+fs::path FolderOfLibrary() {
   Dl_info info{};
-  const auto* here = reinterpret_cast<const void*>(&FolderOfProgram);
+  const auto* here = reinterpret_cast<const void*>(&FolderOfLibrary);
   if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return {};
   std::error_code error;
   const fs::path library = fs::canonical(info.dli_fname, error);

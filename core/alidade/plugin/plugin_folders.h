@@ -16,6 +16,6 @@ std::optional<std::filesystem::path> PluginFolderOfUser();
 
 /// The folder of the plugins of this build: `lib/alidade` next to this library, in the build tree
 /// or the installation; "" if it cannot be determined.
-std::filesystem::path FolderOfProgram();
+std::filesystem::path FolderOfLibrary();
 
 }  // namespace alidade::internal

@@ -71,7 +71,7 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
   }
   if (const auto folder = internal::PluginFolderOfUser())
     LoadPlace(*folder, "user data folder", false);
-  const fs::path own = internal::FolderOfProgram();
+  const fs::path own = internal::FolderOfLibrary();
   if (!own.empty()) LoadPlace(own / "plugins", "next to the program", false);
 }
 

@@ -57,7 +57,7 @@ enum class OnRefusal { kThrow, kList };
 class PluginHost {
  public:
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
-  /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
+  /// ALIDADE_PLUGIN_PATH, the user data folder, the folder beside this library. What is refused
   /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
   /// `only`, if set, has every name that will be asked for: plugins elsewhere that list none of
   /// them stay closed, which saves the time of opening them. Then an error about a name that is not

@@ -5,7 +5,6 @@
 #include <set>
 #include <string>
 
-#include "alidade/base/error.h"
 #include "alidade/model/plugin_abi.h"
 
 /// What a plugin says of itself in sections of its file, which are read before it is opened.
@@ -20,10 +19,6 @@ namespace internal {
 /// False if the plugin lists the names of its entries and none of `names` is among them. Such a
 /// plugin may stay closed.
 bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
-
-[[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
-  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
-}
 
 }  // namespace internal
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
@@ -89,12 +90,12 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
   return outcome;
 }
 
-double Linear::ComputeS(FilterState& f, Row& row) {
+double Linear::ComputeNis(FilterState& f, Row& row) {
   row.report->s = {row.s, row.R.size()};
-  return f.update.Gate(row.linearised);
+  return f.update.ComputeNis(row.linearised);
 }
 
-void Linear::Stack(FilterState& f, std::span<Row* const> rows) {
+void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
   stacked_.clear();
   int column = 0;
   for (Row* const row : rows) {
@@ -170,7 +171,7 @@ void Linear::Stack(FilterState& f, std::span<Row* const> rows) {
                                            const double* correction) {
   const Workspace::Use use(f.work);
   KalmanUpdate& update = f.update;
-  Stack(f, rows);
+  AssignColumns(f, rows);
   const bool recorded =
       std::ranges::any_of(rows, [](const Row* row) { return GainIsRecorded(*row); });
   const Solution solution = update.Solve(stacked_, recorded);

@@ -16,15 +16,15 @@ class Linear : public Method {
   Trouble Step(FilterState& f, double dt_s) override;
   void BeginUpdate(FilterState& f, int capacity) override;
   Outcome Predict(FilterState& f, Row& row) override;
-  double ComputeS(FilterState& f, Row& row) override;
+  double ComputeNis(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override {
     return CorrectBy(f, rows, nullptr);
   }
 
   /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
   Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
-  /// Puts the rows one after the other in the update: others that passed the gate may be left out.
-  void Stack(FilterState& f, std::span<Row* const> rows);
+  /// Gives the rows columns that follow one another: some that passed the gate may be left out.
+  void AssignColumns(FilterState& f, std::span<Row* const> rows);
 
  private:
   /// Of considered rows of P: K, and E = (K - K*) L, K* = P H' S^-1 and S = L L'.

@@ -27,10 +27,11 @@ class Method {
   /// h, the innovation, R and what else the others need of a row by itself; kAccepted, or why they
   /// cannot be had, which it notes.
   virtual Outcome Predict(FilterState& f, Row& row) = 0;
-  /// S of a row that Predict left, in its report. Returns its NIS: not a number unless S is finite
-  /// and positive definite. Those before it that are part of the update take row.column columns.
-  virtual double ComputeS(FilterState& f, Row& row) = 0;
-  /// One update with all rows, in the order in which ComputeS had them, R and S weighed since: all
+  /// Computes S of a row that Predict accepted, in its report. Returns its NIS, which is not a
+  /// number unless S is finite and positive definite. The rows before it that are part of the
+  /// update have the columns before row.linearised.column.
+  virtual double ComputeNis(FilterState& f, Row& row) = 0;
+  /// One update with all rows, in the order in which ComputeNis had them, R and S weighed since: all
   /// of it happens, or nothing. kAccepted, and the gain is in the reports by RecordGain; or why
   /// not, which it notes but for kNotPd and kNotFinite. A row that is the reason may have an
   /// outcome of its own, in its report.

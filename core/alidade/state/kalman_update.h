@@ -9,17 +9,24 @@
 
 namespace alidade::internal {
 
-/// One update of a covariance by the kernels for its size, in memory that is kept from one update
-/// to the next: Begin, Gate of each measurement, Solve with those that passed, Downdate. See Update
-/// for the equations.
+/// The equations of a Kalman update of n states by m rows, in memory that is kept from one update
+/// to the next:
+///
+///   Begin        room for P H'
+///   ComputeNis   of each measurement i:  P H_i',  S_i = H_i P H_i' + R_i,  r_i' S_i^-1 r_i
+///   Solve        of those that passed, stacked:
+///                S = H P H' + R = L D L',  W = P H' L^-T,  dx = W D^-1 L^-1 r,  K = W D^-1 L^-1
+///   Downdate     P' = P - W D^-1 W'
+///
+/// The kernels for the size of P have the loops (kernels.h).
 class KalmanUpdate {
  public:
-  /// Starts an update of P by at most `capacity` rows; P has to stay where it is.
+  /// Starts an update of P by at most `capacity` rows; P has to stay in its memory.
   void Begin(Covariance& p, int capacity);
-  /// Makes P H' of a measurement, in its columns, and its S; returns its NIS, which is not a number
-  /// unless S is finite and positive definite.
-  double Gate(const MeasurementRows& one) {
-    return Kernels::For(kernels_->gate, one.h.rows)(update_, one);
+  /// Computes P H' of a measurement, in its columns, and its S. Returns its NIS, which is not a
+  /// number unless S is finite and positive definite.
+  double ComputeNis(const MeasurementRows& measurement) {
+    return Kernels::For(kernels_->nis, measurement.h.rows)(update_, measurement);
   }
   /// Moves P H' of a measurement to columns before those it has.
   void MoveColumns(int from, int to, int count);

@@ -199,7 +199,7 @@ struct Arithmetic {
     ProjectRows<kAtOnce>(u, rows, 0, most, at);
     if (kAtOnce > 1) ProjectRows<1>(u, rows, most, m, at);
   }
-  ALIDADE_KERNEL double Gate(const Update& u, const MeasurementRows& one) {
+  ALIDADE_KERNEL double ComputeNis(const Update& u, const MeasurementRows& one) {
     const int m = Rows(one.h.rows), width = one.h.width();
     const double* const h = one.h.data;
     const int* const columns = one.h.columns.data();
@@ -544,8 +544,8 @@ struct Arithmetic {
   template <class Column>                                                          \
   struct table {                                                                   \
     template <int M>                                                               \
-    target static double Gate(const Update& u, const MeasurementRows& one) {       \
-      return Arithmetic<Column, M>::Gate(u, one);                                  \
+    target static double ComputeNis(const Update& u, const MeasurementRows& one) { \
+      return Arithmetic<Column, M>::ComputeNis(u, one);                            \
     }                                                                              \
     template <int M>                                                               \
     target static Solution Solve(const Update& u) {                                \
@@ -560,7 +560,7 @@ struct Arithmetic {
     }                                                                              \
     static constexpr Kernels kTable{text,                                          \
                                     Column::kRows,                                 \
-                                    {Gate<1>, Gate<2>, Gate<0>},                   \
+                                    {ComputeNis<1>, ComputeNis<2>, ComputeNis<0>}, \
                                     {Solve<1>, Solve<2>, Solve<0>},                \
                                     {Downdate<1>, Downdate<2>, Downdate<0>},       \
                                     Propagate};                                    \

@@ -32,7 +32,7 @@ struct MeasurementRows {
   JacobianRows h;
   const double* innovation;  ///< m
   const double* noise;       ///< R, m x m
-  double* s;                 ///< m x m, of Kernels::gate: S = H P H' + R
+  double* s;                 ///< m x m, of Kernels::nis: S = H P H' + R
   int column = 0;            ///< its first one in the update
 };
 
@@ -95,8 +95,8 @@ struct Kernels {
   // Each of an array is compiled for 1 row, 2 rows and any number: see For().
   /// P H' of one measurement in the columns of w from `one.column` on, and its S. Returns the NIS,
   /// r' S^-1 r; not a number unless S is finite and positive definite. Writes over s, inverse_d, y.
-  double (*gate[3])(const Update& update, const MeasurementRows& one);
-  /// All of an update but P', of the P H' that gate made.
+  double (*nis[3])(const Update& update, const MeasurementRows& one);
+  /// All of an update but P', of the P H' that `nis` made.
   Solution (*solve[3])(const Update& update);
   /// P' in place of P.
   void (*downdate[3])(const Update& update);

@@ -148,7 +148,7 @@ TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
       int at = 0;
       for (const MeasurementRows& one : problem.measurements) {
         const int m = one.h.rows;
-        const double nis = Kernels::For(kernels.gate, m)(update, one);
+        const double nis = Kernels::For(kernels.nis, m)(update, one);
         const MatrixXd own = s.block(at, at, m, m);
         const VectorXd r = problem.r.middleRows(at, m);
         EXPECT_NEAR(nis, r.dot(own.llt().solve(r)), kKernelRounding * (1.0 + nis));
@@ -231,12 +231,12 @@ TEST(Kernels, WhatIsNotPositiveDefiniteOrNotFiniteIsFound) {
         KernelProblem problem(n, {m}, random);
         problem.ones[0].noise(m - 1, m - 1) = variance;
         const Update update = problem.Begin(kernels);
-        EXPECT_TRUE(std::isnan(Kernels::For(kernels.gate, m)(update, problem.measurements[0])));
+        EXPECT_TRUE(std::isnan(Kernels::For(kernels.nis, m)(update, problem.measurements[0])));
         EXPECT_EQ(Kernels::For(kernels.solve, m)(update), Solution::kNotPositiveDefinite);
       }
       KernelProblem problem(n, {m}, random);
       const Update update = problem.Begin(kernels);
-      Kernels::For(kernels.gate, m)(update, problem.measurements[0]);
+      Kernels::For(kernels.nis, m)(update, problem.measurements[0]);
       problem.r(0) = kInfinity;
       EXPECT_EQ(Kernels::For(kernels.solve, m)(update), Solution::kNotFinite);
     }
@@ -251,7 +251,7 @@ TEST(Kernels, AVarianceThatCancelsIsFound) {
     problem.ones[0].h = RowMajor::Ones(1, 1);
     problem.ones[0].noise(0, 0) = 1e-12 * problem.p(n - 1, n - 1);
     const Update update = problem.Begin(kernels);
-    Kernels::For(kernels.gate, 1)(update, problem.measurements[0]);
+    Kernels::For(kernels.nis, 1)(update, problem.measurements[0]);
     EXPECT_EQ(Kernels::For(kernels.solve, 1)(update), Solution::kCancels);
   });
 }

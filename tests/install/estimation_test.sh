@@ -71,4 +71,4 @@ awk '{ d = $4 - $9; if (d * d > 16 * $6 * $6 || $6 > 0.01 || $1 < 400) exit 1 }'
 without=(yaml-cpp Boost OpenSSL nlohmann_json spdlog CLI11 Ceres OpenCV GTest)
 "$cmake" -S . -B "$work/only" -DCMAKE_CXX_COMPILER="$compiler" -DALIDADE_ESTIMATION_ONLY=ON \
   $(printf -- '-DCMAKE_DISABLE_FIND_PACKAGE_%s=ON ' "${without[@]}") >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
-echo "the programs build and run on the component alone"
+echo "the programs build and run on the component alone, and it configures alone"

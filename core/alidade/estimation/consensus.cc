@@ -7,6 +7,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {

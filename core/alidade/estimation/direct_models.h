@@ -17,6 +17,17 @@
 
 /// Models of a program itself: the structs of authors (alidade/model/model.h) without a plugin.
 namespace alidade {
+
+/// A struct on the base Sensor, and on Motion (alidade/model/model.h).
+template <class Model>
+concept SensorStruct = requires {
+  Model::kInitialises;
+};
+template <class Model>
+concept MotionStruct = requires {
+  Model::kNoise;
+};
+
 namespace detail {
 
 /// The names and flags of a quantity that has this geometry; `parts`: of a product.

@@ -8,6 +8,7 @@
 namespace alidade {
 
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(std::move(system), options, streams, std::make_unique<internal::Linear>()) {}
+    : Filter(CheckedProblem(std::move(system), "Ekf", kSupport), options, streams,
+             std::make_unique<internal::Linear>()) {}
 
 }  // namespace alidade

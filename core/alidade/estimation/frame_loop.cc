@@ -20,42 +20,31 @@ Event StaleEvent(const Frame& frame, Timestamp state) {
 }
 
 /// The options. Error kBadConfig if one is out of its range.
-const EkfOptions& Checked(const EkfOptions& options) {
-  const auto expect = [](bool holds, const char* option, double value, const char* range) {
-    if (holds) return;
-    throw Error(ExitCode::kBadConfig, std::string("EkfOptions::") + option + " is " +
-                                          RoundedText(value, 6) + "; expected " + range);
-  };
-  expect(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
-         "a probability in (0, 1], 1: no gate");
-  expect(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "seconds > 0");
-  expect(options.rejection_recovery_after >= 1, "rejection_recovery_after",
-         options.rejection_recovery_after, "at least 1");
-  expect(options.max_covariance_repairs >= 0, "max_covariance_repairs",
-         options.max_covariance_repairs, "at least 0");
+const EkfOptions& CheckedOptions(const EkfOptions& options) {
+  ExpectOption(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
+               "a probability in (0, 1], 1: no gate");
+  ExpectOption(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "seconds > 0");
+  ExpectOption(options.rejection_recovery_after >= 1, "rejection_recovery_after",
+               options.rejection_recovery_after, "at least 1");
+  ExpectOption(options.max_covariance_repairs >= 0, "max_covariance_repairs",
+               options.max_covariance_repairs, "at least 0");
   return options;
-}
-
-/// The system. Error kBadConfig if a block of it cannot start as it says.
-System Checked(System system) {
-  if (const auto defect = FindInitialDefect(system)) {
-    throw Error(ExitCode::kBadConfig,
-                "block '" + system.layout[defect->block].name +
-                    "' cannot start from a measurement: " + defect->what + "; expected " +
-                    defect->remedy +
-                    (defect->nearest.empty() ? "" : "; did you mean '" + defect->nearest + "'?"));
-  }
-  return system;
 }
 
 }  // namespace
 
+void ExpectOption(bool holds, const char* option, double value, const char* expected) {
+  if (holds) return;
+  throw Error(ExitCode::kBadConfig, std::string("option ") + option + " is " +
+                                        RoundedText(value, 6) + "; expected " + expected);
+}
+
 FrameLoop::FrameLoop(System system, const EkfOptions& options,
                      const std::vector<StreamInfo>& streams, std::unique_ptr<Method> equations)
-    : f(std::make_shared<const Binding>(Checked(std::move(system)), streams),
+    : f(std::make_shared<const Binding>(std::move(system), streams),
         options.jacobian == JacobianPolicy::kFirstEstimate),
       method(std::move(equations)),
-      options_(Checked(options)),
+      options_(CheckedOptions(options)),
       time_(f.binding->system, streams, options.max_dt_s),
       gate_(f.binding->system, options),
       consensus_(f.binding->system),
@@ -203,7 +192,7 @@ void FrameLoop::PredictAndGate(std::vector<Row*>& group) {
     Outcome& outcome = row->report->outcome;
     if (outcome != Outcome::kAccepted) continue;
     row->linearised.column = columns;
-    outcome = gate_.Test(f, *row, method->ComputeS(f, *row));
+    outcome = gate_.Test(f, *row, method->ComputeNis(f, *row));
     if (outcome != Outcome::kAccepted) continue;
     *passed++ = row;
     columns += row->report->dof;
@@ -260,7 +249,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
   const int m = row.report->dof;
   method->BeginUpdate(f, m);
   row.linearised.column = 0;
-  const Outcome outcome = gate_.Test(f, row, method->ComputeS(f, row));
+  const Outcome outcome = gate_.Test(f, row, method->ComputeNis(f, row));
   // Gated: h at the estimate lies far from its mean.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   return Prediction{{row.report->h.begin(), row.report->h.end()},

@@ -19,6 +19,9 @@
 
 namespace alidade::internal {
 
+/// Refuses an option of a filter that is out of its range. Error kBadConfig, if not `holds`.
+void ExpectOption(bool holds, const char* option, double value, const char* expected);
+
 /// What a filter is made of, and what a frame goes through there:
 ///
 ///   step         StepTo             Timeline::First, Method::Step
@@ -26,7 +29,7 @@ namespace alidade::internal {
 ///   initialise                      InitialiseWaiting, LandmarkMap::Attach
 ///   group        UpdateInGroups     Update of each group by itself, as `fuse` has them:
 ///   predict      PredictAndGate     Method::Predict of each row
-///   gate                            Method::ComputeS, Gate::Test of each row; Consensus::Split
+///   gate                            Method::ComputeNis, Gate::Test of each row; Consensus::Split
 ///   correct      Correct            Gate::ApplyRobustWeights, Method::Correct
 ///   recover                         Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                       LandmarkMap::Maintain

@@ -8,8 +8,10 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/estimation/frame_loop.h"
 #include "alidade/estimation/linear.h"
 #include "alidade/estimation/method.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -32,7 +34,7 @@ class Iterated : public Method {
   Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
   void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeS(FilterState& f, Row& row) override { return linear_.ComputeS(f, row); }
+  double ComputeNis(FilterState& f, Row& row) override { return linear_.ComputeNis(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
@@ -91,7 +93,7 @@ Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
 /// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
 std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Row* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
-  linear_.Stack(f, rows);
+  linear_.AssignColumns(f, rows);
   Minimum minimum{f.work.Take(n)};
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
@@ -201,7 +203,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       PlusJacobian(geometry, at[i], dx + offset, j.data());
       ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
     }
-    linear_.ComputeS(f, *row);
+    linear_.ComputeNis(f, *row);
   }
   return true;
 }
@@ -210,11 +212,13 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
 }  // namespace internal
 
 Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(std::move(system), options, streams,
+    : Filter(CheckedProblem(std::move(system), "Iekf", kSupport), options, streams,
              std::make_unique<internal::Iterated>(options.max_iterations, options.tolerance)) {
-  ALIDADE_EXPECTS(options.jacobian == JacobianPolicy::kLatest);
-  ALIDADE_EXPECTS(options.max_iterations > 1 && options.tolerance > 0.0);
-  CheckSupported("Iekf", this->system(), kSupport);
+  internal::ExpectOption(options.jacobian == JacobianPolicy::kLatest, "jacobian",
+                         static_cast<double>(options.jacobian), "JacobianPolicy::kLatest");
+  internal::ExpectOption(options.max_iterations > 1, "max_iterations", options.max_iterations,
+                         "at least 2");
+  internal::ExpectOption(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0");
 }
 
 }  // namespace alidade

@@ -36,8 +36,8 @@ class Iekf : public Filter {
   static constexpr Support kSupport = {
       .from_measurement = true, .recovery = true, .landmarks = true};
 
-  /// Errors: kBadConfig if `system` asks for more than kSupport. ContractViolation if `jacobian` is
-  /// not kLatest or an option is out of its range.
+  /// Errors: kBadConfig if `system` asks for more than kSupport, `jacobian` is not kLatest or an
+  /// option is out of its range.
   Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
   explicit Iekf(const System& problem, const IekfOptions& options = {})
       : Iekf(problem, options, problem.streams) {}

@@ -223,11 +223,9 @@ void LandmarkMap::Count(FilterState& f, std::span<Row> rows) {
     if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
     landmark.seen = frame_;
     landmark.last = f.timestamp;
-    due_ = std::min(due_, DueOf(landmark));
     if (!row.on_landmark()) continue;
     ++landmark.tried;
     landmark.accepted += IsUsed(row);
-    any_fails_ |= Fails(landmark);
   }
 }
 
@@ -266,17 +264,10 @@ bool LandmarkMap::IsNegative(FilterState& f, LandmarkRecord& landmark) {
   return negative;
 }
 
-/// Drops what was not seen for long, or fails too often. Known landmarks stay.
+/// Deletes landmarks that were not seen for long, or fail too often. Known landmarks stay.
 void LandmarkMap::Prune(FilterState& f) {
-  if (frame_ < due_ && !any_fails_) return;
-  due_ = std::numeric_limits<std::int64_t>::max();
-  any_fails_ = false;
   DeleteIf(f, [&](const LandmarkRecord& landmark) {
-    if (landmark.known) return false;
-    const std::int64_t due = DueOf(landmark);
-    if (frame_ >= due || Fails(landmark)) return true;
-    due_ = std::min(due_, due);
-    return false;
+    return !landmark.known && (frame_ >= DueOf(landmark) || Fails(landmark));
   });
 }
 
@@ -489,7 +480,6 @@ Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, Row& row,
   }
   f.state.Initialise(fresh, values.data(), inverse.from, by_x, own);
   landmark.representation = family.representation;
-  due_ = std::min(due_, DueOf(landmark));
   f.motions.EndInterval();
   return Outcome::kInitialised;
 }

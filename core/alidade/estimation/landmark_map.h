@@ -104,8 +104,6 @@ class LandmarkMap {
   std::vector<int> users_;        ///< by block, where it is shared: landmarks on it
   std::int64_t frame_ = 0;        ///< frames with a measurement of a landmark
   std::int64_t names_ = 0;        ///< blocks named so far
-  std::int64_t due_ = 0;          ///< no landmark is lost before this frame
-  bool any_fails_ = false;        ///< may be
   Generations generations_;
   LandmarkOptions::Prior prior_;  ///< of what is initialised in this frame
 

@@ -10,19 +10,6 @@
 #include "alidade/state/dense_algebra.h"
 
 namespace alidade::internal {
-namespace {
-
-/// Calls take(row, at) for each row, `at` of the update's m where it begins.
-template <class Take>
-void ForEachPlace(std::span<Row* const> rows, const Take& take) {
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    take(*row, at);
-    at += row->report->dof;
-  }
-}
-
-}  // namespace
 
 [[gnu::noinline]] void Row::Bind(const SensorPlace& to) {
   place = &to;
@@ -129,50 +116,12 @@ Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding&
   return row;
 }
 
-void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles) {
-  for (std::size_t i = 0, count = place.values.size(); i < count; ++i) {
-    const int at = place.values[i];
-    roles[i] = at < 0 ? nullptr : (place.known[i] != 0 ? known_roles : x) + at;
-  }
-}
-
-Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
-                   const Measurement& measurement, const double* const* roles,
-                   const EvaluationOutput& to) {
-  std::array<double*, kMaxRoles> jacobians;
-  SensorModel::Output output{to.h, nullptr, nullptr, to.l};
-  if (to.jacobian != nullptr) {
-    for (std::size_t i = 0, count = place.columns.size(); i < count; ++i) {
-      jacobians[i] = place.columns[i] < 0 ? nullptr : to.jacobian + place.columns[i];
-    }
-    output.jacobians = jacobians.data();
-    output.strides = place.strides.data();
-  }
-  return OutcomeOf(
-      model.Evaluate({measurement.values.data(), measurement.known.data()}, roles, output));
-}
-
-Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
-                const double* const* roles, double* l, double* r) {
-  if (!measurement.covariance.empty()) {
-    std::ranges::copy(measurement.covariance, r);
-    return Outcome::kAccepted;
-  }
-  const Outcome outcome = EvaluateAt(model, place, measurement, roles, {.l = l});
-  Square(l, place.dof, r);
-  return outcome;
-}
-
 Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h) {
   return EvaluateAt(*row.model, *row.place, *row.measurement, RolesAt(f, row, x), {.h = h});
 }
 
 Outcome NoiseAt(Row& row, const double* const* roles) {
   return NoiseAt(*row.model, *row.place, *row.measurement, roles, row.root, row.R.data());
-}
-
-double ComputeNis(const Row& row, Workspace& work) {
-  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, work);
 }
 
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work) {
@@ -203,55 +152,6 @@ void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& w
   Workspace::Matrix chained = work.Take(m, size);
   chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
   own = chained;
-}
-
-void RecordGain(const FilterState& f, std::span<Row* const> rows, const ConstMatrix& gain) {
-  RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
-    for (int j = column; j < column + count; ++j) {
-      for (const int i : kept) *to++ = gain(i, j);
-    }
-  });
-}
-
-int TotalDof(std::span<Row* const> rows) {
-  int m = 0;
-  for (const Row* row : rows) m += row->report->dof;
-  return m;
-}
-
-Stacked Stack(FilterState& f, std::span<Row* const> rows) {
-  return {JacobianOf(f, rows), NoiseOf(f, rows), InnovationOf(f, rows)};
-}
-
-Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Matrix h = f.work.Take(TotalDof(rows), f.size());
-  h.setZero();
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    const JacobianRows& own = row.linearised.h;
-    const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.width());
-    for (int c = 0; c < own.width(); ++c) {
-      h.col(own.columns[static_cast<std::size_t>(c)]).segment(at, own.rows) += compact.col(c);
-    }
-  });
-  return h;
-}
-
-Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Matrix noise = f.work.Take(TotalDof(rows), TotalDof(rows));
-  noise.setZero();
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    const Eigen::Index k = row.report->dof;
-    noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row.R.data(), k, k);
-  });
-  return noise;
-}
-
-Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
-  Workspace::Vector innovation = f.work.Take(TotalDof(rows));
-  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
-    std::ranges::copy(row.report->innovation, innovation.data() + at);
-  });
-  return innovation;
 }
 
 [[gnu::noinline]] void NotePluginFailure(FilterState& f, const Row& row) {

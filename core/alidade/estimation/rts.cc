@@ -4,6 +4,7 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/frame_loop.h"
 #include "alidade/estimation/linear.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/dense_algebra.h"
 
 namespace alidade {
@@ -35,7 +36,7 @@ class Taped : public Method {
   Trouble Step(FilterState& f, double dt_s) override;
   void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeS(FilterState& f, Row& row) override { return linear_.ComputeS(f, row); }
+  double ComputeNis(FilterState& f, Row& row) override { return linear_.ComputeNis(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
   /// From here on is another frame.
@@ -109,9 +110,8 @@ RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          std::unique_ptr<internal::Taped> tape)
     : tape_(tape.get()),
       loop_(std::make_unique<internal::FrameLoop>(
-          std::move(system), internal::WithoutRecovery(options), streams, std::move(tape))) {
-  CheckSupported("RtsSmoother", loop_->f.binding->system, kSupport);
-}
+          CheckedProblem(std::move(system), "RtsSmoother", kSupport),
+          internal::WithoutRecovery(options), streams, std::move(tape))) {}
 
 RtsSmoother::~RtsSmoother() = default;
 

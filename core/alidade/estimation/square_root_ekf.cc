@@ -7,6 +7,7 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/frame_loop.h"
 #include "alidade/estimation/linear.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/dense_algebra.h"
 #include "alidade/state/tiles.h"
 
@@ -47,7 +48,7 @@ class SquareRoot : public Method {
   void Begin(FilterState& f) override;
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeS(FilterState& f, Row& row) override;
+  double ComputeNis(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
   const Eigen::MatrixXd* Root() const override { return &root_; }
@@ -107,7 +108,7 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
 }
 
 /// S = (H L) (H L)' + R, which rounding does not turn negative.
-double SquareRoot::ComputeS(FilterState& f, Row& row) {
+double SquareRoot::ComputeNis(FilterState& f, Row& row) {
   const Workspace::Use use(f.work);
   Row* const one[] = {&row};
   const Stacked all = Stack(f, one);
@@ -118,7 +119,7 @@ double SquareRoot::ComputeS(FilterState& f, Row& row) {
   s = all.noise;
   AddProductWithTransposed(s, hl, hl);
   row.report->s = {row.s, row.R.size()};
-  return ComputeNis(row, f.work);
+  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, f.work);
 }
 
 Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
@@ -163,10 +164,9 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
 
 SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
-    : Filter(std::move(system), internal::WithoutRecovery(options), streams,
-             std::make_unique<internal::SquareRoot>()) {
-  CheckSupported("SquareRootEkf", this->system(), kSupport);
-}
+    : Filter(CheckedProblem(std::move(system), "SquareRootEkf", kSupport),
+             internal::WithoutRecovery(options), streams,
+             std::make_unique<internal::SquareRoot>()) {}
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
   const Eigen::MatrixXd* const root = loop().method->Root();

@@ -1,38 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimation/support.h"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "alidade/base/error.h"
+#include "alidade/base/words.h"
 
 namespace alidade {
 namespace {
 
-std::optional<Unsupported> OfBlocks(const System& system, const Support& support) {
+std::optional<ProblemDefect> OfBlocks(const System& system, const Support& support) {
   const std::vector<Block>& blocks = system.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (blocks[b].status != BlockStatus::kConsider || support.consider) continue;
-    return Unsupported{"consider blocks", "the block estimated or constant",
-                       static_cast<BlockId>(b)};
+    return ProblemDefect{"consider blocks", "the block estimated or constant",
+                         static_cast<BlockId>(b)};
   }
   for (const Prior& prior : system.priors) {
     if (prior.from.empty() || support.from_measurement) continue;
-    return Unsupported{"blocks that start from a measurement", "mean and sigma", prior.block};
+    return ProblemDefect{"blocks that start from a measurement", "mean and sigma", prior.block};
   }
   if (system.landmarks && !support.landmarks) {
-    return Unsupported{"landmarks", "`sensors` that measure none"};
+    return ProblemDefect{"landmarks", "`sensors` that measure none"};
   }
   return std::nullopt;
 }
 
-std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& support) {
+std::optional<ProblemDefect> OfRole(const RoleBinding& role, const Support& support) {
   if (role.mode == RoleMode::kConsider && !support.consider) {
-    return Unsupported{"consider roles", support.known ? "estimate or known" : "estimate"};
+    return ProblemDefect{"consider roles", support.known ? "estimate or known" : "estimate"};
   }
   if (role.mode == RoleMode::kKnown && !support.known)
-    return Unsupported{"known roles", "estimate"};
+    return ProblemDefect{"known roles", "estimate"};
   if (role.jacobian_at == JacobianAt::kMeasurement && !support.at_measurement) {
-    return Unsupported{"jacobian_at: measurement", "prediction"};
+    return ProblemDefect{"jacobian_at: measurement", "prediction"};
   }
   return std::nullopt;
+}
+
+/// The sensor that a block starts from; null if there is none of that name.
+const SensorBinding* SensorOf(const System& system, const Prior& prior) {
+  const int index = system.FindSensor(prior.from);
+  return index < 0 ? nullptr : &system.sensors[static_cast<std::size_t>(index)];
+}
+
+/// Why a block cannot start from the sensor that its prior names.
+std::optional<ProblemDefect> OfStart(const System& system, const Prior& prior) {
+  const SensorBinding* const sensor = SensorOf(system, prior);
+  if (sensor == nullptr) {
+    ProblemDefect defect{"no sensor '" + prior.from + "' here", "a sensor of this estimator",
+                         prior.block};
+    defect.nearest = Nearest(prior.from, internal::NamesOf(system.sensors));
+    return defect;
+  }
+  const int role = sensor->model->inverse().role;
+  if (role >= 0 && sensor->roles[static_cast<std::size_t>(role)].block == prior.block) return {};
+  return ProblemDefect{"sensor '" + prior.from + "' does not determine this block",
+                       "a sensor whose inverse measurement model is this block", prior.block};
+}
+
+/// The first cycle among the blocks that `chain` leads to; each needs the next one to start. All
+/// sensors that blocks start from are there.
+std::optional<ProblemDefect> FindCycle(const System& system, std::vector<BlockId>& chain) {
+  const BlockId last = chain.back();
+  if (std::ranges::find(chain, last) != chain.end() - 1) {
+    std::vector<std::string> names;
+    for (const BlockId block : chain) names.push_back(system.layout[block].name);
+    return ProblemDefect{"cyclic: " + internal::Join(names, " <- "),
+                         "one block of the cycle with a mean of its own", last};
+  }
+  const auto prior = std::ranges::find(system.priors, last, &Prior::block);
+  if (prior == system.priors.end() || prior->from.empty()) return {};
+  for (const RoleBinding& role : SensorOf(system, *prior)->roles) {
+    if (role.block < 0 || role.block == last) continue;
+    chain.push_back(role.block);
+    if (auto cycle = FindCycle(system, chain)) return cycle;
+    chain.pop_back();
+  }
+  return {};
+}
+
+/// `consider blocks (block 'target.depth')`
+std::string Describe(const ProblemDefect& defect, const System& system) {
+  std::string text = defect.what;
+  if (defect.block >= 0) text += " (block '" + system.layout[defect.block].name + "')";
+  if (defect.sensor >= 0) {
+    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(defect.sensor)];
+    text += " (sensor '" + sensor.name + "', role '" +
+            sensor.model->roles()[static_cast<std::size_t>(defect.role)].name + "')";
+  }
+  text += "; expected " + defect.remedy;
+  return defect.nearest.empty() ? text : text + "; did you mean '" + defect.nearest + "'?";
 }
 
 }  // namespace
@@ -42,7 +102,30 @@ const char* ToString(EstimatorKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-std::optional<Unsupported> FindUnsupported(const System& system, const Support& support) {
+std::optional<ProblemDefect> FindDefect(const System& system) {
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty()) continue;
+    if (auto defect = OfStart(system, prior)) return defect;
+  }
+  for (const Prior& prior : system.priors) {
+    std::vector<BlockId> chain{prior.block};
+    if (auto cycle = FindCycle(system, chain)) return cycle;
+  }
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const SensorBinding& sensor = system.sensors[s];
+    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
+      const bool inverted = sensor.model->inverse().role == static_cast<int>(r);
+      if (sensor.roles[r].jacobian_at != JacobianAt::kMeasurement || inverted) continue;
+      return ProblemDefect{"jacobian_at: measurement of role '" + sensor.model->roles()[r].name +
+                               "', of which model '" + sensor.model->name() +
+                               "' has no inverse measurement model",
+                           "prediction", -1, static_cast<int>(s), static_cast<int>(r)};
+    }
+  }
+  return {};
+}
+
+std::optional<ProblemDefect> FindUnsupported(const System& system, const Support& support) {
   if (auto found = OfBlocks(system, support)) return found;
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
     const SensorBinding& sensor = system.sensors[s];
@@ -57,18 +140,16 @@ std::optional<Unsupported> FindUnsupported(const System& system, const Support& 
   return std::nullopt;
 }
 
-void CheckSupported(const char* estimator, const System& system, const Support& support) {
-  const auto asked = FindUnsupported(system, support);
-  if (!asked) return;
-  std::string where;
-  if (asked->block >= 0) where = " (block '" + system.layout[asked->block].name + "')";
-  if (asked->sensor >= 0) {
-    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked->sensor)];
-    where = " (sensor '" + sensor.name + "', role '" +
-            sensor.model->roles()[static_cast<std::size_t>(asked->role)].name + "')";
+System CheckedProblem(System system, const char* estimator, const Support& support) {
+  const std::string name = estimator;
+  if (const auto defect = FindUnsupported(system, support)) {
+    throw Error(ExitCode::kBadConfig,
+                name + " does not support " + Describe(*defect, system) + ", or an Ekf");
   }
-  throw Error(ExitCode::kBadConfig, std::string(estimator) + " does not support " + asked->what +
-                                        where + "; expected " + asked->remedy + ", or an Ekf");
+  if (const auto defect = FindDefect(system)) {
+    throw Error(ExitCode::kBadConfig, name + ": " + Describe(*defect, system));
+  }
+  return system;
 }
 
 }  // namespace alidade

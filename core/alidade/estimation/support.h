@@ -29,20 +29,27 @@ struct Support {
   bool landmarks = false;         ///< that come and go
 };
 
-/// Something that a system asks for and an estimator cannot do: of a block, of a role of a sensor,
-/// or without either the landmarks.
-struct Unsupported {
+/// Why a problem cannot be solved: for a block, for a role of a sensor, or without either for its
+/// landmarks.
+struct ProblemDefect {
   std::string what;    ///< `consider blocks`
   std::string remedy;  ///< what to write in its place: `the block estimated or constant`
   BlockId block = -1;
-  int sensor = -1;  ///< index into System::sensors
-  int role = -1;    ///< index into its roles
+  int sensor = -1;           ///< index into System::sensors
+  int role = -1;             ///< index into its roles
+  std::string nearest = {};  ///< the name that may be meant, or ""
 };
 
-/// The first thing that `system` asks for beyond `support`, blocks before sensors; nothing where
-/// all can be done. Recovery is an option of the estimator, and not looked at.
-std::optional<Unsupported> FindUnsupported(const System& system, const Support& support);
-/// Error kBadConfig, by name and with the remedy, if there is such a thing. `estimator`: `Ukf`.
-void CheckSupported(const char* estimator, const System& system, const Support& support);
+/// The first defect that no estimator can do anything about, blocks before sensors: a block that
+/// starts from the measurement of a sensor that is not there or does not determine it, a cycle of
+/// blocks that start from one another, a role without an inverse measurement model that is
+/// linearised at its measurement. Nothing if there is none.
+std::optional<ProblemDefect> FindDefect(const System& system);
+/// The first thing that `system` asks for beyond `support`, blocks before sensors; nothing if all
+/// can be done. Recovery is an option of the estimator, and not looked at.
+std::optional<ProblemDefect> FindUnsupported(const System& system, const Support& support);
+/// The system. Error kBadConfig, by name and with the remedy, if it has a defect of either kind.
+/// `estimator`: `Ukf`.
+System CheckedProblem(System system, const char* estimator, const Support& support);
 
 }  // namespace alidade

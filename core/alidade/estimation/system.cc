@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
@@ -204,50 +203,6 @@ int System::FindSensor(std::string_view name) const {
   const auto found = std::find_if(sensors.begin(), sensors.end(),
                                   [name](const SensorBinding& s) { return s.name == name; });
   return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
-}
-
-std::optional<InitialDefect> FindInitialDefect(const System& system) {
-  const auto sensor_of = [&](const Prior& prior) -> const SensorBinding& {
-    return system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
-  };
-  for (const Prior& prior : system.priors) {
-    if (prior.from.empty()) continue;
-    if (system.FindSensor(prior.from) < 0) {
-      return InitialDefect{prior.block, "no sensor '" + prior.from + "' here",
-                           "a sensor of this estimator",
-                           Nearest(prior.from, NamesOf(system.sensors))};
-    }
-    const SensorBinding& sensor = sensor_of(prior);
-    const int role = sensor.model->inverse().role;
-    if (role < 0 || sensor.roles[static_cast<std::size_t>(role)].block != prior.block) {
-      return InitialDefect{prior.block,
-                           "sensor '" + prior.from + "' does not determine this block",
-                           "a sensor whose inverse measurement model is this block",
-                           {}};
-    }
-  }
-  std::vector<BlockId> chain;  // each needs the next one
-  std::optional<InitialDefect> defect;
-  const std::function<void(BlockId)> follow = [&](BlockId id) {
-    const auto prior = std::ranges::find(system.priors, id, &Prior::block);
-    if (defect || prior == system.priors.end() || prior->from.empty()) return;
-    if (std::ranges::find(chain, id) != chain.end()) {
-      std::string text;
-      for (const BlockId one : chain) text += system.layout[one].name + " <- ";
-      defect = {id,
-                "cyclic: " + text + system.layout[id].name,
-                "one block of the cycle with a mean of its own",
-                {}};
-      return;
-    }
-    chain.push_back(id);
-    for (const RoleBinding& role : sensor_of(*prior).roles) {
-      if (role.block >= 0 && role.block != id) follow(role.block);
-    }
-    chain.pop_back();
-  };
-  for (const Prior& prior : system.priors) follow(prior.block);
-  return defect;
 }
 
 BlockId internal::PositionBlockOf(const System& system) {

@@ -133,8 +133,7 @@ struct System {
   StateHandle AddState(const std::string& name, SharedMotion model,
                        const std::vector<InitialValue>& initial,
                        double input_timeout_s = std::numeric_limits<double>::infinity());
-  template <class Model>
-  requires requires { Model::kNoise; }
+  template <MotionStruct Model>
   StateHandle AddState(const std::string& name, Model model,
                        const std::vector<InitialValue>& initial,
                        double input_timeout_s = std::numeric_limits<double>::infinity()) {
@@ -144,8 +143,7 @@ struct System {
   /// measurement names. Roles at the end that are optional may be left out.
   SensorHandle AddSensor(const std::string& name, SharedSensor model,
                          std::vector<RoleBinding> roles, const SensorOptions& options = {});
-  template <class Model>
-  requires requires { Model::kInitialises; }
+  template <SensorStruct Model>
   SensorHandle AddSensor(const std::string& name, Model model, std::vector<RoleBinding> roles,
                          const SensorOptions& options = {}) {
     return AddSensor(name, MakeSensor(std::move(model), name), std::move(roles), options);
@@ -165,16 +163,6 @@ struct System {
   std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there if a sensor measures landmarks
 };
-
-/// Why a block cannot start from the measurement that its prior names, and what to do.
-struct InitialDefect {
-  BlockId block = -1;
-  std::string what, remedy;
-  std::string nearest;  ///< the name that may be meant, or ""
-};
-/// The first of them: there is no such sensor, it does not determine the block, or it needs a block
-/// that itself waits for this one. Nothing where all can start.
-std::optional<InitialDefect> FindInitialDefect(const System& system);
 
 namespace internal {
 

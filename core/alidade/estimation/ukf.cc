@@ -9,7 +9,9 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/estimation/frame_loop.h"
 #include "alidade/estimation/method.h"
+#include "alidade/estimation/stacked_rows.h"
 #include "alidade/state/dense_algebra.h"
 #include "alidade/state/tiles.h"
 
@@ -77,7 +79,7 @@ class Unscented : public Method {
   }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override;
-  double ComputeS(FilterState& f, Row& row) override;
+  double ComputeNis(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
@@ -352,14 +354,14 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
 }
 
 /// S = Cov(h) + R.
-double Unscented::ComputeS(FilterState& f, Row& row) {
+double Unscented::ComputeNis(FilterState& f, Row& row) {
   Predicted& predicted = PredictedOf(f, row);
   const Eigen::Index m = row.report->dof;
   Workspace::Matrix s(row.s, m, m);
   MomentsOf(TransformOf(RootOf(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
   s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
   row.report->s = {row.s, row.R.size()};
-  return ComputeNis(row, f.work);
+  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, f.work);
 }
 
 /// All rows at one spread, also those that the gate saw at a wider one: f in place of H, R,
@@ -441,11 +443,13 @@ Unscented::Predicted& Unscented::PredictedOf(const FilterState& f, const Row& ro
 }  // namespace internal
 
 Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(std::move(system), internal::WithoutRecovery(options.filter), streams,
+    : Filter(CheckedProblem(std::move(system), "Ukf", kSupport),
+             internal::WithoutRecovery(options.filter), streams,
              std::make_unique<internal::Unscented>(options)) {
-  CheckSupported("Ukf", this->system(), kSupport);
-  ALIDADE_EXPECTS(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0 &&
-                  options.beta >= 0.0 && options.kappa >= 0.0);
+  internal::ExpectOption(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0, "alpha",
+                         options.alpha, "UkfOptions::kLeastAlpha to 1");
+  internal::ExpectOption(options.beta >= 0.0, "beta", options.beta, "at least 0");
+  internal::ExpectOption(options.kappa >= 0.0, "kappa", options.kappa, "at least 0");
 }
 
 }  // namespace alidade

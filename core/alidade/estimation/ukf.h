@@ -49,8 +49,7 @@ class Ukf : public Filter {
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// Errors: kBadConfig if `system` asks for more than kSupport. ContractViolation if an option is
-  /// out of its range.
+  /// Errors: kBadConfig if `system` asks for more than kSupport or an option is out of its range.
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit Ukf(const System& problem, const UkfOptions& options = {})
       : Ukf(problem, options, problem.streams) {}

@@ -8,6 +8,7 @@
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/experiment/calibration.h"
+#include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/estimator_types.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/plugin_host.h"
@@ -117,35 +118,6 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
   }
   if (!host.complete()) FailOffered(type, host.Complete(), node);
   FailOffered(type, host, node);
-}
-
-std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
-
-/// The item `block` of the list under `consider` of its state entry.
-Node ConsiderOf(const Node& state, const Block& block) {
-  const Node list = state.At("consider");
-  for (const Node& item : list.Items()) {
-    if (item.Text() == NameIn(block)) return item;
-  }
-  return list;
-}
-
-/// Where the config asks for what is not supported.
-Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
-  if (asked.block >= 0) {
-    const Block& block = system.layout[asked.block];
-    const auto entry = root.At("state").Find(block.owner);
-    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
-    if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
-    return state.At("initial").At(NameIn(block)).At("from_measurement");
-  }
-  if (asked.sensor < 0) return root.At("landmarks");
-  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
-  const Node roles = root.At("sensors").At(sensor.name).At("roles");
-  const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(asked.role)].name);
-  if (!role) return roles;  // one that a time offset adds
-  // A mode that cannot be done comes before jacobian_at.
-  return role->At(asked.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
 }
 
 /// Refuses by name what `system`, built from the config `root`, asks for beyond `support`.

@@ -2,6 +2,7 @@
 #include "alidade/experiment/estimator_run.h"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 
 #include "alidade/base/number_text.h"
@@ -10,23 +11,39 @@
 #include "alidade/experiment/run_log.h"
 
 namespace alidade::internal {
+namespace {
 
-Frame EstimatorRun::WithoutFailed(const Frame& frame,
-                                  const std::vector<StreamInfo>& streams) const {
-  const System& system = spec.system;
+/// The frame without the streams that only failed sensors read; `failed` by sensor.
+Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams,
+                    const System& system, const std::vector<char>& failed) {
   const auto goes_on = [&](const Measurement& m) {
     const std::string& stream = streams[static_cast<std::size_t>(m.stream)].name;
     bool read = false, works = false;
     for (std::size_t s = 0; s < system.sensors.size(); ++s) {
       if (system.sensors[s].stream != stream) continue;
       read = true;
-      works = works || failed_sensors[s] == 0;
+      works = works || failed[s] == 0;
     }
     return works || !read;  // a control input, say
   };
   Frame visible{frame.timestamp, {}};
   std::ranges::copy_if(frame.measurements, std::back_inserter(visible.measurements), goes_on);
   return visible;
+}
+
+}  // namespace
+
+EstimatorRun::AfterFrame EstimatorRun::Process(const Frame& frame,
+                                               const std::vector<StreamInfo>& streams,
+                                               const ProcessedFrame* rolled_back) const {
+  if (rolled_back != nullptr) return {*rolled_back->after, rolled_back->report, {}};
+  Frame visible;
+  const bool all = failed_sensors.empty();
+  if (!all) visible = WithoutFailed(frame, streams, spec.system, failed_sensors);
+  const auto started = std::chrono::steady_clock::now();
+  const UpdateReport& report = spec.estimator->Process(all ? frame : visible);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
+  return {*spec.estimator, report, took.count()};
 }
 
 std::string EstimatorRun::HandleFailures(const UpdateReport& report) {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/rollback.h"
 #include "alidade/experiment/metrics.h"
 #include "alidade/experiment/reference_metrics.h"
 #include "alidade/experiment/run.h"
@@ -26,6 +28,16 @@ struct EstimatorRun {
   std::int64_t stale_inputs = 0;              ///< events `input_stale`, those that are kept too
   std::vector<char> failed_sensors = {};      ///< under OnPluginFailure::kDisable; empty: none
 
+  /// The estimator after a frame.
+  struct AfterFrame {
+    const Estimator& estimator;
+    const UpdateReport& report;
+    std::optional<double> wall_s;  ///< that it took; none: it had processed the frame before
+  };
+  /// Has the estimator process the frame, without the streams that only failed sensors read, unless
+  /// it did so when the frame came: `rolled_back`, null if not.
+  AfterFrame Process(const Frame& frame, const std::vector<StreamInfo>& streams,
+                     const ProcessedFrame* rolled_back) const;
   /// Disables the sensors whose model failed in the frame of `report`. Returns why the run has to
   /// end, or "".
   std::string HandleFailures(const UpdateReport& report);
@@ -35,8 +47,6 @@ struct EstimatorRun {
   /// Adds the events to the result and the log; of an input that is missing again and again only
   /// the first, and their number to `stale_inputs`.
   void AddEvents(const std::vector<Event>& events);
-  /// The frame without the streams that only failed sensors read.
-  Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams) const;
 };
 
 /// All estimators of the experiment before their first frame.

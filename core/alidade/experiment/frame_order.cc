@@ -2,7 +2,6 @@
 #include "alidade/experiment/frame_order.h"
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <numeric>
 #include <tuple>
@@ -67,16 +66,9 @@ bool FrameOrder::Next(SourceFrame& frame) {
   return true;
 }
 
-FrameOrder::Processed FrameOrder::Process(std::size_t index, const Frame& visible) const {
-  if (index < snapshots_.size() && snapshots_[index]) {
-    const ProcessedFrame& processed = snapshots_[index]->released();
-    return {*processed.after, processed.report, {}};
-  }
-  Estimator& estimator = *experiment_.estimators[index].estimator;
-  const auto started = std::chrono::steady_clock::now();
-  const UpdateReport& report = estimator.Process(visible);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
-  return {estimator, report, took.count()};
+const ProcessedFrame* FrameOrder::processed(std::size_t estimator) const {
+  if (estimator >= snapshots_.size() || !snapshots_[estimator]) return nullptr;
+  return &snapshots_[estimator]->released();
 }
 
 /// Whether a frame of this timestamp, were it to come now, would come too late.

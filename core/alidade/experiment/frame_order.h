@@ -33,15 +33,9 @@ class FrameOrder {
   /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
   /// a stream, or another value of a truth, comes twice at one timestamp.
   bool Next(SourceFrame& frame);
-  /// An estimator after the frame that Next gave.
-  struct Processed {
-    const Estimator& after;
-    const UpdateReport& report;
-    std::optional<double> wall_s;  ///< that it took; none: it had processed the frame before
-  };
-  /// Has estimator `index` process `visible`, what it sees of the frame that Next gave. Under
-  /// kRollback it has already, as the frame came. Good until the next call of Process or Next.
-  Processed Process(std::size_t index, const Frame& visible) const;
+  /// The frame that Next gave as the estimator processed it when it came, under kRollback; else
+  /// null. Good until the next call of Next.
+  const ProcessedFrame* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
   /// `out_of_sequence` of each frame dropped since the last call.
   std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }

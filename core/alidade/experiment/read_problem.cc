@@ -11,6 +11,7 @@
 #include "alidade/config/tree.h"
 #include "alidade/estimation/owned_state.h"
 #include "alidade/estimation/time_offset.h"
+#include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
 #include "alidade/state/quaternion_sign.h"
 
@@ -347,14 +348,6 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     }
     if (const auto at = node.Find("jacobian_at")) {
       binding.jacobian_at = static_cast<JacobianAt>(at->Choice({"prediction", "measurement"}));
-      const int initialised = model.inverse().role;
-      if (binding.jacobian_at == JacobianAt::kMeasurement &&
-          (initialised < 0 ||
-           model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
-        at->Fail("model '" + model.name() + "' has no inverse measurement model of role '" +
-                     role.name + "'",
-                 "prediction");
-      }
     }
     node.RejectUnread();
   }
@@ -423,16 +416,6 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
   return binding;
 }
 
-/// Checks that every block that starts from a sensor can do so.
-void CheckInitialisation(const Node& root, const System& system) {
-  const auto defect = FindInitialDefect(system);
-  if (!defect) return;
-  const Block& block = system.layout[defect->block];
-  const std::string name = block.name.substr(block.owner.size() + 1);
-  const Node entry = root.At("state").At(block.owner).At("initial").At(name);
-  entry.At("from_measurement").Fail(defect->what, defect->remedy, defect->nearest);
-}
-
 /// The system without the state entries that no sensor touches.
 System WithoutUntouched(System system) {
   std::vector<std::string> touched;
@@ -499,7 +482,9 @@ System ReadProblem(const Node& root, const PluginHost& host, const std::vector<s
   if (!only.empty()) system = WithoutUntouched(std::move(system));
   const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
-  CheckInitialisation(root, system);
+  if (const auto defect = FindDefect(system)) {
+    internal::NodeOf(*defect, root, system).Fail(defect->what, defect->remedy, defect->nearest);
+  }
   return system;
 }
 

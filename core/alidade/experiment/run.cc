@@ -51,18 +51,14 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
   return events.empty() ? otherwise : events.back().text;
 }
 
-/// One frame through one estimator, which sees `visible` of it; false where the whole run has to
-/// end.
+/// One frame through one estimator, which sees `visible` of it, unless it was `rolled_back` to it;
+/// false if the whole run has to end.
 bool Advance(EstimatorRun& one, const FrameWithSegments& seen, const Frame& visible,
-             const internal::FrameOrder& frames, const Source& source, const RunOptions& options,
+             const ProcessedFrame* rolled_back, const Source& source, const RunOptions& options,
              RunResult& result) {
   one.last_report = nullptr;
   if (one.finished) return true;
-  Frame rest;
-  const bool all = one.failed_sensors.empty();
-  if (!all) rest = one.WithoutFailed(visible, source.streams());
-  const auto [after, report, wall_s] =
-      frames.Process(static_cast<std::size_t>(one.index), all ? visible : rest);
+  const auto [after, report, wall_s] = one.Process(visible, source.streams(), rolled_back);
   if (wall_s) {
     one.result.wall_s += *wall_s;
     std::ranges::transform(one.result.parts_s, report.spent_s, one.result.parts_s.begin(),

@@ -396,10 +396,10 @@ TEST(FilterOptions, OutOfTheirRangeAreNamed) {
     return false;
   };
   for (const double gate : {-1.0, 0.0, 2.0, std::nan("")}) {
-    EXPECT_TRUE(refused({.gate = gate}, "EkfOptions::gate is ")) << gate;
+    EXPECT_TRUE(refused({.gate = gate}, "option gate is ")) << gate;
   }
   for (const double dt_s : {0.0, -1.0, std::nan("")}) {
-    EXPECT_TRUE(refused({.max_dt_s = dt_s}, "EkfOptions::max_dt_s is ")) << dt_s;
+    EXPECT_TRUE(refused({.max_dt_s = dt_s}, "option max_dt_s is ")) << dt_s;
   }
   EXPECT_TRUE(refused({.rejection_recovery_after = 0}, "rejection_recovery_after is 0"));
   EXPECT_TRUE(refused({.max_covariance_repairs = -1}, "max_covariance_repairs is -1"));

@@ -418,7 +418,10 @@ TEST(Iekf, RefusesWhatItCannotDo) {
   EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), Error);
   IekfOptions first;
   first.jacobian = JacobianPolicy::kFirstEstimate;
-  EXPECT_THROW(Iekf(DepthFilter(), first, {}), ContractViolation);
+  EXPECT_THROW(Iekf(DepthFilter(), first, {}), Error);
+  IekfOptions once;
+  once.max_iterations = 1;
+  EXPECT_THROW(Iekf(DepthFilter(), once, {}), Error);
 }
 
 }  // namespace

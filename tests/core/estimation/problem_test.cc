@@ -137,12 +137,40 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
   };
   EXPECT_EQ(refusal("position", "stereo"), "nothing");
   EXPECT_EQ(refusal("position", "stero"),
-            "block 'target.position' cannot start from a measurement: no sensor 'stero' here; "
-            "expected a sensor of this estimator; did you mean 'stereo'?");
+            "Ekf: no sensor 'stero' here (block 'target.position'); expected a sensor of this "
+            "estimator; did you mean 'stereo'?");
   EXPECT_EQ(refusal("velocity", "stereo"),
-            "block 'target.velocity' cannot start from a measurement: sensor 'stereo' does not "
-            "determine this block; expected a sensor whose inverse measurement model is this "
-            "block");
+            "Ekf: sensor 'stereo' does not determine this block (block 'target.velocity'); "
+            "expected a sensor whose inverse measurement model is this block");
+}
+
+TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
+  System problem;
+  const auto start = InitialValue::FromMeasurement;
+  const auto a = problem.AddState("a", Constant<1>(1), {start("value", "a_by_b")});
+  const auto b = problem.AddState("b", Constant<1>(1), {start("value", "b_by_a")});
+  problem.AddSensor("a_by_b", Scale2d::FromPixels(300.0, 1.0), {b["value"], a["value"]});
+  problem.AddSensor("b_by_a", Scale2d::FromPixels(300.0, 1.0), {a["value"], b["value"]});
+  EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
+            "Ekf: cyclic: a.value <- b.value <- a.value (block 'a.value'); expected one block of "
+            "the cycle with a mean of its own");
+}
+
+TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {
+  System problem;
+  const auto target =
+      problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
+  const auto model = problem.AddState("template", Constant<1>(1), {{"value", 3.3, 0.5}});
+  const auto measured = [](BlockId block) {
+    return RoleBinding(block, RoleMode::kEstimate, JacobianAt::kMeasurement);
+  };
+  problem.AddSensor("scale", Scale2d::FromPixels(300.0, 1.0),
+                    {measured(target["position"]), model["value"]});
+  EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
+            "Ekf: jacobian_at: measurement of role 'depth', of which model 'scale' has no inverse "
+            "measurement model (sensor 'scale', role 'depth'); expected prediction");
+  problem.sensors[0].roles = {target["position"], measured(model["value"])};
+  EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }), "nothing");
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ TEST(Ukf, ASpreadThatLosesAllDigitsIsRefused) {
   const System system = NearZero(1.0);
   UkfOptions options;
   options.alpha = 1e-5;
-  EXPECT_THROW(Ukf(system, options, StreamsOf(system)), ContractViolation);
+  EXPECT_THROW(Ukf(system, options, StreamsOf(system)), Error);
 }
 
 TEST(Ukf, ASensorNotDefinedAtTheEstimateIsOutOfDomain) {

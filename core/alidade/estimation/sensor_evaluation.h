@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/estimation/binding.h"
+#include "alidade/estimation/estimator.h"
+
+/// A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point, a
+/// point of a batch. m: tangent size of the measurement.
+namespace alidade::internal {
+
+/// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
+/// Null: the role has no place.
+void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
+
+/// Destinations of an evaluation, row-major; null: not wanted.
+struct EvaluationOutput {
+  double* h = nullptr;         ///< ambient
+  double* jacobian = nullptr;  ///< H, m rows of the place's width; h has to be wanted too
+  double* l = nullptr;         ///< of R = L L', m x m
+};
+/// A sensor model at the roles.
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles,
+                   const EvaluationOutput& to);
+
+/// R = L L', m x m, row-major.
+inline void Square(const double* l, int m, double* r) {
+  if (m == 1) {
+    r[0] = l[0] * l[0];
+    return;
+  }
+  for (int i = 0; i < m; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (int k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
+      r[i * m + j] = r[j * m + i] = sum;
+    }
+  }
+}
+
+/// R at the roles, or as the measurement itself says, m x m, row-major. `l` is memory, m x m.
+Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
+                const double* const* roles, double* l, double* r);
+
+}  // namespace alidade::internal

@@ -37,6 +37,17 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   geometry.Normalise(prior.mean.data());
   if (initial.status == BlockStatus::kConstant) return prior;
   const int n = geometry.tangent;
+  if (initial.covariance.size() > 0) {
+    prior.covariance = initial.covariance;
+    const bool fits = prior.covariance.rows() == n && prior.covariance.cols() == n;
+    if (!fits || !prior.covariance.allFinite() ||
+        !prior.covariance.isApprox(prior.covariance.transpose()) ||
+        prior.covariance.diagonal().minCoeff() < 0.0) {
+      Refuse(who, "needs a symmetric covariance of " + std::to_string(n) + " x " +
+                      std::to_string(n) + " finite numbers with " + value);
+    }
+    return prior;
+  }
   std::vector<double> sigma = initial.sigma;
   if (sigma.size() == 1) sigma.assign(static_cast<std::size_t>(n), sigma[0]);
   const auto good = [](double one) { return std::isfinite(one) && one >= 0.0; };
@@ -48,24 +59,22 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   return prior;
 }
 
-/// The state `SENSOR.ROLE` that a sensor brings with it, as its model says.
-BlockId AddOwnedState(System& system, const std::string& sensor, const Space& role,
-                      OwnedRole owned) {
-  const bool constant = owned.sqrt_prior.empty();
-  const BlockId id =
-      system.layout.Declare(sensor + '.' + role.name, sensor, role,
-                            constant ? BlockStatus::kConstant : BlockStatus::kEstimated);
-  Prior prior{id, owned.mean, {}, {}};
-  if (constant) {
-    owned.dynamics = OwnedDynamics::kConstant;
-  } else {
-    const int n = role.geometry.tangent;
-    const Eigen::Map<const RowMajor> root(owned.sqrt_prior.data(), n, n);
-    prior.covariance = root * root.transpose();
+/// The index of the stream, a new one if the system reads none of that name.
+int AddStream(System& system, const StreamInfo& stream, const std::string& who) {
+  const auto found = std::ranges::find(system.streams, stream.name, &StreamInfo::name);
+  if (found == system.streams.end()) {
+    system.streams.push_back(stream);
+    return static_cast<int>(system.streams.size()) - 1;
   }
-  system.priors.push_back(std::move(prior));
-  system.motions.push_back({sensor, internal::OwnedMotion(role.geometry, owned), {id}});
-  return id;
+  if (found->size != stream.size || found->known != stream.known) {
+    const auto numbers = [](const StreamInfo& one) {
+      return std::to_string(one.size) + " values with " + std::to_string(one.known) +
+             " known numbers";
+    };
+    Refuse(who, "reads " + numbers(stream) + " from stream '" + stream.name + "', and another " +
+                    numbers(*found));
+  }
+  return static_cast<int>(found - system.streams.begin());
 }
 
 /// Refuses a block that cannot fill a role.
@@ -97,6 +106,13 @@ InitialValue::InitialValue(std::string name, std::vector<double> at, double devi
 InitialValue::InitialValue(std::string name, double at, double deviation, BlockStatus use)
     : InitialValue(std::move(name), std::vector{at}, std::vector{deviation}, use) {}
 
+InitialValue InitialValue::WithCovariance(std::string block, std::vector<double> mean,
+                                          Eigen::MatrixXd covariance, BlockStatus status) {
+  InitialValue initial(std::move(block), std::move(mean), std::vector<double>(), status);
+  initial.covariance = std::move(covariance);
+  return initial;
+}
+
 InitialValue InitialValue::Constant(std::string block, std::vector<double> value) {
   return {std::move(block), std::move(value), std::vector<double>(), BlockStatus::kConstant};
 }
@@ -105,6 +121,13 @@ InitialValue InitialValue::FromMeasurement(std::string block, std::string sensor
   InitialValue initial(std::move(block), std::vector<double>(), std::vector<double>());
   initial.from = std::move(sensor);
   return initial;
+}
+
+OwnedState OwnedState::Of(const OwnedRole& owned) {
+  if (owned.sqrt_prior.empty()) return {InitialValue::Constant({}, owned.mean), owned};
+  const auto n = static_cast<Eigen::Index>(std::sqrt(owned.sqrt_prior.size()));
+  const Eigen::Map<const RowMajor> root(owned.sqrt_prior.data(), n, n);
+  return {InitialValue::WithCovariance({}, owned.mean, root * root.transpose()), owned};
 }
 
 BlockId StateHandle::operator[](std::string_view block) const {
@@ -117,37 +140,48 @@ BlockId StateHandle::operator[](std::string_view block) const {
 }
 
 StateHandle System::AddState(const std::string& name, SharedMotion model,
-                             const std::vector<InitialValue>& initial, double input_timeout_s) {
+                             const std::vector<InitialValue>& initial, const InputBinding& input) {
   const std::string who = "state '" + name + "'";
   const auto taken = [&](const Block& block) { return block.owner == name; };
   if (std::ranges::any_of(layout.blocks(), taken)) Refuse(who, "is there already");
-  StateHandle handle{name, {}, -1};
-  MotionBinding motion{name, std::move(model), {}, {}};
-  const std::vector<Space>& spaces = motion.model->blocks();
+  const std::vector<Space>& spaces = model->blocks();
   for (const InitialValue& one : initial) {
     if (std::ranges::count(spaces, one.block, &Space::name) == 0) {
       Refuse(who,
              "has no block '" + one.block + "'; its blocks are " + internal::Join(NamesOf(spaces)));
     }
   }
+  std::vector<InitialValue> values;  // in the order of the model
   std::vector<Prior> added;
   for (const Space& space : spaces) {
     const auto found = std::ranges::find(initial, space.name, &InitialValue::block);
-    if (found == initial.end()) Refuse(who, "needs an initial value of '" + space.name + "'");
-    added.push_back(PriorOf(*found, space, -1, who));
+    if (found != initial.end()) {
+      values.push_back(*found);
+    } else if ((space.flags & ALIDADE_ROLE_OWNED) != 0) {
+      std::vector<double> neutral(static_cast<std::size_t>(space.geometry.ambient));
+      space.geometry.Identity(neutral.data());
+      values.push_back(InitialValue::Constant(space.name, neutral));
+    } else {
+      Refuse(who, "needs an initial value of '" + space.name + "'");
+    }
+    if (values.back().name.empty()) values.back().name = space.name;
+    added.push_back(PriorOf(values.back(), space, -1, who));
   }
+  StateHandle handle{name, {}, -1};
+  MotionBinding motion{name, std::move(model), {}, {}};
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    const auto found = std::ranges::find(initial, spaces[i].name, &InitialValue::block);
-    const BlockId id = layout.Declare(name + '.' + spaces[i].name, name, spaces[i], found->status);
-    handle.blocks.emplace(spaces[i].name, id);
+    const std::string& block = values[i].name;
+    const BlockId id = layout.Declare(name + '.' + block, name, spaces[i], values[i].status);
+    handle.blocks.emplace(block, id);
     motion.blocks.push_back(id);
     added[i].block = id;
   }
   std::ranges::move(added, std::back_inserter(priors));
   if (motion.model->has_input()) {
-    motion.input = {name + '.' + motion.model->input().name, input_timeout_s};
-    handle.input = static_cast<int>(streams.size());
-    streams.push_back({motion.input.stream, motion.model->input().geometry.ambient});
+    const Space& space = motion.model->input();
+    motion.input = input;
+    if (input.stream.empty()) motion.input.stream = name + '.' + space.name;
+    handle.input = AddStream(*this, {motion.input.stream, space.geometry.ambient}, who);
   }
   motions.push_back(std::move(motion));
   return handle;
@@ -166,22 +200,43 @@ SensorHandle System::AddSensor(const std::string& name, SharedSensor model,
                     internal::Join(NamesOf(spaces)));
   }
   roles.resize(spaces.size());
+  const auto brings = [&](std::size_t i) {
+    return (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && roles[i].block < 0;
+  };
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    const bool owned = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0;
-    if (spaces[i].landmark() || (owned && roles[i].block < 0)) continue;
-    CheckRole(*this, spaces[i], roles[i], who);
+    if (!spaces[i].landmark() && !brings(i)) CheckRole(*this, spaces[i], roles[i], who);
+    const BlockId block = roles[i].block;
+    if (block < 0 || std::ranges::count(roles, block, &RoleBinding::block) < 2) continue;
+    Refuse(who, "has block '" + layout[block].name + "' in two roles; expected one for each");
   }
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    const bool owned = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0;
-    if (owned && roles[i].block < 0)
-      roles[i] = AddOwnedState(*this, name, spaces[i], model->owned(i));
+    if (!brings(i)) continue;
+    const auto given = options.owned.find(i);
+    roles[i] = internal::AddOwnedState(
+        *this, name, spaces[i],
+        given != options.owned.end() ? given->second : OwnedState::Of(model->owned(i)));
   }
   if (of_landmark > 0 && !landmarks) landmarks.emplace();
-  const SensorHandle handle{static_cast<int>(sensors.size()), static_cast<int>(streams.size())};
-  streams.push_back({name, model->measurement().geometry.ambient, 0.0, model->known_size()});
-  sensors.push_back({name, name, std::move(model), std::move(roles), options.loss, options.xyz,
+  const std::string& stream = options.stream.empty() ? name : options.stream;
+  const SensorHandle handle{
+      static_cast<int>(sensors.size()),
+      AddStream(*this, {stream, model->measurement().geometry.ambient, 0.0, model->known_size()},
+                who)};
+  sensors.push_back({name, stream, std::move(model), std::move(roles), options.loss, options.xyz,
                      options.outlier_rejection});
   return handle;
+}
+
+BlockId internal::AddOwnedState(System& system, const std::string& sensor, const Space& role,
+                                OwnedState state) {
+  Prior prior = PriorOf(state.initial, role, -1, "sensor '" + sensor + "'");
+  const BlockStatus status = state.initial.status;
+  prior.block = system.layout.Declare(sensor + '.' + role.name, sensor, role, status);
+  if (status == BlockStatus::kConstant) state.process.dynamics = OwnedDynamics::kConstant;
+  state.process.mean = prior.mean;
+  system.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});
+  system.priors.push_back(std::move(prior));
+  return system.priors.back().block;
 }
 
 State System::InitialState(bool reserved) const {

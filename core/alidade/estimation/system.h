@@ -90,16 +90,33 @@ struct InitialValue {
                BlockStatus status = BlockStatus::kEstimated);
   InitialValue(std::string block, double mean, double sigma,
                BlockStatus status = BlockStatus::kEstimated);
+  /// A covariance of the tangent in place of standard deviations.
+  static InitialValue WithCovariance(std::string block, std::vector<double> mean,
+                                     Eigen::MatrixXd covariance,
+                                     BlockStatus status = BlockStatus::kEstimated);
   /// A value that is known exactly.
   static InitialValue Constant(std::string block, std::vector<double> value);
   /// `sensor` has to have an inverse measurement model of the block; a filter refuses what cannot
   /// start so.
   static InitialValue FromMeasurement(std::string block, std::string sensor);
 
-  std::string block;
+  std::string block;  ///< as the model names it
+  std::string name;   ///< of the block in the problem; empty: as the model names it
   std::vector<double> mean, sigma;
+  Eigen::MatrixXd covariance;  ///< empty: sigma counts
   BlockStatus status = BlockStatus::kEstimated;
   std::string from;  ///< the sensor; empty: mean and sigma count
+};
+
+/// How a state that comes with its sensor, a bias say, starts and moves.
+struct OwnedState {
+  /// What the model of a sensor says of one of its roles.
+  static OwnedState Of(const OwnedRole& owned);
+
+  InitialValue initial;
+  OwnedRole
+      process;  ///< its dynamics and their noise count; a Gauss-Markov process has the mean of
+                ///< `initial`
 };
 
 /// A state of a problem: its blocks by the names of the motion model.
@@ -120,24 +137,26 @@ struct SensorHandle {
 
 /// What a sensor has besides its model and roles.
 struct SensorOptions {
+  std::string stream = {};  ///< that it reads; empty: one of its own name
   RobustLoss loss = {};
   SharedSensor xyz = {};  ///< as in SensorBinding
   std::optional<OnePointRansac> outlier_rejection = {};
+  /// By role: of states that come with the sensor, in place of what its model says.
+  std::map<std::size_t, OwnedState> owned = {};
 };
 
 /// The problem that every estimator is given: blocks, how they move, what measures them, how they
 /// start. Add* check what they add at once. Errors: kBadConfig, which says what does not fit.
 struct System {
-  /// A state whose blocks are those of the model, each with its initial value. Its control input,
-  /// if the model takes one, acts until it is older than `input_timeout_s`.
+  /// A state whose blocks are those of the model, each with its initial value. A block with the
+  /// flag ALIDADE_ROLE_OWNED that has none is constant at the neutral element. `input`: of a model
+  /// that takes a control input; without a stream it reads NAME.INPUT.
   StateHandle AddState(const std::string& name, SharedMotion model,
-                       const std::vector<InitialValue>& initial,
-                       double input_timeout_s = std::numeric_limits<double>::infinity());
+                       const std::vector<InitialValue>& initial, const InputBinding& input = {});
   template <MotionStruct Model>
   StateHandle AddState(const std::string& name, Model model,
-                       const std::vector<InitialValue>& initial,
-                       double input_timeout_s = std::numeric_limits<double>::infinity()) {
-    return AddState(name, MakeMotion(std::move(model), name), initial, input_timeout_s);
+                       const std::vector<InitialValue>& initial, const InputBinding& input = {}) {
+    return AddState(name, MakeMotion(std::move(model), name), initial, input);
   }
   /// A sensor with what fills its roles, in their order, but those of a landmark, which a
   /// measurement names. Roles at the end that are optional may be left out.
@@ -159,7 +178,7 @@ struct System {
   std::vector<MotionBinding> motions;
   std::vector<SensorBinding> sensors;
   std::vector<Prior> priors;
-  std::vector<StreamInfo> streams;           ///< of what was added, as frames number them
+  std::vector<StreamInfo> streams;           ///< that it reads, each once, as frames number them
   std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there if a sensor measures landmarks
 };
@@ -168,6 +187,11 @@ namespace internal {
 
 /// The block of a position that landmarks are seen from; -1: there is none.
 BlockId PositionBlockOf(const System& system);
+
+/// Adds the state SENSOR.ROLE of a sensor, with its process. Error kBadConfig for an initial value
+/// that does not fit.
+BlockId AddOwnedState(System& system, const std::string& sensor, const Space& role,
+                      OwnedState state);
 
 /// The unit of a block, or else of a sensor's role that it fills.
 std::string UnitOf(const System& system, BlockId id);

@@ -64,25 +64,6 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   return names;
 }
 
-/// What the sensors and control inputs of a system take, each stream once.
-std::vector<StreamInfo> StreamsOf(const System& system) {
-  std::vector<StreamInfo> streams;
-  const auto add = [&](const std::string& name, int size, int known) {
-    if (std::ranges::find(streams, name, &StreamInfo::name) == streams.end()) {
-      streams.push_back({name, size, 0.0, known});
-    }
-  };
-  for (const SensorBinding& sensor : system.sensors) {
-    add(sensor.stream, sensor.model->measurement().geometry.ambient, sensor.model->known_size());
-  }
-  for (const MotionBinding& motion : system.motions) {
-    if (motion.model->has_input()) {
-      add(motion.input.stream, motion.model->input().geometry.ambient, 0);
-    }
-  }
-  return streams;
-}
-
 void CheckName(const std::string& name, const Node& entry) {
   ExpectName(name, entry, "an estimator");
   if (name == "figures") {
@@ -248,7 +229,7 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const EstimatorSpec&
                                 const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
                                 const Node& node) {
   const auto made = [&] {
-    return make(spec.system, streams != nullptr ? *streams : StreamsOf(spec.system));
+    return make(spec.system, streams != nullptr ? *streams : spec.system.streams);
   };
   if (plugin == nullptr) return made();
   std::string why = "an exception of unknown type";

@@ -182,19 +182,21 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
 
 }  // namespace
 
-void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding) {
-  const Node role = entry.At("roles").At("landmark", "sensor '" + binding.name + "'");
+void internal::ReadLandmarkKeys(const std::string& name, const Node& entry,
+                                const SensorModel& model, const PluginHost& host,
+                                SensorOptions& options) {
+  const Node role = entry.At("roles").At("landmark", "sensor '" + name + "'");
   if (role.is_map() || role.Text() != "landmarks") {
     role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
   }
   if (const auto node = entry.Find("outlier_rejection")) {
-    binding.outlier_rejection = ReadOnePointRansac(*node);
+    options.outlier_rejection = ReadOnePointRansac(*node);
   }
-  const auto representation = RepresentationOf(binding.model->roles());
+  const auto representation = RepresentationOf(model.roles());
   if (!representation || IsXyz(*representation)) return;
   SharedSensor xyz =
-      host.CreateSensor(binding.model->name(), entry, ToString(internal::XyzRepresentation()));
-  if (RepresentationOf(xyz->roles()) == internal::XyzRepresentation()) binding.xyz = std::move(xyz);
+      host.CreateSensor(model.name(), entry, ToString(internal::XyzRepresentation()));
+  if (RepresentationOf(xyz->roles()) == internal::XyzRepresentation()) options.xyz = std::move(xyz);
 }
 
 std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,

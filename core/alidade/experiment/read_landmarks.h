@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "alidade/config/config.h"
@@ -10,10 +11,11 @@
 
 namespace alidade::internal {
 
-/// What the entry of a sensor of landmarks has besides: its landmark roles together, as the role
+/// What the entry `name` of a sensor of landmarks has besides: its landmark roles together, as the role
 /// `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
 /// kBadConfig.
-void ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding);
+void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
+                      const PluginHost& host, SensorOptions& options);
 
 /// The map `landmarks` of the config's root, as the sensors need it; none where no sensor measures
 /// landmarks. Errors: kBadConfig where it does not fit them.

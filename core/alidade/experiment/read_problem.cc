@@ -20,6 +20,21 @@ namespace {
 
 using internal::NamesOf;
 
+/// Refuses an entry whose stream another one reads with another size.
+void CheckStream(const Node& entry, const std::string& name, int size, int known,
+                 const System& system) {
+  const auto found = std::ranges::find(system.streams, name, &StreamInfo::name);
+  if (found == system.streams.end() || (found->size == size && found->known == known)) return;
+  const auto text = [](int values, int with) {
+    return std::to_string(values) + " values" +
+           (with > 0 ? " and " + std::to_string(with) + " known numbers" : std::string());
+  };
+  const Node node = entry.Find("input") ? entry.At("input").At("stream") : entry.At("stream");
+  node.Fail("stream '" + name + "' has " + text(found->size, found->known) +
+                " at a time for another entry",
+            text(size, known));
+}
+
 /// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   std::vector<double> mean;
@@ -32,7 +47,6 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
-  geometry.Normalise(mean.data());
   if (geometry.kind == GeometryKind::kUnitQuaternion) internal::ChooseSign({}, mean);
   return mean;
 }
@@ -96,21 +110,24 @@ std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& mo
   return names;
 }
 
-void ReadPrior(const Node& initial, const Block& block, BlockId id, System& system) {
-  Prior prior;
-  prior.block = id;
+/// How the block `name` of the problem starts, which is `space` of the model.
+InitialValue ReadInitial(const Node& initial, const Space& space, const std::string& name,
+                         BlockStatus status) {
+  InitialValue value = InitialValue::Constant(space.name, {});
+  value.name = name;
+  value.status = status;
   if (const auto from = initial.Find("from_measurement")) {
-    prior.from = from->Text();
+    value.from = from->Text();
   } else {
-    prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
-    if (block.status != BlockStatus::kConstant) {
-      prior.covariance = ReadCovariance(initial, block.geometry().tangent);
+    value.mean = ReadMean(initial.At("mean", "the initial value"), space.geometry);
+    if (status != BlockStatus::kConstant) {
+      value.covariance = ReadCovariance(initial, space.geometry.tangent);
     } else {
       for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
     }
   }
   initial.RejectUnread();
-  system.priors.push_back(std::move(prior));
+  return value;
 }
 
 /// `input: {stream: NAME, timeout_s: S}` of a model that takes a control input.
@@ -137,10 +154,9 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
 
 void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
                     System& system) {
-  const std::string model_name = entry.At("model", "a state entry").Text();
-  MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
-  binding.input = ReadInput(entry, *binding.model);
-  const std::vector<std::string> names = ReadBlockNames(entry, *binding.model);
+  const SharedMotion model = host.CreateMotion(entry.At("model", "a state entry").Text(), entry);
+  const InputBinding input = ReadInput(entry, *model);
+  const std::vector<std::string> names = ReadBlockNames(entry, *model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto constant = ReadNames(entry, "constant", names);
   for (const std::string& both : constant) {
@@ -150,28 +166,28 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
               "a block in one of them: a constant is exact, a consider state uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
-  const std::vector<Space>& spaces = binding.model->blocks();
+  std::vector<InitialValue> values;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
-                       !Contains(considered, names[i]);
-    const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
-                               : Contains(considered, names[i])      ? BlockStatus::kConsider
-                                                                     : BlockStatus::kEstimated;
-    const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
-    binding.blocks.push_back(id);
-    if (known) {
-      Prior prior{
-          id, std::vector<double>(static_cast<std::size_t>(spaces[i].geometry.ambient)), {}, {}};
-      spaces[i].geometry.Identity(prior.mean.data());
-      system.priors.push_back(std::move(prior));
+    const Space& space = model->blocks()[i];
+    const bool owned = (space.flags & ALIDADE_ROLE_OWNED) != 0;
+    if (owned && !initial.Find(names[i]) && !Contains(considered, names[i])) {
+      std::vector<double> neutral(static_cast<std::size_t>(space.geometry.ambient));
+      space.geometry.Identity(neutral.data());
+      values.push_back(InitialValue::Constant(space.name, neutral));
+      values.back().name = names[i];
       continue;
     }
-    ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
-              system);
+    const BlockStatus status = Contains(constant, names[i])     ? BlockStatus::kConstant
+                               : Contains(considered, names[i]) ? BlockStatus::kConsider
+                                                                : BlockStatus::kEstimated;
+    const Node node = initial.At(names[i], "block '" + name + "." + names[i] + "'");
+    values.push_back(ReadInitial(node, space, names[i], status));
   }
   initial.RejectUnread();
   entry.RejectUnread();
-  system.motions.push_back(std::move(binding));
+  CheckStream(entry, input.stream, model->has_input() ? model->input().geometry.ambient : 0, 0,
+              system);
+  system.AddState(name, model, values, input);
 }
 
 /// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
@@ -244,10 +260,10 @@ class OwnedReader {
     dynamics_ = entry.Find("dynamics");
   }
 
-  /// Declares the block of a role, `SENSOR.ROLE`, with its prior and its motion.
-  BlockId Add(const Space& role, OwnedRole owned, System& system) {
+  /// The state of a role, of which its model says `owned`.
+  OwnedState Read(const Space& role, const OwnedRole& owned, const System& system) {
     const auto taken = [&](const Block& block) { return block.owner == name_; };
-    if (!std::exchange(added_, true) && std::ranges::any_of(system.layout.blocks(), taken)) {
+    if (!std::exchange(read_, true) && std::ranges::any_of(system.layout.blocks(), taken)) {
       entry_.Fail(
           "it brings the state '" + name_ + '.' + role.name + "', and a state entry has its name",
           "another name for the sensor, or the role bound under `roles`");
@@ -263,35 +279,24 @@ class OwnedReader {
           .Fail("'" + role.name + "' is constant: it has no uncertainty",
                 "`initial` with a sigma, and `constant` without it");
     }
-    const BlockId id = system.layout.Declare(name_ + '.' + role.name, name_, role,
-                                             constant     ? BlockStatus::kConstant
-                                             : considered ? BlockStatus::kConsider
-                                                          : BlockStatus::kEstimated);
+    OwnedState state = OwnedState::Of(owned);
+    state.initial.status = constant     ? BlockStatus::kConstant
+                           : considered ? BlockStatus::kConsider
+                                        : BlockStatus::kEstimated;
     if (own) {
       if (const auto from = own->Find("from_measurement")) {
         from->Fail("a state that a sensor owns starts from no measurement", "mean and sigma");
       }
-      ReadPrior(*own, system.layout[id], id, system);
-      owned.mean = system.priors.back().mean;
-    } else {
-      const int n = role.geometry.tangent;
-      Prior prior{id, owned.mean, {}, {}};
-      if (!constant) {
-        const Eigen::Map<const RowMajor> root(owned.sqrt_prior.data(), n, n);
-        prior.covariance = root * root.transpose();
-      }
-      system.priors.push_back(std::move(prior));
+      state.initial = ReadInitial(*own, role, role.name, state.initial.status);
     }
-    if (is_offset) CheckOffset(system.priors.back());
+    if (is_offset) CheckOffset(state.initial);
     const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt;
-    if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, owned);
-    if (constant && dynamics && owned.dynamics != OwnedDynamics::kConstant) {
+    if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, state.process);
+    if (constant && dynamics && state.process.dynamics != OwnedDynamics::kConstant) {
       dynamics->Fail("'" + role.name + "' is constant",
                      "a sigma where it starts, or the key left out");
     }
-    if (constant) owned.dynamics = OwnedDynamics::kConstant;
-    system.motions.push_back({name_, internal::OwnedMotion(role.geometry, owned), {id}});
-    return id;
+    return state;
   }
 
   /// The time offset of a sensor whose roles are bound; nothing where none is given, or 0.
@@ -301,8 +306,8 @@ class OwnedReader {
     at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
     const Space space{
         kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
-    const std::string why =
-        internal::OffsetInTime(system, Add(space, std::move(at_first), system), sensor);
+    const BlockId id = internal::AddOwnedState(system, name_, space, Read(space, at_first, system));
+    const std::string why = internal::OffsetInTime(system, id, sensor);
     if (!why.empty()) offset_->Fail(why, "the key left out");
   }
 
@@ -313,16 +318,16 @@ class OwnedReader {
 
  private:
   /// Of a clock that is off by more than a filter can look ahead.
-  void CheckOffset(const Prior& prior) const {
+  void CheckOffset(const InitialValue& offset) const {
     constexpr double kMostSeconds = 60.0;
-    const double sigma = prior.covariance.size() == 0 ? 0.0 : std::sqrt(prior.covariance(0, 0));
-    if (std::abs(prior.mean[0]) <= kMostSeconds && sigma <= kMostSeconds) return;
+    const double sigma = offset.covariance.size() == 0 ? 0.0 : std::sqrt(offset.covariance(0, 0));
+    if (std::abs(offset.mean[0]) <= kMostSeconds && sigma <= kMostSeconds) return;
     offset_->Fail("more than a motion model can look ahead", "at most 60 s, sigma too");
   }
 
   std::string name_;
   Node entry_;
-  bool added_ = false;  ///< one of its states
+  bool read_ = false;  ///< one of its states
   std::optional<Node> offset_, initial_, dynamics_;
   std::vector<std::string> considered_, constant_;
 };
@@ -373,53 +378,52 @@ RobustLoss ReadLoss(const Node& node) {
           scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
 }
 
-SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
-                         System& system) {
+void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
+                System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
-  SensorBinding binding{name,
-                        entry.At("stream", "sensor '" + name + "'").Text(),
-                        host.CreateSensor(model_name, entry),
-                        {},
-                        {}};
-  if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
+  SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
+  const SharedSensor model = host.CreateSensor(model_name, entry);
+  if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
-  OwnedReader owned(name, entry, roles, *binding.model);
-  for (std::size_t i = 0; i < binding.model->roles().size(); ++i) {
-    const Space& role = binding.model->roles()[i];
-    if (role.landmark()) {
-      binding.roles.push_back({});
-      continue;
-    }
+  OwnedReader owned(name, entry, roles, *model);
+  std::vector<RoleBinding> bound;
+  for (std::size_t i = 0; i < model->roles().size(); ++i) {
+    const Space& role = model->roles()[i];
+    if (role.landmark()) break;  // the rest of them
     const auto node = roles.Find(role.name);
-    if (!node && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
-      binding.roles.push_back({owned.Add(role, binding.model->owned(i), system)});
-      continue;
-    }
-    if (!node && role.optional()) {
-      binding.roles.push_back({});
+    const bool brings = !node && (role.flags & ALIDADE_ROLE_OWNED) != 0;
+    if (brings) options.owned.emplace(i, owned.Read(role, model->owned(i), system));
+    if (brings || (!node && role.optional())) {
+      bound.emplace_back();
       continue;
     }
     const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
-    binding.roles.push_back(ReadRole(given, role, *binding.model, system));
-    const BlockId block = binding.roles.back().block;
-    const auto same = [block](const RoleBinding& r) { return r.block == block; };
-    if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
+    bound.push_back(ReadRole(given, role, *model, system));
+    const BlockId block = bound.back().block;
+    if (std::ranges::count(bound, block, &RoleBinding::block) > 1) {
       given.Fail("block '" + system.layout[block].name + "' already fills another role",
                  "a block of its own for each role");
     }
   }
-  if (binding.model->has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
-  owned.AddTimeOffset(system, binding);
+  if (model->has_landmark()) internal::ReadLandmarkKeys(name, entry, *model, host, options);
+  CheckStream(entry, options.stream, model->measurement().geometry.ambient, model->known_size(),
+              system);
+  system.AddSensor(name, model, bound, options);
+  owned.AddTimeOffset(system, system.sensors.back());
   roles.RejectUnread();
   owned.RejectUnread();
   entry.RejectUnread();
-  return binding;
 }
 
-/// The system without the state entries that no sensor touches.
-System WithoutUntouched(System system) {
+/// The system with the named sensors alone, in that order, and the state entries that they touch.
+System WithSensors(System system, const std::vector<std::string>& names) {
+  std::vector<SensorBinding> sensors;
   std::vector<std::string> touched;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const std::string& name : names) {
+    const int index = system.FindSensor(name);
+    if (index >= 0) sensors.push_back(system.sensors[static_cast<std::size_t>(index)]);
+  }
+  for (const SensorBinding& sensor : sensors) {
     for (const RoleBinding& role : sensor.roles) {
       if (role.block >= 0) touched.push_back(system.layout[role.block].owner);
     }
@@ -445,9 +449,17 @@ System WithoutUntouched(System system) {
     follow(prior.block);
     if (prior.block >= 0) kept.priors.push_back(std::move(prior));
   }
-  for (SensorBinding& sensor : system.sensors) {
+  for (SensorBinding& sensor : sensors) {
     for (RoleBinding& role : sensor.roles) follow(role.block);
-    kept.sensors.push_back(std::move(sensor));
+  }
+  kept.sensors = std::move(sensors);
+  for (const StreamInfo& stream : system.streams) {
+    const auto reads = [&](const auto& one) { return one == stream.name; };
+    const auto input = [](const MotionBinding& motion) { return motion.input.stream; };
+    if (std::ranges::any_of(kept.sensors, reads, &SensorBinding::stream) ||
+        std::ranges::any_of(kept.motions, reads, input)) {
+      kept.streams.push_back(stream);
+    }
   }
   return kept;
 }
@@ -461,25 +473,15 @@ System ReadProblem(const Node& root, const PluginHost& host, const std::vector<s
     if (name == "landmarks") entry.Fail("'landmarks' is not a state entry", "another name");
     ReadStateEntry(name, entry, host, system);
   }
-  std::vector<SensorBinding> sensors;
   for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
     internal::ExpectName(name, entry, "a sensor");
-    sensors.push_back(ReadSensor(name, entry, host, system));
+    ReadSensor(name, entry, host, system);
   }
-  system.landmarks = internal::ReadLandmarks(root, sensors);
-  if (only.empty()) {
-    system.sensors = std::move(sensors);
-  } else {
-    for (const std::string& name : only) {
-      for (const SensorBinding& sensor : sensors) {
-        if (sensor.name == name) system.sensors.push_back(sensor);
-      }
-    }
-  }
+  system.landmarks = internal::ReadLandmarks(root, system.sensors);
   constexpr double kLatestSeconds = 4.6e9;  // two timestamps may differ by twice that
   if (const auto start = root.Find("initial_time_s"))
     system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
-  if (!only.empty()) system = WithoutUntouched(std::move(system));
+  if (!only.empty()) system = WithSensors(std::move(system), only);
   const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
   if (const auto defect = FindDefect(system)) {

@@ -87,6 +87,46 @@ TEST(Problem, ABlockMayStartFromAMeasurement) {
   EXPECT_NEAR(ekf.Estimate(target["position"]).sigma[0], 0.5 / 52.0, 1e-12);
 }
 
+TEST(Problem, ABlockMayHaveAnotherNameAndACovariance) {
+  System problem;
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal();
+  InitialValue start = InitialValue::WithCovariance("value", {1.0, 2.0, 3.0}, covariance);
+  start.name = "place";
+  const auto body = problem.AddState("body", Constant<3>(3), {start});
+  EXPECT_EQ(problem.layout[body["place"]].name, "body.place");
+  const Ekf ekf(problem);
+  EXPECT_EQ(ekf.Estimate(body["place"]).value, Eigen::Vector3d(1.0, 2.0, 3.0));
+  EXPECT_EQ(ekf.Estimate(body["place"]).sigma, Eigen::Vector3d(1.0, 2.0, 3.0));
+}
+
+TEST(Problem, SensorsMayReadOneStream) {
+  System problem;
+  const auto target =
+      problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
+  const StereoDisparity stereo(400.0, 0.065, 1.0);
+  const auto left = problem.AddSensor("left", stereo, {target["position"]}, {.stream = "camera"});
+  const auto right = problem.AddSensor("right", stereo, {target["position"]}, {.stream = "camera"});
+  EXPECT_EQ(left.stream, right.stream);
+  ASSERT_EQ(problem.streams.size(), 1u);
+  Ekf ekf(problem);
+  EXPECT_EQ(ekf.Push(0, left, 87.0).measurements().size(), 2u);
+}
+
+TEST(Problem, AStateOfASensorMayStartOtherwiseThanItsModelSays) {
+  System problem;
+  const auto receiver =
+      problem.AddState("receiver", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 10.0}});
+  const Pseudorange model(1.0);
+  const std::size_t role = Pseudorange::kRoles.size() - 1;
+  OwnedState drift = OwnedState::Of(MakeSensor(model)->owned(role));
+  drift.initial = InitialValue("", 2.0, 0.5);
+  problem.AddSensor("range", model, {receiver["value"]}, {.owned = {{role, drift}}});
+  const Ekf ekf(problem);
+  const auto [value, sigma] = ekf.Estimate(problem.sensors[0].roles[role].block);
+  EXPECT_EQ(value[0], 2.0);
+  EXPECT_EQ(sigma[0], 0.5);
+}
+
 TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   const StereoDisparity stereo(400.0, 0.065, 1.0);
   EXPECT_EQ(Refusal([](System& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
@@ -121,6 +161,25 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
               p.AddSensor("s", stereo, {wide["value"]});
             }),
             "sensor 's' has a role 'depth', a vector(1); block 'wide.value' is a vector(2)");
+  EXPECT_EQ(Refusal([](System& p, auto& t) {
+              p.AddSensor("s", Scale2d::FromPixels(300.0, 1.0), {t["position"], t["position"]});
+            }),
+            "sensor 's' has block 'target.position' in two roles; expected one for each");
+  EXPECT_EQ(
+      Refusal([&](System& p, auto& t) {
+        p.AddSensor("a", stereo, {t["position"]}, {.stream = "camera"});
+        const auto wide = p.AddState("wide", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 1.0}});
+        p.AddSensor("b", Pseudorange(1.0), {wide["value"]}, {.stream = "camera"});
+      }),
+      "sensor 'b' reads 1 values with 3 known numbers from stream 'camera', and another 1 "
+      "values with 0 known numbers");
+  EXPECT_EQ(Refusal([](System& p, auto&) {
+              p.AddState("b", Constant<3>(3),
+                         {InitialValue::WithCovariance("value", {0.0, 0.0, 0.0},
+                                                       Eigen::Matrix2d::Identity())});
+            }),
+            "state 'b' needs a symmetric covariance of 3 x 3 finite numbers with the initial value "
+            "of 'value', a vector(3)");
 }
 
 TEST(Problem, AFilterRefusesABlockThatCannotStart) {

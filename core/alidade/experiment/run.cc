@@ -141,11 +141,12 @@ void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& running,
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
-      const int by = running[e].spec.accepted_by;
+      const ProcessedFrame* const rolled_back = frames.processed(e);
+      const int by = rolled_back != nullptr ? -1 : running[e].spec.accepted_by;
       Frame accepted;
       if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
-      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames, *experiment.source,
-                      options, result) &&
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, rolled_back,
+                      *experiment.source, options, result) &&
               go_on;
     }
     ++result.frames;

@@ -147,8 +147,8 @@ struct Scene {
 
 // The batch.
 
-System SystemOf(const Scene& scene) {
-  System system;
+Problem SystemOf(const Scene& scene) {
+  Problem problem;
   const SharedMotion motion = MakeMotion(
       QuaternionPose({kAcceleration, kAcceleration, kAcceleration}, {kAngular, kAngular, kAngular}),
       "quaternion_pose");
@@ -162,13 +162,13 @@ System SystemOf(const Scene& scene) {
   const std::array<double, 4> sigmas = {0.0, 0.0, 1.0, 0.5};
   for (std::size_t i = 0; i < 4; ++i) {
     const BlockId id =
-        system.layout.Declare("cam." + motion->blocks()[i].name, "cam", motion->blocks()[i]);
+        problem.layout.Declare("cam." + motion->blocks()[i].name, "cam", motion->blocks()[i]);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;
     prior.mean = means[i];
     prior.covariance = sigmas[i] * sigmas[i] * Matrix3d::Identity();
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
   const Camera camera(2000, 2000, kFocal, kFocal, kCentre, kCentre);
   SensorBinding pixels{"pixels",
@@ -182,19 +182,19 @@ System SystemOf(const Scene& scene) {
   for (SensorBinding* sensor : {&pixels, &depth}) {
     sensor->roles.resize(sensor->model->roles().size());
     for (std::size_t i = 0; i < 2; ++i) sensor->roles[i].block = binding.blocks[i];
-    system.sensors.push_back(*sensor);
+    problem.sensors.push_back(*sensor);
   }
-  system.motions.push_back(std::move(binding));
-  system.landmarks = LandmarkOptions{};
-  system.landmarks->prior = LandmarkOptions::Prior{0.1, 0.05, 0};
-  return system;
+  problem.motions.push_back(std::move(binding));
+  problem.landmarks = LandmarkOptions{};
+  problem.landmarks->prior = LandmarkOptions::Prior{0.1, 0.05, 0};
+  return problem;
 }
 
 /// Stands for the filter that goes along: says what each measurement is, and gives the start.
 class StartOf : public Estimator {
  public:
-  StartOf(const System& system, const Scene& scene)
-      : scene_(scene), state_(system.InitialState(/*reserved=*/true)) {}
+  StartOf(const Problem& problem, const Scene& scene)
+      : scene_(scene), state_(problem.InitialState(/*reserved=*/true)) {}
   void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
@@ -231,11 +231,11 @@ struct Times {
 double NowS() { return 1e-9 * CpuNs(); }
 
 Times TimeBatch(const Scene& scene, int iterations) {
-  const System system = SystemOf(scene);
-  ceres_batch::CondensedRun run(system, {{"pixels", 2}, {"depth", 3}},
+  const Problem problem = SystemOf(scene);
+  ceres_batch::CondensedRun run(problem, {{"pixels", 2}, {"depth", 3}},
                                 std::numeric_limits<double>::infinity(),
                                 std::numeric_limits<int>::max());
-  StartOf start(system, scene);
+  StartOf start(problem, scene);
   ceres_batch::Trajectory about;
   std::size_t at = 0;
   for (std::size_t k = 0; k < scene.start.size(); ++k) {

@@ -48,31 +48,31 @@ struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>, Vec<3>> {
 
 double PlaceOf(int landmark, int axis) { return std::sin(1.0 + landmark * (axis + 1)); }
 
-System MapSystem(BlockStatus bias) {
-  System system;
+Problem MapSystem(BlockStatus bias) {
+  Problem problem;
   const SharedMotion walk = MakeMotion(Walk(), "walk");
   for (const char* owner : {"cam", "bias"}) {
     const BlockStatus status = *owner == 'b' ? bias : BlockStatus::kEstimated;
     const std::string name = std::string(owner) + ".position";
-    const BlockId id = system.layout.Declare(name, owner, walk->blocks()[0], status);
-    system.motions.push_back({owner, walk, {id}});
+    const BlockId id = problem.layout.Declare(name, owner, walk->blocks()[0], status);
+    problem.motions.push_back({owner, walk, {id}});
     Prior prior;
     prior.block = id;
     prior.mean = {0.0, 0.0, 0.0};
     prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
   SensorBinding sensor{"tracks", "tracks", MakeSensor(Offset(), "offset"), {}};
   sensor.roles.resize(3);
   sensor.roles[0].block = 0;
   sensor.roles[1].block = 1;
-  system.sensors.push_back(sensor);
+  problem.sensors.push_back(sensor);
   LandmarkOptions landmarks;
   for (int i = 0; i < kLandmarks; ++i) {
     landmarks.known.push_back({i, {PlaceOf(i, 0), PlaceOf(i, 1), PlaceOf(i, 2)}, 0.1});
   }
-  system.landmarks = landmarks;
-  return system;
+  problem.landmarks = landmarks;
+  return problem;
 }
 
 /// Processes one frame after the other.

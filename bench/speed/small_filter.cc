@@ -139,10 +139,10 @@ class Static {
 /// The engine: frames in, a report of every measurement out.
 class Engine {
  public:
-  explicit Engine(System system) {
+  explicit Engine(Problem problem) {
     EkfOptions options;
     options.gate = kGate;
-    filter_ = std::make_unique<Ekf>(system, options, testing::StreamsOf(system));
+    filter_ = std::make_unique<Ekf>(problem, options, testing::StreamsOf(problem));
     filter_->Start(0);
     frame_ = testing::FrameAt(0.0, {{0, 0.0}, {1, 0.0}});
   }
@@ -161,16 +161,16 @@ class Engine {
 };
 
 /// The models behind the plugin ABI, as a config composes them.
-System ByPlugins() {
-  System system = testing::DepthFilter();
-  system.motions[0].model =
+Problem ByPlugins() {
+  Problem problem = testing::DepthFilter();
+  problem.motions[0].model =
       testing::AbiMotion<ConstantVelocity<1, false>>({{"noise.acceleration", {kAcceleration}}});
-  system.motions[1].model = testing::AbiMotion<Constant<>>({{"noise.random_walk", {0.0}}});
-  system.sensors[0].model = testing::AbiSensor<StereoDisparity>(
+  problem.motions[1].model = testing::AbiMotion<Constant<>>({{"noise.random_walk", {0.0}}});
+  problem.sensors[0].model = testing::AbiSensor<StereoDisparity>(
       {{"focal_px", {400.0}}, {"baseline_m", {0.065}}, {"sigma_px", {1.0}}});
-  system.sensors[1].model =
+  problem.sensors[1].model =
       testing::AbiSensor<Scale2d>({{"template_px", {300.0}}, {"sigma_px", {1.0}}});
-  return system;
+  return problem;
 }
 
 /// A contender of which a chunk takes about 0.4 ms, with its depth at the end of one period.

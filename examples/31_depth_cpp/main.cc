@@ -13,7 +13,7 @@
 #include <random>
 
 int main() {
-  alidade::System problem;
+  alidade::Problem problem;
   const auto target = problem.AddState("target", alidade::ConstantVelocity<1, false>(1.0),
                                        {{"position", 0.3, 10.0}, {"velocity", 0.0, 10.0}});
   const auto model =

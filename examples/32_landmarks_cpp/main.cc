@@ -76,7 +76,7 @@ struct PointInRobot : alidade::Sensor<Vec<3>, Vec<2>, Angle, Vec<3>> {
 };
 
 int main() {
-  alidade::System problem;
+  alidade::Problem problem;
   const auto robot =
       problem.AddState("robot", Robot(), {{"position", {0.0, 0.0}, 0.0}, {"heading", 0.0, 0.0}});
   const auto points =

@@ -90,7 +90,7 @@ class Models : public Source {
     int max_per_frame;  ///< of landmarks
   };
 
-  /// The system of the config, with what `overrides` has of it.
+  /// The problem of the config, with what `overrides` has of it.
   void BuildTruth(const SourceArguments& arguments) {
     const auto overrides = arguments.entry.Find("overrides");
     const Config truth =
@@ -429,7 +429,7 @@ class Models : public Source {
     measurement.values = motion.input;
   }
 
-  System system_;
+  Problem system_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<double>> x_;  ///< the true value of each block
   std::vector<Motion> motions_;

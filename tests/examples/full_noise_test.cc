@@ -66,15 +66,15 @@ TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
   const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]");
   const PluginHost host;
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
-  System system = ReadProblem(config.root(), host, {"pixels"});
+  Problem problem = ReadProblem(config.root(), host, {"pixels"});
   const std::vector<StreamInfo> streams = source->streams();
-  Ekf by_config(system, {}, streams);
+  Ekf by_config(problem, {}, streams);
   const Config other = WithCovariance("[[9, 0], [0, 9]]");
   Ekf by_measurement(ReadProblem(other.root(), host, {"pixels"}), {}, streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
-  system.sensors.at(0).model =
+  problem.sensors.at(0).model =
       MakeSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");
-  Ekf by_model(system, {}, streams);
+  Ekf by_model(problem, {}, streams);
 
   int used = 0, frames = 0;
   for (SourceFrame frame; source->Next(frame) && frames < 40; ++frames) {

@@ -40,7 +40,7 @@ const std::filesystem::path kReplay =
 /// on.
 constexpr double kTolerance = 1e-7;
 
-/// Takes every n-th estimate: values of the system's blocks, |x|^2, tr P and |P|^2 with the
+/// Takes every n-th estimate: values of the problem's blocks, |x|^2, tr P and |P|^2 with the
 /// landmarks, and how many measurements ended with each outcome since the last one taken.
 class Recording : public RunObserver {
  public:
@@ -48,7 +48,7 @@ class Recording : public RunObserver {
 
   void Begin(const Experiment& experiment) override {
     for (const EstimatorSpec& one : experiment.estimators) series_.push_back({one.name, 0, {}});
-    system_blocks_ = experiment.estimators.front().system.layout.blocks().size();
+    system_blocks_ = experiment.estimators.front().problem.layout.blocks().size();
   }
   void OnEstimate(int estimator, const SourceFrame& /*frame*/, const State& state,
                   const UpdateReport& report) override {

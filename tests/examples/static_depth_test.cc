@@ -43,11 +43,11 @@ TEST(StaticDepth, ItsNumbersAreThoseOfExample05) {
 TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
   const Config config = Example05();
   const PluginHost host;
-  const System system = ReadProblem(config.root(), host, {});
+  const Problem problem = ReadProblem(config.root(), host, {});
   EkfOptions options;
   options.gate = 0.9999;
   options.fuse = Fuse::kPerMeasurement;
-  Ekf engine(system, options, {{"disparity", 1}, {"inverse_scale", 1}});
+  Ekf engine(problem, options, {{"disparity", 1}, {"inverse_scale", 1}});
   std::FILE* printed = ::popen(ALIDADE_BINARY_DIR "/bin/example_static_depth", "r");
   ASSERT_NE(printed, nullptr);
   char line[128];

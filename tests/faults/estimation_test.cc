@@ -6,7 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/filter_engine.h"
 #include "alidade/estimation/iekf.h"
 #include "support/recording.h"
 #include "support/systems.h"
@@ -34,18 +34,18 @@ struct Difference : Sensor<Vec<1>, Vec<2>> {
 };
 
 /// Two elements x with the covariance P, and their difference measured.
-System TwoElements(const Eigen::Matrix2d& p, double sigma) {
-  System system;
+Problem TwoElements(const Eigen::Matrix2d& p, double sigma) {
+  Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
-  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model->blocks()[0]));
+  binding.blocks.push_back(problem.layout.Declare("p.x", "p", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {1.0, 2.0};
   prior.covariance = p;
-  system.priors.push_back(prior);
-  system.motions.push_back(binding);
-  AddSensor(system, "difference", MakeSensor(Difference(sigma), "difference"), {"p.x"});
-  return system;
+  problem.priors.push_back(prior);
+  problem.motions.push_back(binding);
+  AddSensor(problem, "difference", MakeSensor(Difference(sigma), "difference"), {"p.x"});
+  return problem;
 }
 
 /// Eigenvalues 2.1 and -0.1; S = 1 - 2.2 + 1 + 0.01 < 0.
@@ -53,10 +53,11 @@ Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).
 
 // FAULTS 75
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
-  const System system = TwoElements(Indefinite(), 0.1);
+  const Problem problem = TwoElements(Indefinite(), 0.1);
   for (const bool iterated : {false, true}) {
-    std::unique_ptr<Filter> filter = std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
-    if (iterated) filter = std::make_unique<Iekf>(system, IekfOptions{}, StreamsOf(system));
+    std::unique_ptr<Filter> filter =
+        std::make_unique<Ekf>(problem, EkfOptions{}, StreamsOf(problem));
+    if (iterated) filter = std::make_unique<Iekf>(problem, IekfOptions{}, StreamsOf(problem));
     const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
     EXPECT_TRUE(HasEvent(report, "repaired"));
@@ -82,10 +83,10 @@ struct Open : Ekf {
 
 // FAULTS 75: the budget.
 TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
-  const System system = TwoElements(Indefinite(), 0.1);
+  const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
   options.max_covariance_repairs = 3;
-  Open ekf(system, options, StreamsOf(system));
+  Open ekf(problem, options, StreamsOf(problem));
   for (int k = 0; k <= options.max_covariance_repairs; ++k) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
@@ -97,10 +98,10 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
 
 // FAULTS 75: a repair that is taken back, as for a late frame, does not count.
 TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
-  const System system = TwoElements(Indefinite(), 0.1);
+  const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
   options.max_covariance_repairs = 1;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   const Ekf before = ekf;
   for (int k = 0; k < 3; ++k) {
     EXPECT_TRUE(HasEvent(ekf.Process(FrameAt(0.0, {{0, -1.0}})), "repaired")) << k;
@@ -114,11 +115,11 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec named;
   named.name = "indefinite";
-  named.system = TwoElements(Indefinite(), 0.1);
-  named.system.sensors[0].stream = "inverse_scale";
+  named.problem = TwoElements(Indefinite(), 0.1);
+  named.problem.sensors[0].stream = "inverse_scale";
   EkfOptions options;
   options.max_covariance_repairs = 0;
-  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  named.estimator = std::make_unique<Ekf>(named.problem, options, experiment.source->streams());
   experiment.estimators.push_back(std::move(named));
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kDiverged);
@@ -136,8 +137,8 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
 // FAULTS 79: S = H P H' + R = 0, though P is as it should be.
 TEST(SingularInnovation, IsReportedAndChangesNothing) {
   const Eigen::Matrix2d ones = Eigen::Matrix2d::Ones();  // x0 - x1 is known exactly
-  const System system = TwoElements(ones, 0.0);
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = TwoElements(ones, 0.0);
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -0.5}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
   ASSERT_TRUE(HasEvent(report, "not_pd"));
@@ -152,11 +153,11 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
 
 // FAULTS 79: the same measurement twice without noise; one by one each S is as it should be.
 TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});
-  AddSensor(system, "one", LinearSensor(1.0, 0.0), {"p.x"});
-  AddSensor(system, "two", LinearSensor(1.0, 0.0), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});
+  AddSensor(problem, "one", LinearSensor(1.0, 0.0), {"p.x"});
+  AddSensor(problem, "two", LinearSensor(1.0, 0.0), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 3.0}, {1, 4.0}}));
   for (const MeasurementReport& entry : report.measurements()) {
     EXPECT_EQ(entry.outcome, Outcome::kNotPd);

@@ -85,37 +85,37 @@ struct Itself : Sensor<G, G> {
 };
 
 /// A body at rest at first, whose position and orientation are measured.
-System MeasuredPose(const SharedMotion& model) {
-  System system;
+Problem MeasuredPose(const SharedMotion& model) {
+  Problem problem;
   MotionBinding binding{"body", model, {}};
   const Blocks means{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   for (std::size_t i = 0; i < means.size(); ++i) {
     const Space& space = model->blocks()[i];
-    const BlockId id = system.layout.Declare("body." + space.name, "body", space);
+    const BlockId id = problem.layout.Declare("body." + space.name, "body", space);
     binding.blocks.push_back(id);
-    system.priors.push_back({id, means[i], 0.0025 * Eigen::Matrix3d::Identity(), ""});
+    problem.priors.push_back({id, means[i], 0.0025 * Eigen::Matrix3d::Identity(), ""});
   }
-  system.motions.push_back(binding);
+  problem.motions.push_back(binding);
   const auto add = [&](const std::string& name, const SharedSensor& sensor, BlockId id) {
-    SensorBinding& bound = system.sensors.emplace_back(name, name, sensor);
+    SensorBinding& bound = problem.sensors.emplace_back(name, name, sensor);
     bound.roles.resize(1);
     bound.roles[0].block = id;
   };
   add("position", MakeSensor(Itself<Vec<3>>(), "position"), 0);
   add("orientation", MakeSensor(Itself<UnitQuaternion>(), "orientation"), 1);
-  return system;
+  return problem;
 }
 
 // Velocities of some 0.3 m/s and rad/s: the filters differ by what a step of 0.03 rad bends.
 TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
   const auto motion = AbiMotion<QuaternionPose>(kNoise);
-  const System system = MeasuredPose(motion);
+  const Problem problem = MeasuredPose(motion);
   for (const double alpha : {1e-4, 1e-3, 0.01, 0.1, 1.0}) {
     UkfOptions options;
     options.alpha = alpha;
     const std::vector<StreamInfo> streams{{"position", 3}, {"orientation", 4}};
-    Ukf ukf(system, options, streams);
-    Ekf ekf(system, {}, streams);
+    Ukf ukf(problem, options, streams);
+    Ekf ekf(problem, {}, streams);
     Random random(43);
     Blocks x{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     for (int k = 0; k < 1000; ++k) {

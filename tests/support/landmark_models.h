@@ -10,30 +10,30 @@
 #include "alidade/estimation/ekf.h"
 #include "support/landmark_sensors.h"
 
-/// Small systems with landmarks composed in C++, for tests.
+/// Small problems with landmarks composed in C++, for tests.
 namespace alidade::testing {
 
 /// Block `cam.position`, known at first to `sigma_0`, and the sensor `tracks`.
 template <class Model>
-System MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
-  System system;
+Problem MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
+  Problem problem;
   const SharedMotion walk = MakeMotion(Walk(0.1), "walk");
-  const BlockId id = system.layout.Declare("cam.position", "cam", walk->blocks()[0]);
-  system.motions.push_back({"cam", walk, {id}});
+  const BlockId id = problem.layout.Declare("cam.position", "cam", walk->blocks()[0]);
+  problem.motions.push_back({"cam", walk, {id}});
   Prior prior;
   prior.block = id;
   prior.mean = {0.0, 0.0, 0.0};
   prior.covariance = sigma_0 * sigma_0 * Eigen::Matrix3d::Identity();
-  system.priors.push_back(prior);
+  problem.priors.push_back(prior);
   SensorBinding binding{"tracks", "tracks", MakeSensor(model, "tracks"), {}};
   binding.roles.resize(binding.model->roles().size());
   binding.roles[0].block = id;
   if constexpr (Model::Measurement::kAmbient == 2) {
     binding.xyz = MakeSensor(XyzPixels(model.sigma), "xyz");
   }
-  system.sensors.push_back(binding);
-  system.landmarks = options;
-  return system;
+  problem.sensors.push_back(binding);
+  problem.landmarks = options;
+  return problem;
 }
 
 inline LandmarkOptions WithPrior(double inverse_distance = 0.5, double sigma = 0.25) {
@@ -57,9 +57,9 @@ inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   return frame;
 }
 
-/// The filter of a system whose source has the stream `tracks` alone.
-inline Ekf EkfOf(const System& system, const EkfOptions& options = {}) {
-  return {system, options, {{"tracks", system.sensors[0].model->measurement().geometry.ambient}}};
+/// The filter of a problem whose source has the stream `tracks` alone.
+inline Ekf EkfOf(const Problem& problem, const EkfOptions& options = {}) {
+  return {problem, options, {{"tracks", problem.sensors[0].model->measurement().geometry.ambient}}};
 }
 
 /// What became of the measurement of a landmark; kFailed: there is none.

@@ -79,10 +79,10 @@ inline Experiment MakeExperiment(int frames = 60) {
     EstimatorSpec named;
     named.name = name;
     named.type = "ekf";
-    named.system = DepthFilter();
-    if (named.name == "alone") named.system.sensors.pop_back();
+    named.problem = DepthFilter();
+    if (named.name == "alone") named.problem.sensors.pop_back();
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(named));
   }
   experiment.seed = 42;

@@ -11,7 +11,7 @@
 #include "alidade/testing/frames.h"
 #include "motion_models/constant_velocity.h"
 
-/// Small systems composed in C++, for tests.
+/// Small problems composed in C++, for tests.
 namespace alidade::testing {
 
 /// z = gain x + n, linear: the Kalman filter is exact.
@@ -49,10 +49,10 @@ struct GivenPrior {
 };
 
 /// Adds a state entry whose scalar blocks start at the given priors.
-void AddMotion(System& system, const std::string& name, const SharedMotion& model,
+void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors);
 /// Adds a sensor of the stream of its name.
-void AddSensor(System& system, const std::string& name, const SharedSensor& model,
+void AddSensor(Problem& problem, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks);
 
 /// Constant velocity but for an acceleration that each step has by itself, constant during it.
@@ -62,16 +62,16 @@ struct Jolted : ConstantVelocity<1, false> {
 };
 
 /// A point that moves with constant velocity, jolted at each step: blocks `p.x`, `p.v`.
-System MovingPoint(double acceleration = 1.0);
+Problem MovingPoint(double acceleration = 1.0);
 /// The same, with an acceleration that is held from one update to the next.
-System HeldPoint(double acceleration = 1.0);
+Problem HeldPoint(double acceleration = 1.0);
 
 /// The depth filter: blocks `target.depth`, `target.depth_rate`, `template.inverse_distance`;
 /// sensors `disparity` (BF = 26 px m, 1 px) and `inverse_scale` (300 px, 1 px).
-System DepthFilter();
+Problem DepthFilter();
 
-/// The same system, the block `name` (empty: every block) estimated, consider or constant.
-System WithStatus(System system, const std::string& name, BlockStatus status);
+/// The same problem, the block `name` (empty: every block) estimated, consider or constant.
+Problem WithStatus(Problem problem, const std::string& name, BlockStatus status);
 
 /// z = sqrt(5 - x), not a number once x passes 5, and no more its Jacobian.
 struct Broken : Sensor<Vec<1>, Vec<1>> {
@@ -90,6 +90,6 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
 };
 
 /// An orientation that walks at random, known to 0.1 rad at first and measured to 0.05 rad.
-System WalkingOrientation();
+Problem WalkingOrientation();
 
 }  // namespace alidade::testing

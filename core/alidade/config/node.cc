@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/read_number.h"
 #include "alidade/config/unread_keys.h"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade::internal {
 namespace {

@@ -7,13 +7,13 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/stacked_measurements.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 
-Consensus::Consensus(const System& system) {
-  for (const SensorBinding& sensor : system.sensors) {
+Consensus::Consensus(const Problem& problem) {
+  for (const SensorBinding& sensor : problem.sensors) {
     const int dof = sensor.model->measurement().geometry.tangent;
     const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
     support_.push_back(ChiSquareQuantile(ransac.inlier_probability, dof));
@@ -21,23 +21,26 @@ Consensus::Consensus(const System& system) {
   }
 }
 
-bool Consensus::IsAsked(std::span<Row* const> rows) {
-  return std::ranges::any_of(
-      rows, [](const Row* row) { return row->binding->outlier_rejection.has_value(); });
+bool Consensus::IsAsked(std::span<PendingMeasurement* const> rows) {
+  return std::ranges::any_of(rows, [](const PendingMeasurement* pending) {
+    return pending->binding->outlier_rejection.has_value();
+  });
 }
 
-[[gnu::noinline]] void Consensus::Split(FilterState& f, std::span<Row* const> rows,
-                                        std::uint64_t seed, std::vector<Row*>& agreed,
-                                        std::vector<Row*>& rest) {
+[[gnu::noinline]] void Consensus::Split(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                        std::uint64_t seed,
+                                        std::vector<PendingMeasurement*>& agreed,
+                                        std::vector<PendingMeasurement*>& rest) {
   matches_.clear();
-  for (Row* const row : rows) {
-    (row->binding->outlier_rejection ? matches_ : agreed).push_back(row);
+  for (PendingMeasurement* const pending : rows) {
+    (pending->binding->outlier_rejection ? matches_ : agreed).push_back(pending);
   }
   FindBest(f, seed);
   for (std::size_t i = 0; i < matches_.size(); ++i) {
     (best_[i] != 0 ? agreed : rest).push_back(matches_[i]);
   }
-  std::ranges::sort(agreed, {}, [](const Row* row) { return row->linearised.column; });
+  std::ranges::sort(agreed, {},
+                    [](const PendingMeasurement* pending) { return pending->linearised.column; });
 }
 
 /// The best support, in best_.
@@ -48,8 +51,8 @@ void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
   best_.assign(matches_.size(), 0);
   std::ptrdiff_t most = 0;
   double failure = 1.0;  // the least that a sensor allows
-  for (const Row* const row : matches_) {
-    failure = std::min(failure, 1.0 - row->binding->outlier_rejection->confidence);
+  for (const PendingMeasurement* const pending : matches_) {
+    failure = std::min(failure, 1.0 - pending->binding->outlier_rejection->confidence);
   }
   double tries = static_cast<double>(order_.size());
   for (std::size_t k = 0; static_cast<double>(k) < tries; ++k) {
@@ -71,10 +74,10 @@ void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
 /// by itself, as an update would: consider states stay, and known roles are seen as they are.
 void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const Workspace::Use use(f.work);
-  const Row& one = *matches_[hypothesis];
+  const PendingMeasurement& one = *matches_[hypothesis];
   const MeasurementReport& own = *one.report;
   const Eigen::Index n = f.size(), m = own.dof;
-  const std::span<Row* const> itself = std::span(matches_).subspan(hypothesis, 1);
+  const std::span<PendingMeasurement* const> itself = std::span(matches_).subspan(hypothesis, 1);
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
   s = Eigen::Map<const RowMajor>(own.s.data(), m, m);
@@ -90,14 +93,14 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   f.state.Retract(dx.data(), f.moved);
   agrees_.assign(matches_.size(), 0);
   for (std::size_t i = 0; i < matches_.size(); ++i) {
-    Row& row = *matches_[i];
-    const MeasurementReport& entry = *row.report;
+    PendingMeasurement& pending = *matches_[i];
+    const MeasurementReport& entry = *pending.report;
     h_.resize(entry.z.size());
     r_.resize(entry.innovation.size());
-    if (PredictAt(f, row, f.moved, h_.data()) != Outcome::kAccepted) continue;
-    row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
-    const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, f.work);
-    agrees_[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
+    if (PredictAt(f, pending, f.moved, h_.data()) != Outcome::kAccepted) continue;
+    pending.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
+    const double d2 = SquaredMahalanobis(pending.R.data(), r_.data(), entry.dof, f.work);
+    agrees_[i] = d2 <= support_[static_cast<std::size_t>(pending.sensor)] ? 1 : 0;
   }
 }
 

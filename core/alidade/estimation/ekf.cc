@@ -3,12 +3,12 @@
 
 #include <utility>
 
-#include "alidade/estimation/linear.h"
+#include "alidade/estimation/ekf_equations.h"
 
 namespace alidade {
 
-Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(CheckedProblem(std::move(system), "Ekf", kSupport), options, streams,
-             std::make_unique<internal::Linear>()) {}
+Ekf::Ekf(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(CheckedProblem(std::move(problem), "Ekf", kCapabilities), options, streams,
+             std::make_unique<internal::EkfEquations>()) {}
 
 }  // namespace alidade

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/support.h"
 
 namespace alidade {
 
@@ -28,19 +28,19 @@ namespace alidade {
 /// Where S is not positive definite because P is not positive semi-definite, P is repaired (event
 /// `repaired`: negative pivots of its L D L' count as zero); after `max_covariance_repairs` of that
 /// the next ends the filter.
-/// Its method is internal::Linear (linear.h).
+/// Its method is internal::EkfEquations (ekf_equations.h).
 class Ekf : public Filter {
  public:
   /// All there is.
-  static constexpr Support kSupport = {.consider = true,
-                                       .at_measurement = true,
-                                       .from_measurement = true,
-                                       .recovery = true,
-                                       .landmarks = true};
+  static constexpr EstimatorCapabilities kCapabilities = {.consider = true,
+                                                          .at_measurement = true,
+                                                          .from_measurement = true,
+                                                          .recovery = true,
+                                                          .landmarks = true};
 
   /// `streams` are the source's, in the order of Measurement::stream.
-  Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
-  explicit Ekf(const System& problem, const EkfOptions& options = {})
+  Ekf(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Ekf(const Problem& problem, const EkfOptions& options = {})
       : Ekf(problem, options, problem.streams) {}
 };
 

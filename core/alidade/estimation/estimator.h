@@ -66,7 +66,7 @@ struct MeasurementReport {
   MeasurementReport(int of_sensor, Outcome became, std::int64_t of_landmark, int tangent_size)
       : sensor(of_sensor), outcome(became), landmark(of_landmark), dof(tangent_size) {}
 
-  int sensor = -1;  ///< index into System::sensors
+  int sensor = -1;  ///< index into Problem::sensors
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
@@ -144,7 +144,7 @@ class UpdateReport {
   void ClearMeasurements() { measurements_.Clear(); }
 
   bool stale = false;       ///< the frame is older than the state, which stays as it was
-  std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
+  std::vector<int> inputs;  ///< motion models whose control input was taken, as in Problem::motions
   std::vector<Event> events;
   LandmarkCounts landmarks;
   /// Those that the frame removed from the state, as they were then. Those of a batch are not here.
@@ -156,7 +156,7 @@ class UpdateReport {
   MeasurementReports measurements_;
 };
 
-/// An estimator over one system. It takes values and returns values: it neither reads files nor
+/// An estimator over one problem. It takes values and returns values: it neither reads files nor
 /// prints nor exits.
 class Estimator {
  public:

@@ -7,12 +7,12 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
-#include "alidade/estimation/frame_loop.h"
+#include "alidade/base/text.h"
+#include "alidade/estimation/filter_engine.h"
 
 namespace alidade {
 
-using internal::FrameLoop;
+using internal::FilterEngine;
 
 namespace {
 
@@ -30,15 +30,15 @@ void CheckKnown(const std::string& what, int size, const std::vector<double>& kn
 }
 
 /// Index of the sensor, which takes as many known numbers.
-int FindSensor(const System& system, std::string_view name, const std::vector<double>& known) {
-  const int index = system.FindSensor(name);
-  if (index < 0) RefuseName("sensor", name, internal::NamesOf(system.sensors));
+int FindSensor(const Problem& problem, std::string_view name, const std::vector<double>& known) {
+  const int index = problem.FindSensor(name);
+  if (index < 0) RefuseName("sensor", name, internal::NamesOf(problem.sensors));
   CheckKnown("sensor '" + std::string(name) + '\'',
-             system.sensors[static_cast<std::size_t>(index)].model->known_size(), known);
+             problem.sensors[static_cast<std::size_t>(index)].model->known_size(), known);
   return index;
 }
 
-void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
+void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
     throw Error(ExitCode::kBadData, "no stream " + std::to_string(one.stream) +
@@ -51,7 +51,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                                         std::to_string(one.values.size()));
   }
   CheckKnown("stream '" + stream.name + '\'', stream.known, one.known);
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model->measurement().geometry;
     const double defect = DistanceFrom(geometry, one.values.data());
@@ -70,9 +70,10 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
 
 }  // namespace
 
-Filter::Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
-               std::unique_ptr<internal::Method> method)
-    : loop_(std::make_unique<FrameLoop>(std::move(system), options, streams, std::move(method))) {}
+Filter::Filter(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+               std::unique_ptr<internal::UpdateMethod> method)
+    : loop_(std::make_unique<FilterEngine>(std::move(problem), options, streams,
+                                           std::move(method))) {}
 
 void Filter::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
 
@@ -81,7 +82,7 @@ const UpdateReport& Filter::Process(const Frame& frame) {
   return loop_->f.report;
 }
 
-const System& Filter::system() const { return loop_->f.binding->system; }
+const Problem& Filter::problem() const { return loop_->f.index->problem; }
 const State& Filter::state() const { return loop_->f.state; }
 Timestamp Filter::timestamp() const { return loop_->f.timestamp; }
 bool Filter::diverged() const { return loop_->f.health.diverged; }
@@ -93,15 +94,15 @@ std::vector<LandmarkEstimate> Filter::landmarks() const {
 }
 
 int Filter::stream(std::string_view name) const {
-  const std::vector<StreamInfo>& streams = loop_->f.binding->streams;
+  const std::vector<StreamInfo>& streams = loop_->f.index->streams;
   const auto found = std::ranges::find(streams, name, &StreamInfo::name);
   if (found == streams.end()) RefuseName("stream", name, internal::NamesOf(streams));
   return static_cast<int>(found - streams.begin());
 }
 
 BlockId Filter::block(std::string_view name) const {
-  const BlockId id = system().layout.Find(name);
-  if (id < 0) RefuseName("block", name, internal::NamesOf(system().layout.blocks()));
+  const BlockId id = problem().layout.Find(name);
+  if (id < 0) RefuseName("block", name, internal::NamesOf(problem().layout.blocks()));
   return id;
 }
 
@@ -109,7 +110,7 @@ Frame Filter::MakeFrame(Timestamp timestamp, const std::vector<Reading>& reading
   Frame frame;
   frame.timestamp = timestamp;
   for (const Reading& one : readings) {
-    CheckReading(loop_->f.binding->streams, system(), one);
+    CheckReading(loop_->f.index->streams, problem(), one);
     frame.measurements.push_back(
         {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
   }
@@ -123,7 +124,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 BlockEstimate Filter::Estimate(BlockId id) const { return state().Estimate(id); }
 
 State Filter::At(Timestamp timestamp) const {
-  FrameLoop later(*loop_);
+  FilterEngine later(*loop_);
   later.Process({timestamp, {}});
   return std::move(later.f.state);
 }
@@ -131,8 +132,8 @@ State Filter::At(Timestamp timestamp) const {
 std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp timestamp,
                                          std::int64_t landmark,
                                          const std::vector<double>& known) const {
-  const int index = FindSensor(system(), sensor, known);
-  FrameLoop later(*loop_);
+  const int index = FindSensor(problem(), sensor, known);
+  FilterEngine later(*loop_);
   later.Process({timestamp, {}});
   return later.Expect(index, landmark, known);
 }
@@ -140,10 +141,10 @@ std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp time
 std::vector<std::optional<Prediction>> Filter::ExpectEach(
     std::string_view sensor, Timestamp timestamp,
     const std::vector<std::int64_t>& landmarks) const {
-  const int index = FindSensor(system(), sensor, {});
+  const int index = FindSensor(problem(), sensor, {});
   std::vector<std::optional<Prediction>> each;
   if (landmarks.empty()) return each;
-  FrameLoop later(*loop_);
+  FilterEngine later(*loop_);
   later.Process({timestamp, {}});
   for (const std::int64_t landmark : landmarks) each.push_back(later.Expect(index, landmark, {}));
   return each;

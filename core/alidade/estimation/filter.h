@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/base/indirect.h"
+#include "alidade/base/clone_ptr.h"
 #include "alidade/estimation/estimator.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 namespace alidade {
 
@@ -49,8 +49,8 @@ struct EkfOptions {
 
 namespace internal {
 
-class FrameLoop;
-class Method;
+class FilterEngine;
+class UpdateMethod;
 
 inline EkfOptions WithoutRecovery(EkfOptions options) {
   options.rejection_recovery = RejectionRecovery::kNone;
@@ -87,7 +87,7 @@ struct Prediction {
   Eigen::MatrixXd s;      ///< S = H P H' + R, m x m
 };
 
-/// A recursive estimator over one system: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
+/// A recursive estimator over one problem: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
 /// snapshot of it, and goes on by itself. What was moved from may be assigned to or destroyed, no
 /// more.
 ///
@@ -127,12 +127,12 @@ class Filter : public Estimator {
   bool diverged() const override;
   bool failed() const override;
 
-  const System& system() const;
+  const Problem& problem() const;
 
   // Live.
   /// Index of a stream, for Reading::stream. Error kBadConfig where there is none.
   int stream(std::string_view name) const;
-  /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
+  /// Id of a block of the problem, `owner.block`. Error kBadConfig where there is none.
   BlockId block(std::string_view name) const;
   /// The readings of one timestamp as a frame. Errors: kBadData for a stream that is not there,
   /// values, a covariance or known numbers of another size than its sensors take, or a quaternion
@@ -176,14 +176,14 @@ class Filter : public Estimator {
  protected:
   /// @cond
   /// `streams` are the source's, in the order of Measurement::stream.
-  Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
-         std::unique_ptr<internal::Method> method);
-  internal::FrameLoop& loop() { return *loop_; }
-  const internal::FrameLoop& loop() const { return *loop_; }
+  Filter(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+         std::unique_ptr<internal::UpdateMethod> method);
+  internal::FilterEngine& loop() { return *loop_; }
+  const internal::FilterEngine& loop() const { return *loop_; }
   /// @endcond
 
  private:
-  Indirect<internal::FrameLoop> loop_;
+  ClonePtr<internal::FilterEngine> loop_;
 };
 
 }  // namespace alidade

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/motions.h"
+#include "alidade/estimation/problem_index.h"
 #include "alidade/state/kalman_update.h"
 #include "alidade/state/state.h"
 #include "alidade/state/workspace.h"
@@ -31,24 +31,24 @@ struct Health {
 /// Only a Method changes P of blocks that have a value, but where the part that does it says so: a
 /// method may carry a root. A copy is a snapshot.
 struct FilterState {
-  FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
+  FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Has to be called when a block of the system gets a value, its first or another one in place of
-  /// a rejected one.
+  /// Has to be called when a block of the problem gets a value, its first or another one in place
+  /// of a rejected one.
   void Activate();
   /// Whether there are any first_estimates.
   bool keeps_first_estimates() const { return keeps_first_estimates_; }
 
-  std::shared_ptr<const Binding> binding;
+  std::shared_ptr<const ProblemIndex> index;
   State state;
   Timestamp timestamp = kNoTimestamp;  ///< of the state
   Motions motions;
-  /// By block of the system: the value that H is taken at; empty: the latest.
+  /// By block of the problem: the value that H is taken at; empty: the latest.
   std::vector<std::vector<double>> first_estimates;
   UpdateReport report;  ///< of the frame
   Health health;
-  /// What Activate last found among the blocks of the system.
+  /// What Activate last found among the blocks of the problem.
   struct {
     bool waiting = false;        ///< one has no value yet
     bool considering = false;    ///< one is a consider state

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/rows.h"
+#include "alidade/estimation/pending_measurements.h"
 
 namespace alidade::internal {
 
@@ -15,16 +15,16 @@ namespace alidade::internal {
 /// snapshot.
 class Gate {
  public:
-  Gate(const System& system, const EkfOptions& options);
+  Gate(const Problem& problem, const EkfOptions& options);
 
   /// Takes the NIS of a row with r, R and S, finds w, and returns whether it passes: kAccepted, or
   /// why not. What lies so far out that its R / w is not finite does not.
-  Outcome Test(FilterState& f, Row& row, double nis) {
-    return nis <= thresholds_[static_cast<std::size_t>(row.sensor)] ? Pass(f, row, nis)
-                                                                    : Refuse(f, row, nis);
+  Outcome Test(FilterState& f, PendingMeasurement& pending, double nis) {
+    return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Pass(f, pending, nis)
+                                                                        : Refuse(f, pending, nis);
   }
   /// R <- R / w in R and in S, of rows that passed.
-  void ApplyRobustWeights(std::span<Row* const> rows) const;
+  void ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const;
 
   /// Counts what became of one measurement. Whether its sensor was rejected so often in a row that
   /// it has to recover; from there it counts anew.
@@ -39,23 +39,23 @@ class Gate {
   }
 
  private:
-  Outcome Pass(FilterState& f, Row& row, double nis) {
-    CheckConditioning(f, row);
-    row.report->nis = nis;
-    row.weight = 1.0;
-    return row.binding->loss.kind == LossKind::kNone ? Outcome::kAccepted : Weigh(row, nis);
+  Outcome Pass(FilterState& f, PendingMeasurement& pending, double nis) {
+    CheckConditioning(f, pending);
+    pending.report->nis = nis;
+    pending.weight = 1.0;
+    return pending.binding->loss.kind == LossKind::kNone ? Outcome::kAccepted : Weigh(pending, nis);
   }
-  Outcome Refuse(FilterState& f, Row& row, double nis);
-  static Outcome Defect(FilterState& f, Row& row);
-  static Outcome Weigh(Row& row, double nis);
-  void CheckConditioning(FilterState& f, const Row& row) {
-    const auto m = static_cast<std::size_t>(row.place->dof);
+  Outcome Refuse(FilterState& f, PendingMeasurement& pending, double nis);
+  static Outcome Defect(FilterState& f, PendingMeasurement& pending);
+  static Outcome Weigh(PendingMeasurement& pending, double nis);
+  void CheckConditioning(FilterState& f, const PendingMeasurement& pending) {
+    const auto m = static_cast<std::size_t>(pending.place->dof);
     for (std::size_t i = 0; i < m; ++i) {  // on the diagonals of R and S
       const std::size_t at = i * (m + 1);
-      if (!(row.R[at] > 1e-13 * row.s[at])) return WarnOfConditioning(f, row, at);
+      if (!(pending.R[at] > 1e-13 * pending.s[at])) return WarnOfConditioning(f, pending, at);
     }
   }
-  void WarnOfConditioning(FilterState& f, const Row& row, std::size_t i);
+  void WarnOfConditioning(FilterState& f, const PendingMeasurement& pending, std::size_t i);
   bool CountRejection(const MeasurementReport& entry);
 
   bool gates_;                      ///< whether there is a gate: else what overflows passes too

@@ -8,10 +8,10 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/frame_loop.h"
-#include "alidade/estimation/linear.h"
-#include "alidade/estimation/method.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/ekf_equations.h"
+#include "alidade/estimation/filter_engine.h"
+#include "alidade/estimation/stacked_measurements.h"
+#include "alidade/estimation/update_method.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -24,18 +24,24 @@ double SquaredNorm(const Workspace::Matrix& l, Workspace::Vector& r) {
   return r.squaredNorm();
 }
 
-/// Gauss-Newton over an update of Linear.
-class Iterated : public Method {
+/// Gauss-Newton over an update of EkfEquations.
+class IekfEquations : public UpdateMethod {
  public:
-  Iterated(int max_iterations, double tolerance)
+  IekfEquations(int max_iterations, double tolerance)
       : max_iterations_(max_iterations), tolerance_(tolerance) {}
 
-  std::unique_ptr<Method> Clone() const override { return std::make_unique<Iterated>(*this); }
-  Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
+  std::unique_ptr<UpdateMethod> Clone() const override {
+    return std::make_unique<IekfEquations>(*this);
+  }
+  StepError Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
   void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
-  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeNis(FilterState& f, Row& row) override { return linear_.ComputeNis(f, row); }
-  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+  Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
+    return linear_.Predict(f, pending);
+  }
+  double ComputeNis(FilterState& f, PendingMeasurement& pending) override {
+    return linear_.ComputeNis(f, pending);
+  }
+  Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
  private:
   struct Minimum {
@@ -49,32 +55,34 @@ class Iterated : public Method {
   struct Direction {
     const Workspace::Vector &dx, &v, &step, &step_v;
   };
-  std::optional<Minimum> Minimise(FilterState& f, std::span<Row* const> rows);
-  double PartThatLowersTheCost(FilterState& f, std::span<Row* const> rows, const Direction& at,
-                               const Workspace::Matrix& r, Workspace::Vector& residual);
+  std::optional<Minimum> Minimise(FilterState& f, std::span<PendingMeasurement* const> rows);
+  double PartThatLowersTheCost(FilterState& f, std::span<PendingMeasurement* const> rows,
+                               const Direction& at, const Workspace::Matrix& r,
+                               Workspace::Vector& residual);
   bool MoveTo(FilterState& f, const double* dx);
-  bool Innovations(FilterState& f, std::span<Row* const> rows, Workspace::Vector& innovations);
-  bool Relinearise(FilterState& f, std::span<Row* const> rows, const double* dx);
+  bool Innovations(FilterState& f, std::span<PendingMeasurement* const> rows,
+                   Workspace::Vector& innovations);
+  bool Relinearise(FilterState& f, std::span<PendingMeasurement* const> rows, const double* dx);
 
-  Linear linear_;
+  EkfEquations linear_;
   int max_iterations_;
   double tolerance_;
   std::vector<double> iterate_;        ///< values on the way; the state is the prior
   std::vector<double> at_prediction_;  ///< h, innovations and S of its rows
 };
 
-Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
+Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Workspace::Use use(f.work);
   at_prediction_.clear();
-  for (const Row* row : rows) {
-    at_prediction_.insert(at_prediction_.end(), row->h, row->s + row->report->s.size());
+  for (const PendingMeasurement* pending : rows) {
+    at_prediction_.insert(at_prediction_.end(), pending->h, pending->s + pending->report->s.size());
   }
   const std::optional<Minimum> minimum = Minimise(f, rows);
   const Outcome outcome = linear_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
   const double* at = at_prediction_.data();
-  for (const Row* row : rows) {
-    const auto count = row->s + row->report->s.size() - row->h;
-    std::copy_n(at, count, row->h);
+  for (const PendingMeasurement* pending : rows) {
+    const auto count = pending->s + pending->report->s.size() - pending->h;
+    std::copy_n(at, count, pending->h);
     at += count;
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
@@ -91,7 +99,8 @@ Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
 /// The optimum of one update, or the last iterate on the way, which the rows are then linearised
 /// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
 /// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
-std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Row* const> rows) {
+std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
+    FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
   linear_.AssignColumns(f, rows);
   Minimum minimum{f.work.Take(n)};
@@ -147,9 +156,10 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
 /// The largest of 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not rise, but for
 /// what rounding makes of it; 0 where there is none. `r` is the factor of R, `residual` the
 /// innovations at dx, then memory.
-double Iterated::PartThatLowersTheCost(FilterState& f, std::span<Row* const> rows,
-                                       const Direction& at, const Workspace::Matrix& r,
-                                       Workspace::Vector& residual) {
+double IekfEquations::PartThatLowersTheCost(FilterState& f,
+                                            std::span<PendingMeasurement* const> rows,
+                                            const Direction& at, const Workspace::Matrix& r,
+                                            Workspace::Vector& residual) {
   constexpr double kRounding = 1e-12;
   constexpr int kHalvings = 10;
   const Workspace::Use use(f.work);
@@ -167,31 +177,34 @@ double Iterated::PartThatLowersTheCost(FilterState& f, std::span<Row* const> row
 }
 
 /// Puts the iterate at prior (+) dx. False where that is not finite.
-bool Iterated::MoveTo(FilterState& f, const double* dx) { return f.state.Retract(dx, iterate_); }
+bool IekfEquations::MoveTo(FilterState& f, const double* dx) {
+  return f.state.Retract(dx, iterate_);
+}
 
 /// z (-) h at the iterate, of all rows; false where one is not defined or not finite.
-bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
-                           Workspace::Vector& innovations) {
+bool IekfEquations::Innovations(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                Workspace::Vector& innovations) {
   Eigen::Index at = 0;
-  for (Row* row : rows) {
-    const SensorModel& model = *row->model;
-    if (PredictAt(f, *row, iterate_, row->h) != Outcome::kAccepted) return false;
-    model.measurement().geometry.Minus(row->z, row->h, innovations.data() + at);
-    at += row->report->dof;
+  for (PendingMeasurement* pending : rows) {
+    const SensorModel& model = *pending->model;
+    if (PredictAt(f, *pending, iterate_, pending->h) != Outcome::kAccepted) return false;
+    model.measurement().geometry.Minus(pending->z, pending->h, innovations.data() + at);
+    at += pending->report->dof;
   }
   return innovations.allFinite();
 }
 
 /// h, R, d h / d dx and S of all rows at the iterate, which lies at prior (+) dx.
-bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const double* dx) {
-  for (Row* row : rows) {
-    const SensorModel& model = *row->model;
-    const SensorPlace& place = *row->place;
-    const double* const* const roles = RolesAt(f, *row, iterate_);
-    if (LineariseAt(*row, roles) != Outcome::kAccepted) return false;
-    for (double& r : row->R) r /= row->weight;
-    ComputeInnovation(*row);
-    const double* const* const at = RolesAt(f, *row, f.state.values());
+bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                const double* dx) {
+  for (PendingMeasurement* pending : rows) {
+    const SensorModel& model = *pending->model;
+    const SensorPlace& place = *pending->place;
+    const double* const* const roles = RolesAt(f, *pending, iterate_);
+    if (LineariseAt(*pending, roles) != Outcome::kAccepted) return false;
+    for (double& r : pending->R) r /= pending->weight;
+    ComputeInnovation(*pending);
+    const double* const* const at = RolesAt(f, *pending, f.state.values());
     std::size_t part = 0;
     for (std::size_t i = 0; i < place.values.size(); ++i) {
       if (place.columns[i] < 0) continue;
@@ -201,9 +214,9 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       const Workspace::Use use(f.work);
       Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
       PlusJacobian(geometry, at[i], dx + offset, j.data());
-      ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
+      ChainJacobian(*pending, place.columns[i], geometry.tangent, j.data(), f.work);
     }
-    linear_.ComputeNis(f, *row);
+    linear_.ComputeNis(f, *pending);
   }
   return true;
 }
@@ -211,9 +224,9 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
 }  // namespace
 }  // namespace internal
 
-Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(CheckedProblem(std::move(system), "Iekf", kSupport), options, streams,
-             std::make_unique<internal::Iterated>(options.max_iterations, options.tolerance)) {
+Iekf::Iekf(Problem problem, const IekfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(CheckedProblem(std::move(problem), "Iekf", kCapabilities), options, streams,
+             std::make_unique<internal::IekfEquations>(options.max_iterations, options.tolerance)) {
   internal::ExpectOption(options.jacobian == JacobianPolicy::kLatest, "jacobian",
                          static_cast<double>(options.jacobian), "JacobianPolicy::kLatest");
   internal::ExpectOption(options.max_iterations > 1, "max_iterations", options.max_iterations,

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/support.h"
 
 namespace alidade {
 
@@ -33,13 +33,13 @@ struct IekfOptions : EkfOptions {
 class Iekf : public Filter {
  public:
   /// No consider blocks and roles, no role linearised at the measurement.
-  static constexpr Support kSupport = {
+  static constexpr EstimatorCapabilities kCapabilities = {
       .from_measurement = true, .recovery = true, .landmarks = true};
 
-  /// Errors: kBadConfig if `system` asks for more than kSupport, `jacobian` is not kLatest or an
-  /// option is out of its range.
-  Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
-  explicit Iekf(const System& problem, const IekfOptions& options = {})
+  /// Errors: kBadConfig if `problem` asks for more than kCapabilities, `jacobian` is not kLatest or
+  /// an option is out of its range.
+  Iekf(Problem problem, const IekfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Iekf(const Problem& problem, const IekfOptions& options = {})
       : Iekf(problem, options, problem.streams) {}
 };
 

@@ -22,7 +22,9 @@ Space Xyz() {
   return {"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
 }
 
-bool IsUsed(const Row& row) { return row.report->outcome == Outcome::kAccepted; }
+bool IsUsed(const PendingMeasurement& pending) {
+  return pending.report->outcome == Outcome::kAccepted;
+}
 
 /// Of a landmark that has a representation.
 std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
@@ -110,12 +112,12 @@ LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkR
 
 }  // namespace
 
-int Generations::Of(std::int64_t id) const {
+int LandmarkIdReuse::Of(std::int64_t id) const {
   const auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
   return found == ended_.end() || found->id != id ? 0 : found->generation;
 }
 
-void Generations::End(std::int64_t id, int generation) {
+void LandmarkIdReuse::End(std::int64_t id, int generation) {
   constexpr std::int64_t kMost = 100'000;
   auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
   if (found == ended_.end() || found->id != id) found = ended_.insert(found, Ended{});
@@ -124,9 +126,9 @@ void Generations::End(std::int64_t id, int generation) {
   std::erase_if(ended_, [&](const Ended& one) { return one.order <= ends_ - kMost / 2; });
 }
 
-LandmarkMap::LandmarkMap(const Binding& binding)
-    : options_(*binding.system.landmarks), xyz_(Xyz()) {
-  for (const SensorBinding& sensor : binding.system.sensors) {
+LandmarkMap::LandmarkMap(const ProblemIndex& index)
+    : options_(*index.problem.landmarks), xyz_(Xyz()) {
+  for (const SensorBinding& sensor : index.problem.sensors) {
     Family& family = families_.emplace_back();
     const std::vector<Space>& roles = sensor.model->roles();
     family.representation = RepresentationOf(roles);
@@ -170,25 +172,25 @@ void LandmarkMap::AddKnown(FilterState& f) {
   }
 }
 
-const double* LandmarkMap::CameraOf(const State& state, const Row& row) const {
-  const int position = FamilyOf(row).position;
+const double* LandmarkMap::CameraOf(const State& state, const PendingMeasurement& pending) const {
+  const int position = FamilyOf(pending).position;
   if (position < 0) return nullptr;
-  const BlockId id = row.binding->roles[static_cast<std::size_t>(position)].block;
+  const BlockId id = pending.binding->roles[static_cast<std::size_t>(position)].block;
   return id < 0 ? nullptr : state.value(id);
 }
 
-[[gnu::noinline]] void LandmarkMap::Attach(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void LandmarkMap::Attach(FilterState& f, std::span<PendingMeasurement> rows) {
   bool any = false;
-  for (Row& row : rows) {
-    if (!Has(row)) continue;
+  for (PendingMeasurement& pending : rows) {
+    if (!Has(pending)) continue;
     any = true;
-    Outcome& outcome = row.report->outcome;
+    Outcome& outcome = pending.report->outcome;
     if (outcome != Outcome::kAccepted) continue;
-    const auto found = landmarks_.find(row.measurement->landmark);
-    if (row.measurement->landmark < 0) {
+    const auto found = landmarks_.find(pending.measurement->landmark);
+    if (pending.measurement->landmark < 0) {
       outcome = Outcome::kInvalid;
     } else if (found != landmarks_.end() && found->second.in_state()) {
-      Attach(f, row, found->second);
+      Attach(f, pending, found->second);
     } else {
       outcome = Outcome::kNotReady;
     }
@@ -197,15 +199,17 @@ const double* LandmarkMap::CameraOf(const State& state, const Row& row) const {
 }
 
 /// Puts the blocks of the landmark into the row's last roles.
-void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark) {
-  const Family& family = FamilyOf(row);
-  row.own = *row.place;
-  row.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(), landmark.blocks);
-  row.Bind(row.own);
-  if (landmark.representation != family.representation) row.model = row.binding->xyz.get();
+void LandmarkMap::Attach(const FilterState& f, PendingMeasurement& pending,
+                         const LandmarkRecord& landmark) {
+  const Family& family = FamilyOf(pending);
+  pending.own = *pending.place;
+  pending.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(),
+                          landmark.blocks);
+  pending.Bind(pending.own);
+  if (landmark.representation != family.representation) pending.model = pending.binding->xyz.get();
 }
 
-[[gnu::noinline]] void LandmarkMap::Maintain(FilterState& f, std::span<Row> rows) {
+[[gnu::noinline]] void LandmarkMap::Maintain(FilterState& f, std::span<PendingMeasurement> rows) {
   Count(f, rows);
   CheckDepths(f);
   Prune(f);
@@ -214,18 +218,19 @@ void LandmarkMap::Attach(const FilterState& f, Row& row, const LandmarkRecord& l
 }
 
 /// Takes down which landmarks were seen, and what became of their measurements.
-void LandmarkMap::Count(FilterState& f, std::span<Row> rows) {
-  for (const Row& row : rows) {
-    if (!Has(row) || (!row.on_landmark() && row.report->outcome != Outcome::kNotReady)) continue;
-    if (!IsReady(f, row)) continue;
-    LandmarkRecord& landmark = RecordOf(row.measurement->landmark);
+void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
+  for (const PendingMeasurement& pending : rows) {
+    if (!Has(pending) || (!pending.on_landmark() && pending.report->outcome != Outcome::kNotReady))
+      continue;
+    if (!IsReady(f, pending)) continue;
+    LandmarkRecord& landmark = RecordOf(pending.measurement->landmark);
     if (landmark.first == kNoTimestamp) landmark.first = f.timestamp;
     if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
     landmark.seen = frame_;
     landmark.last = f.timestamp;
-    if (!row.on_landmark()) continue;
+    if (!pending.on_landmark()) continue;
     ++landmark.tried;
-    landmark.accepted += IsUsed(row);
+    landmark.accepted += IsUsed(pending);
   }
 }
 
@@ -320,19 +325,20 @@ void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
 }
 
 /// Turns those landmarks of the frame into xyz that are linear enough.
-void LandmarkMap::Convert(FilterState& f, std::span<Row> rows) {
+void LandmarkMap::Convert(FilterState& f, std::span<PendingMeasurement> rows) {
   if (!(options_.max_linearity_index > 0.0)) return;
-  for (const Row& row : rows) {
-    if (!row.on_landmark() || row.model != row.binding->model.get() || !IsUsed(row)) continue;
-    const auto found = landmarks_.find(row.measurement->landmark);
+  for (const PendingMeasurement& pending : rows) {
+    if (!pending.on_landmark() || pending.model != pending.binding->model.get() || !IsUsed(pending))
+      continue;
+    const auto found = landmarks_.find(pending.measurement->landmark);
     if (found == landmarks_.end() || !found->second.in_state()) continue;
-    f.report.landmarks.converted += ConvertToXyz(f, found->first, found->second, row);
+    f.report.landmarks.converted += ConvertToXyz(f, found->first, found->second, pending);
   }
 }
 
 bool LandmarkMap::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark,
-                               const Row& row) {
-  const double* const camera = CameraOf(f.state, row);
+                               const PendingMeasurement& pending) {
+  const double* const camera = CameraOf(f.state, pending);
   if (!HasInverseDistance(landmark) || camera == nullptr) return false;
   const double linearity = LinearityIndexOf(f.state, landmark, camera);
   const auto point = PointOf(*landmark.representation, ValuesOf(f.state, landmark).data());
@@ -347,64 +353,71 @@ bool LandmarkMap::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& 
 }
 
 /// Initialises landmarks of this frame that wait, as long as too few are measured.
-void LandmarkMap::InitialiseNew(FilterState& f, std::span<Row> rows) {
+void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> rows) {
   FindMeasured(rows);
   auto measured = std::ssize(measured_);
   for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
   bool asked_map = prior_.adapt_after == 0;
   Reserve(f, rows, options_.max_per_frame - measured);
-  for (Row& row : rows) {
+  for (PendingMeasurement& pending : rows) {
     if (measured >= options_.max_per_frame) return;
-    const auto found = FindWaiting(f, row);
+    const auto found = FindWaiting(f, pending);
     if (found == landmarks_.end()) continue;
     if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state);
     asked_map = true;
-    row.report->outcome = Initialise(f, found->first, row, found->second);
-    if (row.report->outcome != Outcome::kInitialised) continue;
+    pending.report->outcome = Initialise(f, found->first, pending, found->second);
+    if (pending.report->outcome != Outcome::kInitialised) continue;
     ++f.report.landmarks.initialised;
     ++measured;
   }
 }
 
 /// The landmark that the row may initialise, or the end.
-LandmarkMap::ById::iterator LandmarkMap::FindWaiting(const FilterState& f, const Row& row) {
-  if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
-      row.binding->model->inverse().role != FamilyOf(row).first) {
+LandmarkMap::ById::iterator LandmarkMap::FindWaiting(const FilterState& f,
+                                                     const PendingMeasurement& pending) {
+  if (!Has(pending) || pending.report->outcome != Outcome::kNotReady || !IsReady(f, pending) ||
+      pending.binding->model->inverse().role != FamilyOf(pending).first) {
     return landmarks_.end();
   }
   const bool takes_prior =
-      row.binding->model->inverse().prior_size > 0 && prior_.min_observations > 0;
+      pending.binding->model->inverse().prior_size > 0 && prior_.min_observations > 0;
   const int least = takes_prior ? prior_.min_observations : options_.min_observations;
-  const auto found = landmarks_.find(row.measurement->landmark);
+  const auto found = landmarks_.find(pending.measurement->landmark);
   const bool waits =
       found != landmarks_.end() && !found->second.in_state() && found->second.observations >= least;
   return waits ? found : landmarks_.end();
 }
 
 /// Takes memory at once for those that may come, `most`: the first frame has many.
-void LandmarkMap::Reserve(FilterState& f, std::span<const Row> rows, std::ptrdiff_t most) {
+void LandmarkMap::Reserve(FilterState& f, std::span<const PendingMeasurement> rows,
+                          std::ptrdiff_t most) {
   int size = 0;
-  for (const Row& row : rows) {
+  for (const PendingMeasurement& pending : rows) {
     if (most <= 0) break;
-    if (FindWaiting(f, row) == landmarks_.end()) continue;
-    for (const Space& role : FamilyOf(row).roles) size += role.shared() ? 0 : role.geometry.tangent;
+    if (FindWaiting(f, pending) == landmarks_.end()) continue;
+    for (const Space& role : FamilyOf(pending).roles)
+      size += role.shared() ? 0 : role.geometry.tangent;
     --most;
   }
   f.state.covariance().Reserve(size);
 }
 
 /// A row that was used of each landmark in the state, by id; the first one of several.
-void LandmarkMap::FindMeasured(std::span<Row> rows) {
+void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
   measured_.clear();
-  for (const Row& row : rows) {
-    if (!row.on_landmark() || !IsUsed(row)) continue;
-    const auto found = landmarks_.find(row.measurement->landmark);
-    if (found != landmarks_.end() && found->second.in_state()) measured_.push_back(&row);
+  for (const PendingMeasurement& pending : rows) {
+    if (!pending.on_landmark() || !IsUsed(pending)) continue;
+    const auto found = landmarks_.find(pending.measurement->landmark);
+    if (found != landmarks_.end() && found->second.in_state()) measured_.push_back(&pending);
   }
-  const auto id = [](const Row* row) { return row->measurement->landmark; };
-  std::ranges::sort(measured_, {}, [&](const Row* row) { return std::pair(id(row), row); });
-  const auto same = [&](const Row* a, const Row* b) { return id(a) == id(b); };
+  const auto id = [](const PendingMeasurement* pending) { return pending->measurement->landmark; };
+  std::ranges::sort(measured_, {}, [&](const PendingMeasurement* pending) {
+    return std::pair(id(pending), pending);
+  });
+  const auto same = [&](const PendingMeasurement* a, const PendingMeasurement* b) {
+    return id(a) == id(b);
+  };
   measured_.erase(std::unique(measured_.begin(), measured_.end(), same), measured_.end());
 }
 
@@ -415,9 +428,9 @@ double LandmarkMap::PriorInverseDistance(const State& state) {
   const double limit =
       options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
   distances_.clear();
-  for (const Row* const row : measured_) {
-    const double* const camera = CameraOf(state, *row);
-    const LandmarkRecord& landmark = landmarks_.at(row->measurement->landmark);
+  for (const PendingMeasurement* const pending : measured_) {
+    const double* const camera = CameraOf(state, *pending);
+    const LandmarkRecord& landmark = landmarks_.at(pending->measurement->landmark);
     if (camera == nullptr || !landmark.representation) continue;
     if (HasInverseDistance(landmark) && !(LinearityIndexOf(state, landmark, camera) < limit))
       continue;
@@ -435,11 +448,11 @@ double LandmarkMap::PriorInverseDistance(const State& state) {
 
 /// Gives the landmark its blocks, correlated with those that the observation took. Of a shared role
 /// the first landmark of the frame makes the block, and the others of the same sensor take it.
-Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, Row& row,
+Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, PendingMeasurement& pending,
                                 LandmarkRecord& landmark) {
-  Family& family = families_[static_cast<std::size_t>(row.sensor)];
-  Inverse& inverse = family.inverse;
-  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse);
+  Family& family = families_[static_cast<std::size_t>(pending.sensor)];
+  InverseMeasurement& inverse = family.inverse;
+  const Outcome outcome = Invert(f, pending, options_.prior ? &prior_ : nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
   auto& [fresh, values, rows] = fresh_;
   fresh.clear();

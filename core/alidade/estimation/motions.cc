@@ -59,7 +59,7 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
              : Outcome::kNotFinite;
 }
 
-[[gnu::noinline]] Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
+[[gnu::noinline]] StepError StepErrorOf(const MotionBinding& motion, Outcome outcome) {
   if (outcome == Outcome::kAccepted) return {};
   const std::string who = "motion model of '" + motion.name + "' ";
   if (outcome == Outcome::kNotFinite) {
@@ -70,12 +70,12 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
           who + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
 }
 
-Motions::Motions(const Binding& binding)
-    : binding_(&binding),
-      steps_(binding.system.motions.size()),
-      next_(binding.initial.values().size(), kNotANumber) {
+Motions::Motions(const ProblemIndex& index)
+    : index_(&index),
+      steps_(index.problem.motions.size()),
+      next_(index.initial.values().size(), kNotANumber) {
   for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
-    const MotionModel& model = *binding.system.motions[i].model;
+    const MotionModel& model = *index.problem.motions[i].model;
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
     Step& step = steps_[i];
@@ -83,8 +83,8 @@ Motions::Motions(const Binding& binding)
     step.g.resize(n * n_w, kNotANumber);
     step.l.resize(n_w * n_w, kNotANumber);
     step.gl.resize(n * n_w);
-    if (binding.motion_places[i].holds) step.cross.resize(n * n);
-    if (binding.motion_places[i].holds) step.m.resize(n * n_w);
+    if (index.motion_places[i].holds) step.cross.resize(n * n);
+    if (index.motion_places[i].holds) step.m.resize(n * n_w);
   }
 }
 
@@ -92,25 +92,25 @@ void Motions::Activate(const StateLayout& layout) {
   holds_ = false;
   active_.clear();
   for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
-    const MotionBinding& motion = binding_->system.motions[i];
+    const MotionBinding& motion = index_->problem.motions[i];
     steps_[i].active =
         !motion.model->stationary() &&
         std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
     if (steps_[i].active) active_.push_back(i);
-    holds_ = holds_ || (steps_[i].active && binding_->motion_places[i].holds);
+    holds_ = holds_ || (steps_[i].active && index_->motion_places[i].holds);
   }
 }
 
-Trouble Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
+StepError Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
   for (const std::size_t i : active_) {
-    if (Trouble trouble = EvaluateOne(i, state, dt_s, derivatives)) return trouble;
+    if (StepError error = EvaluateOne(i, state, dt_s, derivatives)) return error;
   }
   return {};
 }
 
-Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
-  const MotionBinding& motion = binding_->system.motions[i];
-  const MotionPlace& place = binding_->motion_places[i];
+StepError Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
+  const MotionBinding& motion = index_->problem.motions[i];
+  const MotionPlace& place = index_->motion_places[i];
   Step& step = steps_[i];
   const bool goes_on = place.holds && in_interval();
   StepOutput to{next_.data()};
@@ -123,7 +123,7 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   const double* const x = state.values().data();
   const Outcome outcome = derivatives ? CallStep(motion, place, x, step.u.data(), nullptr, dt_s, to)
                                       : StepAt(motion, place, x, step.u.data(), nullptr, dt_s, to);
-  if (outcome != Outcome::kAccepted) return TroubleOf(motion, outcome);
+  if (outcome != Outcome::kAccepted) return StepErrorOf(motion, outcome);
   if (!derivatives) return {};
   SpreadNoise(step.g.data(), step.l.data(), motion.model->tangent_size(),
               motion.model->noise_size(), step.gl.data());
@@ -152,7 +152,7 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   m = moved + input;
 }
 
-Trouble Motions::Apply(State& state) {
+StepError Motions::Apply(State& state) {
   Covariance& p = state.covariance();
   if (active_.size() <= 1) {  // all of it, or nothing
     if (!Propagate(p)) return WhyNotFinite();
@@ -166,17 +166,17 @@ Trouble Motions::Apply(State& state) {
     }
   }
   for (const std::size_t i : active_) {
-    TakeStep(binding_->motion_places[i], next_.data(), state.values().data());
+    TakeStep(index_->motion_places[i], next_.data(), state.values().data());
   }
   return {};
 }
 
 /// Why P after the step is not finite.
-[[gnu::noinline]] Trouble Motions::WhyNotFinite() const {
+[[gnu::noinline]] StepError Motions::WhyNotFinite() const {
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
     if (AllFinite(step.f) && AllFinite(step.g) && AllFinite(step.l)) continue;
-    return TroubleOf(binding_->system.motions[i], Outcome::kNotFinite);
+    return StepErrorOf(index_->problem.motions[i], Outcome::kNotFinite);
   }
   return {"not_finite", "the covariance steps to what is not finite"};
 }
@@ -204,9 +204,9 @@ Trouble Motions::Apply(State& state) {
 /// P of all models, or of those before one by which it would not be finite.
 bool Motions::Propagate(Covariance& p) {
   for (const std::size_t i : active_) {
-    const MotionPlace& place = binding_->motion_places[i];
+    const MotionPlace& place = index_->motion_places[i];
     const Step& step = steps_[i];
-    const int width = binding_->system.motions[i].model->noise_size();
+    const int width = index_->problem.motions[i].model->noise_size();
     const double* const cross = step.carries ? step.cross.data() : nullptr;
     const bool finite = place.rows.size() == place.at.size()
                             ? p.Propagate(place.rows, step.f.data(), step.gl.data(), width, cross)
@@ -236,7 +236,7 @@ bool Motions::Propagate(Covariance& p) {
 
 int Motions::noise_size() const {
   int size = 0;
-  for (const std::size_t i : active_) size += binding_->system.motions[i].model->noise_size();
+  for (const std::size_t i : active_) size += index_->problem.motions[i].model->noise_size();
   return size;
 }
 
@@ -245,8 +245,8 @@ Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   transition.setIdentity();
   for (const std::size_t i : active_) {
     const double* f = steps_[i].f.data();
-    for (const int row : binding_->motion_places[i].at) {
-      for (const int column : binding_->motion_places[i].at) {
+    for (const int row : index_->motion_places[i].at) {
+      for (const int column : index_->motion_places[i].at) {
         if (row >= 0 && column >= 0) transition(row, column) = *f;
         ++f;
       }
@@ -262,8 +262,8 @@ Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Worksp
   Eigen::Index columns = 0;
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
-    const MotionPlace& place = binding_->motion_places[i];
-    const MotionModel& model = *binding_->system.motions[i].model;
+    const MotionPlace& place = index_->motion_places[i];
+    const MotionModel& model = *index_->problem.motions[i].model;
     const Eigen::Index width = model.noise_size();
     for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {
       if (place.at[row] < 0) continue;

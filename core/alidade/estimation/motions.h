@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
+#include "alidade/estimation/problem_index.h"
 #include "alidade/state/workspace.h"
 
 namespace alidade::internal {
@@ -16,10 +16,10 @@ namespace alidade::internal {
 // batch. n_w: noise inputs.
 
 /// Why a step cannot be done; empty: it can. As small as a pointer, for every step returns one.
-class Trouble {
+class StepError {
  public:
-  Trouble() = default;
-  Trouble(const char* kind, std::string text)
+  StepError() = default;
+  StepError(const char* kind, std::string text)
       : detail_(std::make_unique<const Detail>(Detail{kind, std::move(text)})) {}
   explicit operator bool() const { return detail_ != nullptr; }
   const char* kind() const { return detail_->kind; }  ///< of the event
@@ -44,7 +44,7 @@ struct StepOutput {
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, const StepOutput& to);
 /// What an outcome of it that is not kAccepted means.
-Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
+StepError StepErrorOf(const MotionBinding& motion, Outcome outcome);
 /// x <- x' of its blocks that are not constant, brought back to their manifolds.
 inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
   for (const auto& [at, size, geometry] : place.moved) {
@@ -53,7 +53,7 @@ inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
   }
 }
 
-/// What the motion models of a system make of the state over one step: x', F and G Lq.
+/// What the motion models of a problem make of the state over one step: x', F and G Lq.
 /// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,
 /// A = F M. n: size of P, n_w: noise inputs of the models that move. A copy is a snapshot.
 class Motions {
@@ -69,7 +69,7 @@ class Motions {
     bool carries = false;       ///< noise that the step before held
   };
 
-  explicit Motions(const Binding& binding);
+  explicit Motions(const ProblemIndex& index);
 
   /// Finds out which models move: those all of whose blocks have a value.
   void Activate(const StateLayout& layout);
@@ -78,9 +78,9 @@ class Motions {
   std::vector<double>& next() { return next_; }
 
   /// x', F, G and Lq of all active models; without `derivatives` x' and Lq alone.
-  Trouble Evaluate(const State& state, double dt_s, bool derivatives = true);
+  StepError Evaluate(const State& state, double dt_s, bool derivatives = true);
   /// P <- F P F' + N N', N = G Lq, and x <- x': all of it, or nothing, and why.
-  Trouble Apply(State& state);
+  StepError Apply(State& state);
 
   /// Whether noise that the last step held goes on being held.
   bool in_interval() const { return holds_ && interval_steps_ > 0; }
@@ -98,15 +98,15 @@ class Motions {
                          bool all = false) const;
 
  private:
-  Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
+  StepError EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
   void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
   bool IsBounded(const Covariance& p) const;
   bool Propagate(Covariance& p);
   bool PropagatePart(Covariance& p, const MotionPlace& place, const Step& step, int width);
-  Trouble WhyNotFinite() const;
+  StepError WhyNotFinite() const;
 
-  const Binding* binding_;
-  std::vector<Step> steps_;  ///< as in System::motions
+  const ProblemIndex* index_;
+  std::vector<Step> steps_;  ///< as in Problem::motions
   std::vector<double> next_;
   std::vector<std::size_t> active_;  ///< steps that are
   bool holds_ = false;

@@ -32,10 +32,10 @@ BlockId BlockIn(const SensorBinding& sensor, const char* role) {
 }
 
 /// Where the block starts, else `otherwise`.
-std::vector<double> StartOf(const System& system, BlockId block,
+std::vector<double> StartOf(const Problem& problem, BlockId block,
                             const std::vector<double>& otherwise) {
-  const auto prior = std::ranges::find(system.priors, block, &Prior::block);
-  const bool fits = prior != system.priors.end() && prior->mean.size() == otherwise.size();
+  const auto prior = std::ranges::find(problem.priors, block, &Prior::block);
+  const bool fits = prior != problem.priors.end() && prior->mean.size() == otherwise.size();
   return fits ? prior->mean : otherwise;
 }
 
@@ -58,12 +58,12 @@ struct Trajectory {
 };
 
 /// A generic point near the prior: no element at a special value, the sensors' domain kept.
-Trajectory StartNearPrior(const System& system) {
+Trajectory StartNearPrior(const Problem& problem) {
   Trajectory t;
-  t.values.resize(system.layout.blocks().size());
+  t.values.resize(problem.layout.blocks().size());
   t.columns.assign(t.values.size(), -1);
-  for (const Prior& prior : system.priors) {
-    const Block& block = system.layout[prior.block];
+  for (const Prior& prior : problem.priors) {
+    const Block& block = problem.layout[prior.block];
     const Geometry& geometry = block.geometry();
     auto& value = t.values[static_cast<std::size_t>(prior.block)];
     value.resize(static_cast<std::size_t>(geometry.ambient));
@@ -110,9 +110,9 @@ std::vector<double> GenericInput(const MotionModel& model, Random* random) {
 }
 
 /// Moves the values by dt and phi <- F phi. False where a model cannot step.
-bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
+bool Advance(const Problem& problem, double dt_s, Random* random, Trajectory& t,
              Eigen::MatrixXd& phi) {
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     const int n = motion.model->tangent_size();
     std::vector<const double*> x;
     std::vector<std::vector<double>> next;
@@ -134,7 +134,7 @@ bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
     for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
       const BlockId id = motion.blocks[i];
       const int column = t.columns[static_cast<std::size_t>(id)];
-      for (int k = 0; k < system.layout[id].geometry().tangent; ++k, ++row) {
+      for (int k = 0; k < problem.layout[id].geometry().tangent; ++k, ++row) {
         if (column < 0) continue;
         from.push_back(row);
         to.push_back(column + k);
@@ -173,7 +173,7 @@ class RowSpace {
 };
 
 /// Adds the rows H phi of a sensor, where it is defined at the values, in units of the prior sigma.
-void ObserveBy(const SensorBinding& sensor, const double* known, const System& system,
+void ObserveBy(const SensorBinding& sensor, const double* known, const Problem& problem,
                const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
   const int m = sensor.model->measurement().geometry.tangent;
@@ -182,7 +182,7 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
   for (const RoleBinding& role : sensor.roles) {
     roles.push_back(role.block < 0 ? nullptr
                                    : t.values[static_cast<std::size_t>(role.block)].data());
-    j.emplace_back(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent);
+    j.emplace_back(m, role.block < 0 ? 1 : problem.layout[role.block].geometry().tangent);
   }
   std::vector<double*> data;
   std::vector<int> strides;
@@ -209,18 +209,18 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
 
 /// The same of every sensor; known numbers are any of the size of the state, as several
 /// measurements bring them.
-void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi, Random& random,
-             RowSpace& rows) {
+void Observe(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
+             Random& random, RowSpace& rows) {
   constexpr int kMeasurements = 4;
   double reach = 1.0;
   for (const std::vector<double>& value : t.values) {
     for (const double element : value) reach = std::max(reach, 2.0 * std::abs(element));
   }
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     std::vector<double> known(static_cast<std::size_t>(sensor.model->known_size()));
     for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
       for (double& number : known) number = reach * random.Normal();
-      ObserveBy(sensor, known.data(), system, t, phi, rows);
+      ObserveBy(sensor, known.data(), problem, t, phi, rows);
     }
   }
 }
@@ -229,7 +229,7 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
 /// landmarks it is these that say where the world is.
 void AddKnown(const internal::WithLandmarks& with, const Trajectory& t, RowSpace& rows) {
   const auto n = static_cast<Eigen::Index>(t.names.size());
-  for (const Prior& prior : with.system.priors) {
+  for (const Prior& prior : with.problem.priors) {
     const int column = t.columns[static_cast<std::size_t>(prior.block)];
     const auto landmark = std::ranges::find(with.landmarks, prior.block) - with.landmarks.begin();
     for (Eigen::Index i = 0; column >= 0 && i < prior.covariance.rows(); ++i) {
@@ -280,22 +280,22 @@ void Reduce(Eigen::MatrixXd& basis) {
 
 }  // namespace
 
-std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const System& system) {
+std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const Problem& problem) {
   const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
   const auto blind = [&](const SensorBinding& s) { return sees(s) && XyzModel(s) == nullptr; };
-  const auto first = std::ranges::find_if(system.sensors, sees);
-  if (!system.landmarks || first == system.sensors.end() ||
-      std::ranges::any_of(system.sensors, blind)) {
+  const auto first = std::ranges::find_if(problem.sensors, sees);
+  if (!problem.landmarks || first == problem.sensors.end() ||
+      std::ranges::any_of(problem.sensors, blind)) {
     return std::nullopt;
   }
-  const std::size_t known = std::min(system.landmarks->known.size(), std::size(kPlaces));
-  WithLandmarks with{system, {}, known, BlockIn(*first, "position")};
-  with.system.landmarks.reset();
-  std::erase_if(with.system.sensors, sees);
-  const std::vector<double> r = StartOf(system, with.camera, {0.0, 0.0, 0.0});
+  const std::size_t known = std::min(problem.landmarks->known.size(), std::size(kPlaces));
+  WithLandmarks with{problem, {}, known, BlockIn(*first, "position")};
+  with.problem.landmarks.reset();
+  std::erase_if(with.problem.sensors, sees);
+  const std::vector<double> r = StartOf(problem, with.camera, {0.0, 0.0, 0.0});
   const std::vector<double> q =
-      StartOf(system, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
-  const auto& prior = system.landmarks->prior;
+      StartOf(problem, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
+  const auto& prior = problem.landmarks->prior;
   constexpr double kFarthest_m = 1000.0;  // a prior at infinity would tell nothing of scale
   const double distance_m = prior ? std::min(1.0 / prior->inverse_distance, kFarthest_m) : 2.0;
   const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3)};
@@ -305,32 +305,32 @@ std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const System& sy
     UnitQuaternion::Rotate(q.data(), h, p);
     Vec<3>::Plus(r.data(), p, p);
     const std::string name = std::string(kLandmarks) + '.' + std::to_string(with.landmarks.size());
-    const BlockId block = with.system.layout.Declare(name, kLandmarks, xyz);
+    const BlockId block = with.problem.layout.Declare(name, kLandmarks, xyz);
     with.landmarks.push_back(block);
-    with.system.priors.push_back({block, {p, p + 3}, Eigen::Matrix3d::Identity(), {}});
-    for (const SensorBinding& sensor : system.sensors) {
-      if (sees(sensor)) with.system.sensors.push_back(SeenAs(sensor, block));
+    with.problem.priors.push_back({block, {p, p + 3}, Eigen::Matrix3d::Identity(), {}});
+    for (const SensorBinding& sensor : problem.sensors) {
+      if (sees(sensor)) with.problem.sensors.push_back(SeenAs(sensor, block));
     }
   }
   return with;
 }
 
-bool internal::ObservabilityIsTold(const System& system) {
+bool internal::ObservabilityIsTold(const Problem& problem) {
   int size = 0;
-  for (const Block& block : system.layout.blocks()) {
+  for (const Block& block : problem.layout.blocks()) {
     if (block.status != BlockStatus::kConstant) size += block.geometry().tangent;
   }
   return size <= internal::kMostObserved;
 }
 
-std::vector<std::vector<std::string>> internal::UnobservableDirections(const System& given,
+std::vector<std::vector<std::string>> internal::UnobservableDirections(const Problem& given,
                                                                        Excitation excitation) {
   const auto with = internal::PlaceLandmarks(given);
   if ((given.landmarks && !with) || !internal::ObservabilityIsTold(given)) return {};
-  const System& system = with ? with->system : given;
+  const Problem& problem = with ? with->problem : given;
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
-  const Trajectory start = StartNearPrior(system);
+  const Trajectory start = StartNearPrior(problem);
   const Eigen::Index n = static_cast<Eigen::Index>(start.names.size());
   if (n == 0) return {};
   Trajectory t = start;
@@ -343,9 +343,9 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(const Sys
   // for these inputs, which are not special, holds from the next ones. Twice, as trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index before = rows.rank();
-    Observe(system, t, phi, known, rows);
+    Observe(problem, t, phi, known, rows);
     idle = rows.rank() == before ? idle + 1 : 0;
-    if (!Advance(system, kStep, changing, t, phi)) break;
+    if (!Advance(problem, kStep, changing, t, phi)) break;
   }
   if (rows.rank() == n) return {};
   Eigen::MatrixXd null_space = rows.Complement();
@@ -365,8 +365,8 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(const Sys
   return directions;
 }
 
-std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
-  return internal::UnobservableDirections(system, internal::Excitation::kChanging);
+std::vector<std::vector<std::string>> UnobservableDirections(const Problem& problem) {
+  return internal::UnobservableDirections(problem, internal::Excitation::kChanging);
 }
 
 }  // namespace alidade

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/first_values.h"
+#include "alidade/estimation/delayed_initialisation.h"
 #include "alidade/state/dense_algebra.h"
 
 namespace alidade::internal {
@@ -22,9 +22,9 @@ Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 /// Of the blocks that one motion model moves together with `id`: the values they have are no better
 /// known than at the start, nor than they are. Uncorrelated. `id` itself is initialised after it.
 void DropMotionOf(FilterState& f, BlockId id) {
-  for (const MotionBinding& motion : f.binding->system.motions) {
+  for (const MotionBinding& motion : f.index->problem.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
-    for (const Prior& prior : f.binding->system.priors) {
+    for (const Prior& prior : f.index->problem.priors) {
       const Block& block = f.state.layout()[prior.block];
       if (std::ranges::find(motion.blocks, prior.block) == motion.blocks.end() ||
           prior.covariance.size() == 0 || !block.has_covariance() ||
@@ -84,24 +84,24 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
            std::to_string(options_.max_covariance_repairs) + ")");
 }
 
-[[gnu::noinline]] void Recovery::Recover(FilterState& f, Row& row) {
-  const SensorBinding& sensor = *row.binding;
+[[gnu::noinline]] void Recovery::Recover(FilterState& f, PendingMeasurement& pending) {
+  const SensorBinding& sensor = *pending.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +
                           std::to_string(options_.rejection_recovery_after) + " times in a row: ";
   const int role = sensor.model->inverse().role;
-  Inverse inverse;
+  InverseMeasurement inverse;
   const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
   if (options_.rejection_recovery == RejectionRecovery::kReset && target != nullptr &&
       target->block >= 0 && target->mode == RoleMode::kEstimate &&
       f.state.layout()[target->block].status == BlockStatus::kEstimated &&
-      Invert(f, row, nullptr, inverse) == Outcome::kAccepted) {
+      Invert(f, pending, nullptr, inverse) == Outcome::kAccepted) {
     DropMotionOf(f, target->block);
-    Initialise(f, row, inverse);
+    Initialise(f, pending, inverse);
     Note(f, "rejection_recovery",
          why + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
-  char& inflated = f.health.inflated[static_cast<std::size_t>(row.sensor)];
+  char& inflated = f.health.inflated[static_cast<std::size_t>(pending.sensor)];
   if (inflated != 0) return;
   inflated = 1;
   Note(f, "rejection_recovery",

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/rows.h"
+#include "alidade/estimation/pending_measurements.h"
 
 namespace alidade::internal {
 
@@ -20,7 +20,7 @@ class Recovery {
   /// `rejection_recovery`): resets what it determines from its measurement, with the blocks that
   /// move with it at their prior uncertainty, or theirs where that is larger; where that cannot be,
   /// inflates the blocks that it corrects, once until it is accepted again.
-  void Recover(FilterState& f, Row& row);
+  void Recover(FilterState& f, PendingMeasurement& pending);
 
  private:
   EkfOptions options_;

@@ -2,9 +2,9 @@
 #include "alidade/estimation/rts.h"
 
 #include "alidade/base/error.h"
-#include "alidade/estimation/frame_loop.h"
-#include "alidade/estimation/linear.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/ekf_equations.h"
+#include "alidade/estimation/filter_engine.h"
+#include "alidade/estimation/stacked_measurements.h"
 #include "alidade/state/dense_algebra.h"
 
 namespace alidade {
@@ -29,34 +29,40 @@ struct Adjoint {
   }
 };
 
-/// Linear, that takes its steps and updates down as an adjoint.
-class Taped : public Method {
+/// EkfEquations, that takes its steps and updates down as an adjoint.
+class RecordingEquations : public UpdateMethod {
  public:
-  std::unique_ptr<Method> Clone() const override { return std::make_unique<Taped>(*this); }
-  Trouble Step(FilterState& f, double dt_s) override;
+  std::unique_ptr<UpdateMethod> Clone() const override {
+    return std::make_unique<RecordingEquations>(*this);
+  }
+  StepError Step(FilterState& f, double dt_s) override;
   void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
-  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeNis(FilterState& f, Row& row) override { return linear_.ComputeNis(f, row); }
-  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+  Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
+    return linear_.Predict(f, pending);
+  }
+  double ComputeNis(FilterState& f, PendingMeasurement& pending) override {
+    return linear_.ComputeNis(f, pending);
+  }
+  Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
   /// From here on is another frame.
   void StartFrame(const FilterState& f);
   const Adjoint& frame() const { return frame_; }
 
  private:
-  Linear linear_;
+  EkfEquations linear_;
   Adjoint frame_;
 };
 
-void Taped::StartFrame(const FilterState& f) {
+void RecordingEquations::StartFrame(const FilterState& f) {
   const Eigen::Index n = f.size();
   const Eigen::Index all = n + (f.motions.in_interval() ? f.motions.noise_size() : 0);
   frame_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
             Eigen::MatrixXd::Zero(all, all)};
 }
 
-Trouble Taped::Step(FilterState& f, double dt_s) {
-  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+StepError RecordingEquations::Step(FilterState& f, double dt_s) {
+  if (StepError error = linear_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
   const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
@@ -64,7 +70,7 @@ Trouble Taped::Step(FilterState& f, double dt_s) {
   return {};
 }
 
-Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
+Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const std::vector<double> before = f.state.values();
   const Outcome outcome = linear_.Correct(f, rows);
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
@@ -101,16 +107,17 @@ struct RtsSmoother::Passed {
   UpdateReport report;
 };
 
-RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+RtsSmoother::RtsSmoother(Problem problem, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
-    : RtsSmoother(std::move(system), options, streams, std::make_unique<internal::Taped>()) {}
+    : RtsSmoother(std::move(problem), options, streams,
+                  std::make_unique<internal::RecordingEquations>()) {}
 
-RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+RtsSmoother::RtsSmoother(Problem problem, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams,
-                         std::unique_ptr<internal::Taped> tape)
+                         std::unique_ptr<internal::RecordingEquations> tape)
     : tape_(tape.get()),
-      loop_(std::make_unique<internal::FrameLoop>(
-          CheckedProblem(std::move(system), "RtsSmoother", kSupport),
+      loop_(std::make_unique<internal::FilterEngine>(
+          CheckedProblem(std::move(problem), "RtsSmoother", kCapabilities),
           internal::WithoutRecovery(options), streams, std::move(tape))) {}
 
 RtsSmoother::~RtsSmoother() = default;

@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "alidade/estimation/estimator.h"
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/support.h"
 
 namespace alidade {
 
 namespace internal {
-class Taped;
+class RecordingEquations;
 }
 
 /// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
@@ -35,12 +35,12 @@ class RtsSmoother : public Estimator {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
-  static constexpr Support kSupport = {};
+  static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more
-  /// than kSupport.
-  RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
-  explicit RtsSmoother(const System& problem, const EkfOptions& options = {})
+  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `problem` asks for more
+  /// than kCapabilities.
+  RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit RtsSmoother(const Problem& problem, const EkfOptions& options = {})
       : RtsSmoother(problem, options, problem.streams) {}
   ~RtsSmoother() override;
 
@@ -57,11 +57,11 @@ class RtsSmoother : public Estimator {
 
  private:
   struct Passed;
-  RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
-              std::unique_ptr<internal::Taped> tape);
+  RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+              std::unique_ptr<internal::RecordingEquations> tape);
 
-  internal::Taped* tape_;  ///< the method of the loop
-  std::unique_ptr<internal::FrameLoop> loop_;
+  internal::RecordingEquations* tape_;  ///< the method of the loop
+  std::unique_ptr<internal::FilterEngine> loop_;
   std::vector<Passed> passed_frames_;
 };
 

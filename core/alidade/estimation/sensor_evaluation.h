@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
+#include "alidade/estimation/problem_index.h"
 
-/// A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point, a
-/// point of a batch. m: tangent size of the measurement.
+/// A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point,
+/// a point of a batch. m: tangent size of the measurement.
 namespace alidade::internal {
 
 /// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.

@@ -5,9 +5,9 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
-#include "alidade/estimation/frame_loop.h"
-#include "alidade/estimation/linear.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/ekf_equations.h"
+#include "alidade/estimation/filter_engine.h"
+#include "alidade/estimation/stacked_measurements.h"
 #include "alidade/state/dense_algebra.h"
 #include "alidade/state/tiles.h"
 
@@ -41,15 +41,19 @@ void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matri
   root = tall.topRows(n).transpose();
 }
 
-/// Linear, with a root of P stepped and corrected beside it, of which P is made.
-class SquareRoot : public Method {
+/// EkfEquations, with a root of P stepped and corrected beside it, of which P is made.
+class SquareRootEquations : public UpdateMethod {
  public:
-  std::unique_ptr<Method> Clone() const override { return std::make_unique<SquareRoot>(*this); }
+  std::unique_ptr<UpdateMethod> Clone() const override {
+    return std::make_unique<SquareRootEquations>(*this);
+  }
   void Begin(FilterState& f) override;
-  Trouble Step(FilterState& f, double dt_s) override;
-  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
-  double ComputeNis(FilterState& f, Row& row) override;
-  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+  StepError Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
+    return linear_.Predict(f, pending);
+  }
+  double ComputeNis(FilterState& f, PendingMeasurement& pending) override;
+  Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
   const Eigen::MatrixXd* Root() const override { return &root_; }
 
@@ -62,21 +66,21 @@ class SquareRoot : public Method {
     Eigen::MatrixXd root;
   };
 
-  Linear linear_;
+  EkfEquations linear_;
   Eigen::MatrixXd root_;
   Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
   std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
 };
 
-void SquareRoot::Begin(FilterState& f) {
-  noise_roots_.resize(f.binding->sensor_places.size());
+void SquareRootEquations::Begin(FilterState& f) {
+  noise_roots_.resize(f.index->sensor_places.size());
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   SquareRootOf(f.state.covariance().Dense(), ldlt, root_);
   SetCovariance(f);
 }
 
 /// P = L L'.
-void SquareRoot::SetCovariance(FilterState& f) const {
+void SquareRootEquations::SetCovariance(FilterState& f) const {
   const Workspace::Use use(f.work);
   Workspace::Matrix p = f.work.Take(root_.rows(), root_.rows());
   p.setZero();
@@ -84,9 +88,9 @@ void SquareRoot::SetCovariance(FilterState& f) const {
   f.state.covariance().SetBlock(0, 0, p);
 }
 
-Trouble SquareRoot::Step(FilterState& f, double dt_s) {
+StepError SquareRootEquations::Step(FilterState& f, double dt_s) {
   const bool goes_on = f.motions.in_interval();
-  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+  if (StepError error = linear_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
   Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
@@ -108,30 +112,30 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
 }
 
 /// S = (H L) (H L)' + R, which rounding does not turn negative.
-double SquareRoot::ComputeNis(FilterState& f, Row& row) {
+double SquareRootEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
   const Workspace::Use use(f.work);
-  Row* const one[] = {&row};
+  PendingMeasurement* const one[] = {&pending};
   const Stacked all = Stack(f, one);
   const Eigen::Index m = all.h.rows();
-  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s(row.s, m, m);
+  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s(pending.s, m, m);
   hl.setZero();
   AddProduct(hl, all.h, root_);
   s = all.noise;
   AddProductWithTransposed(s, hl, hl);
-  row.report->s = {row.s, row.R.size()};
-  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, f.work);
+  pending.report->s = {pending.s, pending.R.size()};
+  return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
 }
 
-Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
+Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Workspace::Use use(f.work);
   const Stacked all = Stack(f, rows);
   const Eigen::Index n = root_.rows(), m = all.h.rows();
   Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);  // array: transposed
   array.setZero();
   Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    const Eigen::Index k = row->report->dof;
-    auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(row->sensor)];
+  for (const PendingMeasurement* pending : rows) {
+    const Eigen::Index k = pending->report->dof;
+    auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(pending->sensor)];
     SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
     array.block(at, at, k, k) = root.transpose();
     at += k;
@@ -162,11 +166,11 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
 }  // namespace
 }  // namespace internal
 
-SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
+SquareRootEkf::SquareRootEkf(Problem problem, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
-    : Filter(CheckedProblem(std::move(system), "SquareRootEkf", kSupport),
+    : Filter(CheckedProblem(std::move(problem), "SquareRootEkf", kCapabilities),
              internal::WithoutRecovery(options), streams,
-             std::make_unique<internal::SquareRoot>()) {}
+             std::make_unique<internal::SquareRootEquations>()) {}
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
   const Eigen::MatrixXd* const root = loop().method->Root();

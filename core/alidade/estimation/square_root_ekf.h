@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/support.h"
 #include "alidade/state/eigen_alignment.h"
 
 namespace alidade {
@@ -31,12 +31,12 @@ class SquareRootEkf : public Filter {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
-  static constexpr Support kSupport = {};
+  static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `system` asks for more
-  /// than kSupport.
-  SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
-  explicit SquareRootEkf(const System& problem, const EkfOptions& options = {})
+  /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `problem` asks for more
+  /// than kCapabilities.
+  SquareRootEkf(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit SquareRootEkf(const Problem& problem, const EkfOptions& options = {})
       : SquareRootEkf(problem, options, problem.streams) {}
 
   /// L, n x n; ContractViolation where another kind of filter was assigned. state().covariance() is

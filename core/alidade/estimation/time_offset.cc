@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade::internal {
 namespace {
@@ -303,7 +303,7 @@ struct Arrangement {
 };
 
 /// Of one model of the sensor: its own, or that of landmarks that are xyz.
-Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& sensor,
+Arrangement Arrange(const Problem& problem, BlockId offset, const SensorBinding& sensor,
                     const SensorModel& model) {
   Arrangement all;
   all.place_of_role.assign(model.roles().size(), -1);
@@ -311,7 +311,7 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
     const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
     return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
   };
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     const bool moves =
         !motion.model->stationary() &&
         std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
@@ -325,10 +325,10 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
         std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
     for (const BlockId id : motion.blocks) {
-      all.movers.back().stays.push_back(system.layout[id].status == BlockStatus::kConstant);
+      all.movers.back().stays.push_back(problem.layout[id].status == BlockStatus::kConstant);
       const int role = role_of(id);
       if (role < 0) {
-        all.Add(system.layout[id].space, RoleBinding{id, mode}, system.layout[id].name);
+        all.Add(problem.layout[id].space, RoleBinding{id, mode}, problem.layout[id].name);
         continue;
       }
       const auto index = static_cast<std::size_t>(role);
@@ -341,7 +341,7 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
     if (role.landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) continue;
     all.place_of_role[i] = all.Add(role, sensor.roles[i], role.name);
   }
-  all.offset = all.Add(system.layout[offset].space, RoleBinding{offset}, "time_offset");
+  all.offset = all.Add(problem.layout[offset].space, RoleBinding{offset}, "time_offset");
   for (std::size_t i = 0; i < model.roles().size(); ++i) {
     const Space& role = model.roles()[i];
     if (role.landmark()) all.place_of_role[i] = all.Add(role, {}, role.name);
@@ -356,8 +356,8 @@ SharedSensor Offset(const SharedSensor& model, Arrangement all) {
 
 }  // namespace
 
-std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& sensor) {
-  Arrangement all = Arrange(system, offset, sensor, *sensor.model);
+std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& sensor) {
+  Arrangement all = Arrange(problem, offset, sensor, *sensor.model);
   for (const Mover& mover : all.movers) {
     if (mover.model->has_input()) {
       return "motion model '" + mover.model->name() + "' of its roles takes a control input";
@@ -371,7 +371,7 @@ std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& se
   }
   if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
   if (sensor.xyz) {
-    sensor.xyz = Offset(sensor.xyz, Arrange(system, offset, sensor, *sensor.xyz));
+    sensor.xyz = Offset(sensor.xyz, Arrange(problem, offset, sensor, *sensor.xyz));
   }
   std::vector<RoleBinding> bindings = std::move(all.bindings);
   sensor.model = Offset(sensor.model, std::move(all));

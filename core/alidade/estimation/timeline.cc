@@ -36,11 +36,11 @@ Timestamp LongestStep(double max_dt_s) {
 
 }  // namespace
 
-Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams, double max_dt_s)
+Timeline::Timeline(const Problem& problem, const std::vector<StreamInfo>& streams, double max_dt_s)
     : max_dt_s_(max_dt_s), longest_(LongestStep(max_dt_s)) {
-  if (system.initial_time_s) start_ = TimestampFromSeconds(*system.initial_time_s);
-  for (std::size_t i = 0; i < system.motions.size(); ++i) {
-    const MotionBinding& motion = system.motions[i];
+  if (problem.initial_time_s) start_ = TimestampFromSeconds(*problem.initial_time_s);
+  for (std::size_t i = 0; i < problem.motions.size(); ++i) {
+    const MotionBinding& motion = problem.motions[i];
     if (!motion.model->has_input()) continue;
     Held& held = held_.emplace_back();
     held.motion = i;
@@ -59,30 +59,31 @@ Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams,
   }
 }
 
-Trouble Timeline::First(Timestamp from, Timestamp to, std::vector<Event>& events, Piece& piece) {
+StepError Timeline::NextSubStep(Timestamp from, Timestamp to, std::vector<Event>& events,
+                                SubStep& sub_step) {
   constexpr Timestamp kMostSteps = 1'000'000;
-  piece.start = from;
-  piece.end = to;
+  sub_step.start = from;
+  sub_step.end = to;
   for (const Held& held : held_) {  // u changes where one stops acting
-    if (Acts(held, from)) piece.end = std::min(piece.end, held.until);
+    if (Acts(held, from)) sub_step.end = std::min(sub_step.end, held.until);
   }
   Timestamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(piece.end, from, &elapsed);
-  piece.steps = overflow ? 0 : (elapsed <= longest_ ? 1 : (elapsed - 1) / longest_ + 1);
-  if (overflow || piece.steps > kMostSteps) {
-    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(piece.end) - Seconds(from)) +
+  const bool overflow = __builtin_sub_overflow(sub_step.end, from, &elapsed);
+  sub_step.steps = overflow ? 0 : (elapsed <= longest_ ? 1 : (elapsed - 1) / longest_ + 1);
+  if (overflow || sub_step.steps > kMostSteps) {
+    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(from)) +
                                      " s would need more than " +
                                      RoundedText(static_cast<double>(kMostSteps)) + " steps of " +
                                      RoundedText(max_dt_s_) + " s"};
   }
-  piece.dt_s = Seconds(elapsed);
-  if (piece.steps > 1) piece.dt_s /= static_cast<double>(piece.steps);
-  if (piece.steps >= 2 * most_steps_) {
+  sub_step.dt_s = Seconds(elapsed);
+  if (sub_step.steps > 1) sub_step.dt_s /= static_cast<double>(sub_step.steps);
+  if (sub_step.steps >= 2 * most_steps_) {
     events.push_back({from, "substeps",
                       "a gap of " + RoundedText(Seconds(elapsed)) +
                           " s, longer than max_dt_s = " + RoundedText(max_dt_s_) +
-                          ", is stepped in " + std::to_string(piece.steps) + " equal parts"});
-    most_steps_ = piece.steps;
+                          ", is stepped in " + std::to_string(sub_step.steps) + " equal parts"});
+    most_steps_ = sub_step.steps;
   }
   return {};
 }

@@ -8,7 +8,7 @@
 
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/motions.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 namespace alidade::internal {
 
@@ -28,7 +28,7 @@ namespace alidade::internal {
 class Timeline {
  public:
   /// Equal steps from `start` to `end`.
-  struct Piece {
+  struct SubStep {
     Timestamp start = 0, end = 0;
     Timestamp steps = 0;
     double dt_s = 0.0;
@@ -40,18 +40,19 @@ class Timeline {
 
   /// `streams` are the source's, in the order of Measurement::stream. ContractViolation where the
   /// stream of an input has another size than the model's input.
-  Timeline(const System& system, const std::vector<StreamInfo>& streams, double max_dt_s);
+  Timeline(const Problem& problem, const std::vector<StreamInfo>& streams, double max_dt_s);
 
   /// The time of the priors, where nothing else sets it: initial_time_s, or the first frame's.
   Timestamp StartFor(const Frame& first) const { return start_.value_or(first.timestamp); }
   /// The first piece of the way from `from` to `to`, later. A piece of at least twice as many steps
   /// as any noted before is noted as the event `substeps`. What is not empty: it would need too
   /// many.
-  Trouble First(Timestamp from, Timestamp to, std::vector<Event>& events, Piece& piece);
+  StepError NextSubStep(Timestamp from, Timestamp to, std::vector<Event>& events,
+                        SubStep& sub_step);
 
   /// Whether a model takes a control input.
   bool has_inputs() const { return !held_.empty(); }
-  /// u (ambient) over the piece that starts at `from`, for System::motions[motion]; empty where it
+  /// u (ambient) over the piece that starts at `from`, for Problem::motions[motion]; empty where it
   /// takes none. Where none acts, an event `input_stale`, once until one does. Good until the next
   /// TakeInputs.
   std::span<const double> Input(std::size_t motion, Timestamp from, std::vector<Event>& events);

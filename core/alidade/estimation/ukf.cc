@@ -9,9 +9,9 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/frame_loop.h"
-#include "alidade/estimation/method.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/filter_engine.h"
+#include "alidade/estimation/stacked_measurements.h"
+#include "alidade/estimation/update_method.h"
 #include "alidade/state/dense_algebra.h"
 #include "alidade/state/tiles.h"
 
@@ -69,18 +69,18 @@ void MomentsOf(const Transform& transform, const Eigen::Ref<const Eigen::MatrixX
 }
 
 /// By sigma points, in place of Jacobians.
-class Unscented : public Method {
+class UkfEquations : public UpdateMethod {
  public:
-  explicit Unscented(const UkfOptions& options) : spread_(options) {}
+  explicit UkfEquations(const UkfOptions& options) : spread_(options) {}
 
-  std::unique_ptr<Method> Clone() const override { return std::make_unique<Unscented>(*this); }
-  void Begin(FilterState& f) override {
-    guarded_.assign(f.binding->sensor_places.size() + 1, false);
+  std::unique_ptr<UpdateMethod> Clone() const override {
+    return std::make_unique<UkfEquations>(*this);
   }
-  Trouble Step(FilterState& f, double dt_s) override;
-  Outcome Predict(FilterState& f, Row& row) override;
-  double ComputeNis(FilterState& f, Row& row) override;
-  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+  void Begin(FilterState& f) override { guarded_.assign(f.index->sensor_places.size() + 1, false); }
+  StepError Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, PendingMeasurement& pending) override;
+  double ComputeNis(FilterState& f, PendingMeasurement& pending) override;
+  Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
  private:
   /// What the sigma points make of one measurement.
@@ -105,10 +105,10 @@ class Unscented : public Method {
   Outcome StepPoints(FilterState& f, int halvings, double dt_s);
   Outcome StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
                     double* to);
-  Outcome PredictPoints(FilterState& f, Row& row, int halvings);
-  Predicted& PredictedOf(const FilterState& f, const Row& row);
-  Outcome StackPoints(FilterState& f, std::span<Row* const> rows, int halvings, Stacked& all,
-                      Workspace::Vector& mean);
+  Outcome PredictPoints(FilterState& f, PendingMeasurement& pending, int halvings);
+  Predicted& PredictedOf(const FilterState& f, const PendingMeasurement& pending);
+  Outcome StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows, int halvings,
+                      Stacked& all, Workspace::Vector& mean);
   void NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough);
 
   UkfOptions spread_;
@@ -123,7 +123,7 @@ class Unscented : public Method {
   const MotionBinding* failed_ = nullptr;  ///< whose plugin failed last
 };
 
-Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
+Transform UkfEquations::TransformOf(Eigen::Index directions, int halvings) const {
   const double alpha = std::ldexp(spread_.alpha, -halvings);
   if (directions == 0) return {0.0, 0.0, spread_.beta - alpha * alpha};  // no point but the centre
   const double c2 = alpha * alpha * (static_cast<double>(directions) + spread_.kappa);
@@ -133,7 +133,7 @@ Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
 /// What `attempt` makes of the widest spread at which no point is out of its domain, or else of the
 /// last that keeps its digits, after so many halvings.
 template <class Attempt>
-Outcome Unscented::Narrow(int& halvings, const Attempt& attempt) const {
+Outcome UkfEquations::Narrow(int& halvings, const Attempt& attempt) const {
   for (halvings = 0;; ++halvings) {
     const Outcome outcome = attempt(halvings);
     const bool last = !(std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha);
@@ -142,7 +142,7 @@ Outcome Unscented::Narrow(int& halvings, const Attempt& attempt) const {
 }
 
 /// A with P = A A'; repairs P where it is not positive semi-definite.
-const Eigen::MatrixXd& Unscented::RootOf(FilterState& f) {
+const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
   root_is_current_ = true;
@@ -160,7 +160,7 @@ const Eigen::MatrixXd& Unscented::RootOf(FilterState& f) {
 
 /// B with P - M M' = B B', the covariance of x given the noise that is held. M M' is a part of P: a
 /// negative pivot is rounding.
-const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
+const Eigen::MatrixXd& UkfEquations::RootWithoutHeld(const FilterState& f) {
   rest_ = f.state.covariance().lower();  // of which the lower triangle counts
   AddOuterProduct(rest_, held_, -1.0);
   SquareRootOf(rest_, ldlt_, root_of_rest_);
@@ -168,26 +168,26 @@ const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
 }
 
 /// M from the deviations of the points: along w_j alone they are those at +c and -c.
-void Unscented::TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c) {
+void UkfEquations::TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c) {
   if (!f.motions.holds()) return;
   const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
   held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < f.binding->motion_places.size(); ++i) {
+  for (std::size_t i = 0; i < f.index->motion_places.size(); ++i) {
     if (!f.motions.steps()[i].active) continue;
-    const Eigen::Index inputs = f.binding->system.motions[i].model->noise_size();
-    if (!f.binding->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
+    const Eigen::Index inputs = f.index->problem.motions[i].model->noise_size();
+    if (!f.index->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
     column += inputs;
   }
 }
 
 /// Of sensor `index`, or of the motion, where that is beyond them; `narrow_enough`: the points at
 /// this spread are of use.
-void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
+void UkfEquations::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
   const bool guarded = halvings > 0 || !narrow_enough;
   if (guarded && !guarded_[index]) {
-    const std::string who = index < f.binding->sensor_places.size()
-                                ? "sensor '" + f.binding->system.sensors[index].name + "'"
+    const std::string who = index < f.index->sensor_places.size()
+                                ? "sensor '" + f.index->problem.sensors[index].name + "'"
                                 : "motion";
     Note(f, "guarded",
          who + ": sigma points leave its domain or have no mean" +
@@ -198,8 +198,8 @@ void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool 
 }
 
 /// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
-Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
-                             double* to) {
+Outcome UkfEquations::StepPoint(FilterState& f, const double* from, const double* noise,
+                                double dt_s, double* to) {
   const Workspace::Use use(f.work);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
   Workspace::Vector next = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
@@ -207,12 +207,12 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
   for (std::size_t i = 0; i < f.motions.steps().size(); ++i) {
     const Motions::Step& step = f.motions.steps()[i];
     if (!step.active) continue;
-    const MotionBinding& motion = f.binding->system.motions[i];
+    const MotionBinding& motion = f.index->problem.motions[i];
     const Eigen::Index inputs = motion.model->noise_size();
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const MotionPlace& place = f.binding->motion_places[i];
+    const MotionPlace& place = f.index->motion_places[i];
     const Outcome outcome =
         StepAt(motion, place, from, step.u.data(), w.data(), dt_s, {.next = next.data()});
     if (outcome == Outcome::kFailed) {
@@ -227,7 +227,7 @@ Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* n
 }
 
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
-Outcome Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
+Outcome UkfEquations::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
   const bool goes_on = f.motions.in_interval();
   const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : RootOf(f);
@@ -278,10 +278,10 @@ Outcome Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
   return Outcome::kAccepted;
 }
 
-Trouble Unscented::Step(FilterState& f, double dt_s) {
+StepError UkfEquations::Step(FilterState& f, double dt_s) {
   if (std::ranges::none_of(f.motions.steps(), &Motions::Step::active)) return {};
   // The centre, and Lq.
-  if (Trouble trouble = f.motions.Evaluate(f.state, dt_s, /*derivatives=*/false)) return trouble;
+  if (StepError error = f.motions.Evaluate(f.state, dt_s, /*derivatives=*/false)) return error;
   int halvings = 0;
   const Outcome outcome = Narrow(halvings, [&](int k) { return StepPoints(f, k, dt_s); });
   if (outcome == Outcome::kAccepted) {
@@ -297,9 +297,9 @@ Trouble Unscented::Step(FilterState& f, double dt_s) {
 }
 
 /// h at the sigma points of one measurement, where it is defined at the estimate.
-Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
+Outcome UkfEquations::PredictPoints(FilterState& f, PendingMeasurement& pending, int halvings) {
   const Workspace::Use use(f.work);
-  const Geometry& geometry = row.model->measurement().geometry;
+  const Geometry& geometry = pending.model->measurement().geometry;
   const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
@@ -308,10 +308,10 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
     f.state.Retract(dx.data(), f.moved);
-    const Outcome outcome = PredictAt(f, row, f.moved, points.col(i).data());
+    const Outcome outcome = PredictAt(f, pending, f.moved, points.col(i).data());
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  Predicted& predicted = PredictedOf(f, row);
+  Predicted& predicted = PredictedOf(f, pending);
   predicted.halvings = halvings;
   predicted.h.resize(static_cast<std::size_t>(geometry.ambient));
   predicted.innovation.resize(static_cast<std::size_t>(geometry.tangent));
@@ -321,68 +321,68 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
               predicted.f(), predicted.m())) {
     return Outcome::kOutOfDomain;
   }
-  geometry.Minus(row.z, predicted.h.data(), predicted.innovation.data());
+  geometry.Minus(pending.z, predicted.h.data(), predicted.innovation.data());
   return Outcome::kAccepted;
 }
 
-Outcome Unscented::Predict(FilterState& f, Row& row) {
-  Predicted& predicted = PredictedOf(f, row);
-  predicted.centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
-  Outcome outcome = PredictAt(f, row, f.state.values(), predicted.centre.data());
+Outcome UkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
+  Predicted& predicted = PredictedOf(f, pending);
+  predicted.centre.resize(static_cast<std::size_t>(pending.model->measurement().geometry.ambient));
+  Outcome outcome = PredictAt(f, pending, f.state.values(), predicted.centre.data());
   bool too_wide = false;
   if (outcome == Outcome::kAccepted) {  // at the estimate itself
     int halvings = 0;
-    outcome = Narrow(halvings, [&](int k) { return PredictPoints(f, row, k); });
+    outcome = Narrow(halvings, [&](int k) { return PredictPoints(f, pending, k); });
     too_wide = outcome == Outcome::kOutOfDomain;
     if (outcome == Outcome::kAccepted || too_wide) {
-      NoteGuard(f, static_cast<std::size_t>(row.sensor), halvings, !too_wide);
+      NoteGuard(f, static_cast<std::size_t>(pending.sensor), halvings, !too_wide);
     }
   }
   if (outcome == Outcome::kAccepted) {
-    outcome = NoiseAt(row, RolesAt(f, row, f.state.values()));
+    outcome = NoiseAt(pending, RolesAt(f, pending, f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
-    std::ranges::copy(predicted.h, row.h);
-    std::ranges::copy(predicted.innovation, row.innovation);
-    row.report->h = {row.h, predicted.h.size()};
-    row.report->innovation = {row.innovation, predicted.innovation.size()};
-    row.H.clear();  // there is none
+    std::ranges::copy(predicted.h, pending.h);
+    std::ranges::copy(predicted.innovation, pending.innovation);
+    pending.report->h = {pending.h, predicted.h.size()};
+    pending.report->innovation = {pending.innovation, predicted.innovation.size()};
+    pending.H.clear();  // there is none
   } else if (!too_wide) {
-    NoteRefusal(f, row, outcome);
+    NoteRefusal(f, pending, outcome);
   }
   return outcome;
 }
 
 /// S = Cov(h) + R.
-double Unscented::ComputeNis(FilterState& f, Row& row) {
-  Predicted& predicted = PredictedOf(f, row);
-  const Eigen::Index m = row.report->dof;
-  Workspace::Matrix s(row.s, m, m);
+double UkfEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
+  Predicted& predicted = PredictedOf(f, pending);
+  const Eigen::Index m = pending.report->dof;
+  Workspace::Matrix s(pending.s, m, m);
   MomentsOf(TransformOf(RootOf(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
-  s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
-  row.report->s = {row.s, row.R.size()};
-  return SquaredMahalanobis(row.s, row.innovation, row.report->dof, f.work);
+  s += Eigen::Map<const RowMajor>(pending.R.data(), m, m);
+  pending.report->s = {pending.s, pending.R.size()};
+  return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
 }
 
 /// All rows at one spread, also those that the gate saw at a wider one: f in place of H, R,
 /// innovation and m below one another.
-Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int halvings,
-                               Stacked& all, Workspace::Vector& mean) {
+Outcome UkfEquations::StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                  int halvings, Stacked& all, Workspace::Vector& mean) {
   all.noise.setZero();
   Eigen::Index at = 0;
-  for (Row* row : rows) {
-    Predicted& predicted = PredictedOf(f, *row);
+  for (PendingMeasurement* pending : rows) {
+    Predicted& predicted = PredictedOf(f, *pending);
     if (predicted.halvings < halvings) {
-      const Outcome outcome = PredictPoints(f, *row, halvings);
+      const Outcome outcome = PredictPoints(f, *pending, halvings);
       if (outcome != Outcome::kAccepted) {  // h is defined at the estimate: it does not diverge
-        if (outcome == Outcome::kFailed) NotePluginFailure(f, *row);
-        row->report->outcome = outcome;
+        if (outcome == Outcome::kFailed) NotePluginFailure(f, *pending);
+        pending->report->outcome = outcome;
         return Outcome::kNotFinite;
       }
     }
-    const Eigen::Index k = row->report->dof;
+    const Eigen::Index k = pending->report->dof;
     all.h.middleRows(at, k) = predicted.f();
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->R.data(), k, k);
+    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(pending->R.data(), k, k);
     all.innovation.segment(at, k) =
         Eigen::Map<const Eigen::VectorXd>(predicted.innovation.data(), k);
     mean.segment(at, k) = predicted.m();
@@ -391,13 +391,13 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
   return Outcome::kAccepted;
 }
 
-Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
+Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Workspace::Use use(f.work);
   const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols(), m = TotalDof(rows);
   int halvings = 0;  // of the narrowest
-  for (const Row* row : rows) {
-    halvings = std::max(halvings, PredictedOf(f, *row).halvings);
+  for (const PendingMeasurement* pending : rows) {
+    halvings = std::max(halvings, PredictedOf(f, *pending).halvings);
   }
   Stacked all{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
   Workspace::Vector mean = f.work.Take(m), centre = f.work.Take(n), step = f.work.Take(n);
@@ -433,8 +433,9 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
 }
 
 /// By the place of its report.
-Unscented::Predicted& Unscented::PredictedOf(const FilterState& f, const Row& row) {
-  const auto index = static_cast<std::size_t>(row.report - f.report.measurements().data());
+UkfEquations::Predicted& UkfEquations::PredictedOf(const FilterState& f,
+                                                   const PendingMeasurement& pending) {
+  const auto index = static_cast<std::size_t>(pending.report - f.report.measurements().data());
   if (predicted_.size() <= index) predicted_.resize(index + 1);
   return predicted_[index];
 }
@@ -442,10 +443,10 @@ Unscented::Predicted& Unscented::PredictedOf(const FilterState& f, const Row& ro
 }  // namespace
 }  // namespace internal
 
-Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Filter(CheckedProblem(std::move(system), "Ukf", kSupport),
+Ukf::Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(CheckedProblem(std::move(problem), "Ukf", kCapabilities),
              internal::WithoutRecovery(options.filter), streams,
-             std::make_unique<internal::Unscented>(options)) {
+             std::make_unique<internal::UkfEquations>(options)) {
   internal::ExpectOption(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0, "alpha",
                          options.alpha, "UkfOptions::kLeastAlpha to 1");
   internal::ExpectOption(options.beta >= 0.0, "beta", options.beta, "at least 0");

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/estimation/filter.h"
-#include "alidade/estimation/support.h"
 
 namespace alidade {
 
@@ -47,11 +47,12 @@ class Ukf : public Filter {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
-  static constexpr Support kSupport = {};
+  static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// Errors: kBadConfig if `system` asks for more than kSupport or an option is out of its range.
-  Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
-  explicit Ukf(const System& problem, const UkfOptions& options = {})
+  /// Errors: kBadConfig if `problem` asks for more than kCapabilities or an option is out of its
+  /// range.
+  Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInfo>& streams);
+  explicit Ukf(const Problem& problem, const UkfOptions& options = {})
       : Ukf(problem, options, problem.streams) {}
 };
 

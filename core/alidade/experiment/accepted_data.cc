@@ -19,12 +19,12 @@ std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
 
 }  // namespace
 
-Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
+Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const Problem& problem,
                  const UpdateReport& report) {
   Frame accepted{frame.timestamp, {}};
   std::vector<std::optional<std::vector<bool>>> used(streams.size());  // none: of no sensor
-  for (int sensor = 0; sensor < std::ssize(system.sensors); ++sensor) {
-    const std::string& stream = system.sensors[static_cast<std::size_t>(sensor)].stream;
+  for (int sensor = 0; sensor < std::ssize(problem.sensors); ++sensor) {
+    const std::string& stream = problem.sensors[static_cast<std::size_t>(sensor)].stream;
     const auto found = std::ranges::find(streams, stream, &StreamInfo::name);
     ALIDADE_EXPECTS(found != streams.end());
     used[static_cast<std::size_t>(found - streams.begin())] = UsedOf(sensor, report);

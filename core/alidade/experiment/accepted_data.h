@@ -7,9 +7,9 @@
 
 namespace alidade::internal {
 
-/// `frame` with those of its measurements alone that an estimator of `system` accepted or took as
+/// `frame` with those of its measurements alone that an estimator of `problem` accepted or took as
 /// first values, as its `report` of the frame says. Each of its streams goes to one sensor.
-Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
+Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const Problem& problem,
                  const UpdateReport& report);
 
 }  // namespace alidade::internal

@@ -5,11 +5,11 @@
 #include <exception>
 #include <new>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
 #include "alidade/experiment/calibration.h"
 #include "alidade/experiment/defect_node.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/read_problem.h"
 #include "alidade/plugin/plugin_host.h"
 
@@ -17,10 +17,10 @@ namespace alidade::internal {
 namespace {
 
 /// What the estimator of a plugin can do. One that does not state it refuses by itself the rest.
-const Support& SupportOf(const PluginEntry& entry) {
-  static constexpr Support kUnsaid = {
+const EstimatorCapabilities& SupportOf(const PluginEntry& entry) {
+  static constexpr EstimatorCapabilities kUnsaid = {
       .consider = true, .at_measurement = true, .from_measurement = true};
-  const Support* const support = EstimatorOf(entry).support;
+  const EstimatorCapabilities* const support = EstimatorOf(entry).support;
   return support != nullptr ? *support : kUnsaid;
 }
 
@@ -101,12 +101,12 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
   FailOffered(type, host, node);
 }
 
-/// Refuses by name what `system`, built from the config `root`, asks for beyond `support`.
-void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
-                       const System& system) {
-  const auto asked = FindUnsupported(system, support);
+/// Refuses by name what `problem`, built from the config `root`, asks for beyond `support`.
+void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& support,
+                       const Node& root, const Problem& problem) {
+  const auto asked = FindUnsupported(problem, support);
   if (!asked) return;
-  NodeOf(*asked, root, system)
+  NodeOf(*asked, root, problem)
       .Fail("estimator type '" + type + "' does not support " + asked->what,
             asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
@@ -127,10 +127,10 @@ void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
 }
 
 /// Refuses `fuse: per_measurement` where a sensor looks for matches that agree.
-void RefuseLoneMatches(const Node& entry, const System& system) {
+void RefuseLoneMatches(const Node& entry, const Problem& problem) {
   const auto fuse = entry.Find("fuse");
   if (!fuse || fuse->Text() != "per_measurement") return;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     if (!sensor.outlier_rejection) continue;
     fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
                    "' asks by its `outlier_rejection`",
@@ -164,9 +164,9 @@ void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const 
   if (filter.estimator->offline()) {
     by.Fail(quoted + " has its estimates at the end only", "a filter");
   }
-  for (const SensorBinding& sensor : spec.system.sensors) {
-    const int index = filter.system.FindSensor(sensor.name);
-    const auto& theirs = filter.system.sensors;
+  for (const SensorBinding& sensor : spec.problem.sensors) {
+    const int index = filter.problem.FindSensor(sensor.name);
+    const auto& theirs = filter.problem.sensors;
     if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
       by.Fail(
           quoted + " does not use sensor '" + sensor.name + "' on stream '" + sensor.stream + "'",
@@ -182,9 +182,9 @@ void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const 
 
 /// Refuses a control input of `spec` that is a measurement of `filter`, which may not accept it.
 void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& by) {
-  for (const MotionBinding& motion : spec.system.motions) {
+  for (const MotionBinding& motion : spec.problem.motions) {
     const std::string& stream = motion.input.stream;
-    const auto& theirs = filter.system.sensors;
+    const auto& theirs = filter.problem.sensors;
     const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
     if (!motion.model->has_input() || sensor == theirs.end()) continue;
     by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
@@ -229,7 +229,7 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const EstimatorSpec&
                                 const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
                                 const Node& node) {
   const auto made = [&] {
-    return make(spec.system, streams != nullptr ? *streams : spec.system.streams);
+    return make(spec.problem, streams != nullptr ? *streams : spec.problem.streams);
   };
   if (plugin == nullptr) return made();
   std::string why = "an exception of unknown type";
@@ -271,7 +271,8 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   const PluginEntry* const of_plugin =
       of_core == nullptr ? &FindOffered(spec.type, host, type) : nullptr;
   spec.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
-  const Support& support = of_core != nullptr ? of_core->support : SupportOf(*of_plugin);
+  const EstimatorCapabilities& support =
+      of_core != nullptr ? of_core->support : SupportOf(*of_plugin);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, spec.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -299,15 +300,15 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   if (use && use->is_map()) use->Declare("accepted_by");
   RefuseUnsupportedKeys(spec.type, entry);
   entry.RejectUnread();
-  spec.system = ReadProblem(own.root(), host, only);
-  RefuseUnsupported(spec.type, support, own.root(), spec.system);
+  spec.problem = ReadProblem(own.root(), host, only);
+  RefuseUnsupported(spec.type, support, own.root(), spec.problem);
   if (of_core != nullptr) {
-    RefuseLoneMatches(entry, spec.system);
+    RefuseLoneMatches(entry, spec.problem);
   }
-  if (streams != nullptr) CheckStreams(own.root(), spec.system, *streams);
+  if (streams != nullptr) CheckStreams(own.root(), spec.problem, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
-  if (lent && spec.system.landmarks) {
-    LandmarkOptions& landmarks = *spec.system.landmarks;
+  if (lent && spec.problem.landmarks) {
+    LandmarkOptions& landmarks = *spec.problem.landmarks;
     landmarks.min_observations = 1;
     if (landmarks.prior) landmarks.prior->min_observations = 0;
   }
@@ -332,11 +333,12 @@ int FindStream(const Node& sensor, const SensorModel& model,
   return index;
 }
 
-void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams) {
-  for (const SensorBinding& sensor : system.sensors) {
+void CheckStreams(const Node& root, const Problem& problem,
+                  const std::vector<StreamInfo>& streams) {
+  for (const SensorBinding& sensor : problem.sensors) {
     FindStream(root.At("sensors").At(sensor.name), *sensor.model, streams);
   }
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     if (!motion.model->has_input()) continue;
     const Space& input = motion.model->input();
     FindStreamOf(root.At("state").At(motion.name).At("input"), input.geometry.ambient,

@@ -14,7 +14,7 @@ int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams);
 
 /// Refuses a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
-void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams);
+void CheckStreams(const Node& root, const Problem& problem, const std::vector<StreamInfo>& streams);
 
 /// The entry `name` of the config's `estimators:`, given the streams of its source (null: those
 /// that it takes) and the estimators before it. Errors: those of BuildExperiment.

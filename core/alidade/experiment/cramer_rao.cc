@@ -6,24 +6,24 @@
 #include <memory>
 #include <utility>
 
-#include "alidade/estimation/linear.h"
+#include "alidade/estimation/ekf_equations.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/model/landmark.h"
 
 namespace alidade::internal {
 namespace {
 
-/// The system whose best filter is asked for: every measurement counts by its nominal noise, with
+/// The problem whose best filter is asked for: every measurement counts by its nominal noise, with
 /// its Jacobian at the state, and corrects all that it tells of.
-System Ideal(System system) {
-  for (SensorBinding& sensor : system.sensors) {
+Problem Ideal(Problem problem) {
+  for (SensorBinding& sensor : problem.sensors) {
     sensor.loss = {};
     for (RoleBinding& role : sensor.roles) {
       role.jacobian_at = JacobianAt::kPrediction;
       if (role.mode == RoleMode::kConsider) role.mode = RoleMode::kEstimate;
     }
   }
-  return system;
+  return problem;
 }
 
 /// Whether a measurement that counts could not be used.
@@ -45,13 +45,13 @@ std::string WhyNotAtTruth(const SensorBinding& sensor) {
   return "";
 }
 
-/// Of a system with landmarks.
-std::string WhyNoMap(const System& system) {
-  for (std::size_t i = 0; i < system.sensors.size(); ++i) {
-    const SensorBinding& sensor = system.sensors[i];
+/// Of a problem with landmarks.
+std::string WhyNoMap(const Problem& problem) {
+  for (std::size_t i = 0; i < problem.sensors.size(); ++i) {
+    const SensorBinding& sensor = problem.sensors[i];
     for (std::size_t k = 0; k < i; ++k) {
-      if (system.sensors[k].stream != sensor.stream) continue;
-      return '\'' + system.sensors[k].name + "' and '" + sensor.name + "' share a stream";
+      if (problem.sensors[k].stream != sensor.stream) continue;
+      return '\'' + problem.sensors[k].name + "' and '" + sensor.name + "' share a stream";
     }
     if (!sensor.model->has_landmark()) continue;
     if (std::string why = WhyNotAtTruth(sensor); !why.empty()) return why;
@@ -77,13 +77,13 @@ std::vector<double> Written(LandmarkRepresentation representation, const std::ar
 
 }  // namespace
 
-std::string CramerRaoBound::WhyNone(const System& system, const std::vector<StreamInfo>& truths) {
-  if (system.landmarks) {
-    if (std::string why = WhyNoMap(system); !why.empty()) return why;
+std::string CramerRaoBound::WhyNone(const Problem& problem, const std::vector<StreamInfo>& truths) {
+  if (problem.landmarks) {
+    if (std::string why = WhyNoMap(problem); !why.empty()) return why;
   }
-  const std::vector<int> match = MatchTruths(system.layout, truths);
+  const std::vector<int> match = MatchTruths(problem.layout, truths);
   for (BlockId id = 0; id < std::ssize(match); ++id) {
-    const Block& block = system.layout[id];
+    const Block& block = problem.layout[id];
     const int truth = match[static_cast<std::size_t>(id)];
     const std::string name = '\'' + block.name + '\'';
     if (block.status == BlockStatus::kConsider) return name + " is a consider state";
@@ -96,17 +96,17 @@ std::string CramerRaoBound::WhyNone(const System& system, const std::vector<Stre
   return "";
 }
 
-CramerRaoBound::CramerRaoBound(const System& system, const std::vector<StreamInfo>& streams,
+CramerRaoBound::CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                                const std::vector<StreamInfo>& truths, TrueLandmark true_landmark)
-    : loop_(Ideal(system), WithoutRecovery({}), streams, std::make_unique<Linear>()),
+    : loop_(Ideal(problem), WithoutRecovery({}), streams, std::make_unique<EkfEquations>()),
       true_landmark_(std::move(true_landmark)),
-      truths_(MatchTruths(system.layout, truths)) {
-  ALIDADE_EXPECTS(WhyNone(system, truths).empty());
-  ALIDADE_EXPECTS(!system.landmarks || true_landmark_);
+      truths_(MatchTruths(problem.layout, truths)) {
+  ALIDADE_EXPECTS(WhyNone(problem, truths).empty());
+  ALIDADE_EXPECTS(!problem.landmarks || true_landmark_);
   for (const StreamInfo& stream : streams) {
-    const auto at = std::ranges::find(system.sensors, stream.name, &SensorBinding::stream);
-    const auto sensor = static_cast<int>(at - system.sensors.begin());
-    sensors_.push_back(at == system.sensors.end() ? -1 : sensor);
+    const auto at = std::ranges::find(problem.sensors, stream.name, &SensorBinding::stream);
+    const auto sensor = static_cast<int>(at - problem.sensors.begin());
+    sensors_.push_back(at == problem.sensors.end() ? -1 : sensor);
   }
 }
 
@@ -137,7 +137,7 @@ bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
   for (Measurement& one : frame.measurements) {
     const int index = sensors_[static_cast<std::size_t>(one.stream)];
     if (index < 0) continue;
-    const SensorBinding& sensor = f.binding->system.sensors[static_cast<std::size_t>(index)];
+    const SensorBinding& sensor = f.index->problem.sensors[static_cast<std::size_t>(index)];
     const SensorModel& model = *sensor.model;
     if (f.blocks.waiting || model.Valid({one.values.data(), one.known.data()}) != Status::kOk)
       continue;

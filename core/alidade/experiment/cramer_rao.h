@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/filter_engine.h"
 #include "alidade/experiment/source.h"
 
 namespace alidade::internal {
@@ -27,7 +27,7 @@ namespace alidade::internal {
 /// from one.
 ///
 /// Landmarks are set to truth as well, in the representation that they have, from where the camera
-/// truly was. So that they start there, too, a system with landmarks is given h at truth in place
+/// truly was. So that they start there, too, a problem with landmarks is given h at truth in place
 /// of each valid measurement: no update moves the state, and a landmark is initialised with the
 /// Jacobians at truth. A prior of the inverse distance gives its sigma; its mean does not count.
 class CramerRaoBound {
@@ -35,11 +35,11 @@ class CramerRaoBound {
   /// Where the landmark of an id truly is, m.
   using TrueLandmark = std::function<std::optional<std::array<double, 3>>(std::int64_t id)>;
 
-  /// Why a system has none here, in words that follow `no Cramer-Rao bound: `; "": it has one.
-  static std::string WhyNone(const System& system, const std::vector<StreamInfo>& truths);
+  /// Why a problem has none here, in words that follow `no Cramer-Rao bound: `; "": it has one.
+  static std::string WhyNone(const Problem& problem, const std::vector<StreamInfo>& truths);
 
-  /// Of a system that has one.
-  CramerRaoBound(const System& system, const std::vector<StreamInfo>& streams,
+  /// Of a problem that has one.
+  CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                  const std::vector<StreamInfo>& truths, TrueLandmark true_landmark = {});
 
   /// The frames of a run, in the order of time. False, and for good, where the truth of a block or
@@ -56,7 +56,7 @@ class CramerRaoBound {
                                              std::span<const Block* const> anchors) const;
   bool MeasureAtTruth(Frame& frame, bool& all) const;
 
-  FrameLoop loop_;
+  FilterEngine loop_;
   TrueLandmark true_landmark_;
   std::vector<int> sensors_;                              ///< by stream; -1: none
   std::map<std::string, std::vector<double>> landmarks_;  ///< true values, by block

@@ -19,16 +19,16 @@ Node ConsiderOf(const Node& state, const Block& block) {
 
 }  // namespace
 
-Node NodeOf(const ProblemDefect& defect, const Node& root, const System& system) {
+Node NodeOf(const ProblemDefect& defect, const Node& root, const Problem& problem) {
   if (defect.block >= 0) {
-    const Block& block = system.layout[defect.block];
+    const Block& block = problem.layout[defect.block];
     const auto entry = root.At("state").Find(block.owner);
     const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
     if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
     return state.At("initial").At(NameIn(block)).At("from_measurement");
   }
   if (defect.sensor < 0) return root.At("landmarks");
-  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(defect.sensor)];
+  const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
   const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(defect.role)].name);
   if (!role) return roles;  // one that a time offset adds

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "alidade/config/config.h"
-#include "alidade/estimation/support.h"
+#include "alidade/estimation/estimator_capabilities.h"
 
 namespace alidade::internal {
 
-/// The node of the config `root`, of which `system` was made, that a defect of it is about.
-Node NodeOf(const ProblemDefect& defect, const Node& root, const System& system);
+/// The node of the config `root`, of which `problem` was made, that a defect of it is about.
+Node NodeOf(const ProblemDefect& defect, const Node& root, const Problem& problem);
 
 }  // namespace alidade::internal

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/map_metrics.h"
 #include "alidade/experiment/run_log.h"
 
@@ -12,9 +12,9 @@ namespace alidade::internal {
 namespace {
 
 /// An event `unit` for each sensor whose measurements are far from all that it predicts.
-void AddUnitEvents(const System& system, const Metrics& metrics, EstimatorResult& result) {
+void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResult& result) {
   for (const int index : metrics.far_off()) {
-    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
+    const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(index)];
     const Space& measured = sensor.model->measurement();
     const bool angle = measured.geometry.kind == GeometryKind::kAngle;
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
@@ -58,8 +58,8 @@ void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
 }
 
 /// An event `unused` for each sensor of which the whole run used no measurement.
-void AddUnusedEvents(const System& system, EstimatorResult& result) {
-  for (const SensorBinding& sensor : system.sensors) {
+void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
+  for (const SensorBinding& sensor : problem.sensors) {
     std::int64_t used = 0, all = 0;
     std::vector<std::string> others;
     for (const auto& [key, count] : result.counts) {
@@ -87,7 +87,7 @@ void AddUnusedEvents(const System& system, EstimatorResult& result) {
 
 void Diagnose(const Experiment& experiment, EstimatorRun& run) {
   EstimatorResult& result = run.result;
-  const System& system = run.spec.system;
+  const Problem& problem = run.spec.problem;
   const Estimator& estimator = *run.spec.estimator;
   result.counts = run.metrics.counts();
   if (run.stale_inputs > 0) result.counts["input_stale"] = run.stale_inputs;
@@ -95,9 +95,9 @@ void Diagnose(const Experiment& experiment, EstimatorRun& run) {
   const std::size_t before = result.events.size();
   NoteMap(run.spec, *experiment.source, result);
   const bool is_known = run.has_estimate && !estimator.failed();
-  if (is_known) AddUnusedEvents(system, result);
+  if (is_known) AddUnusedEvents(problem, result);
   if (is_known && experiment.reference < 0) AddTruthEvent(run.metrics, result);
-  AddUnitEvents(system, run.metrics, result);
+  AddUnitEvents(problem, run.metrics, result);
   if (is_known) AddConsistencyEvents(result);
   LogEvents(result.name, std::span(result.events).subspan(before));
   run.AddEvents(run.metrics.events());

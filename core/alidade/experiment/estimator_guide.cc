@@ -8,11 +8,11 @@
 
 namespace alidade::internal {
 
-const SensorBinding* GuidingSensor(const System& system, std::string_view stream) {
-  const auto found = std::ranges::find_if(system.sensors, [&](const SensorBinding& sensor) {
+const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stream) {
+  const auto found = std::ranges::find_if(problem.sensors, [&](const SensorBinding& sensor) {
     return sensor.stream == stream && sensor.model->known_size() == 0;
   });
-  return found == system.sensors.end() ? nullptr : &*found;
+  return found == problem.sensors.end() ? nullptr : &*found;
 }
 
 EstimatorGuide::EstimatorGuide(Experiment& experiment) : experiment_(experiment) {
@@ -33,7 +33,7 @@ std::vector<Expected> EstimatorGuide::Expect(int stream, Timestamp timestamp,
   std::vector<Expected> all(landmarks.size());
   const Filter& filter = *experiment_.guide;
   const std::string& name = experiment_.source->streams().at(static_cast<std::size_t>(stream)).name;
-  const SensorBinding* const sensor = GuidingSensor(filter.system(), name);
+  const SensorBinding* const sensor = GuidingSensor(filter.problem(), name);
   if (sensor == nullptr) return all;
   const std::vector<std::optional<Prediction>> each =
       filter.ExpectEach(sensor->name, timestamp, landmarks);

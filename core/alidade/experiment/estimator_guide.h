@@ -10,7 +10,7 @@
 namespace alidade::internal {
 
 /// The first sensor on that stream that takes no known numbers; null: there is none.
-const SensorBinding* GuidingSensor(const System& system, std::string_view stream);
+const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stream);
 
 /// Lends the experiment's source, as long as this lives, what the filter `experiment.guide` expects
 /// of it, as that filter is when it is asked, by its GuidingSensor of a stream. Does nothing where

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/estimation/estimator.h"
-#include "alidade/estimation/support.h"
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/model/params.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
@@ -17,9 +17,9 @@ namespace alidade {
 
 inline constexpr const char* kEstimatorKind = "estimator";
 
-/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
+/// Makes an estimator, its options read, once its problem is known; `streams` are the source's.
 using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
-    const System& system, const std::vector<StreamInfo>& streams)>;
+    const Problem& problem, const std::vector<StreamInfo>& streams)>;
 
 /// What an estimator reads its options from.
 struct EstimatorArguments {
@@ -32,13 +32,13 @@ struct EstimatorEntry {
   const char* name;
   const char* doc;
   const char* citation;
-  /// Reads the options; what it returns makes the estimator once its system is known. Errors of
+  /// Reads the options; what it returns makes the estimator once its problem is known. Errors of
   /// both: an Error with a place, as of Node::Fail.
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
   EstimatorKind kind = EstimatorKind::kFilter;
-  /// What it can do; what a system asks for beyond is refused by name before `create`'s maker is
+  /// What it can do; what a problem asks for beyond is refused by name before `create`'s maker is
   /// asked. Null: it takes no landmarks, and refuses by itself what else it cannot do.
-  const Support* support = nullptr;
+  const EstimatorCapabilities* support = nullptr;
 };
 constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
   return {kEstimatorKind, estimator.name, estimator.doc, estimator.citation, "", &estimator};

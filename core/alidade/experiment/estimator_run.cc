@@ -6,7 +6,7 @@
 #include <iterator>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/estimation/observability.h"
 #include "alidade/experiment/run_log.h"
 
@@ -15,12 +15,12 @@ namespace {
 
 /// The frame without the streams that only failed sensors read; `failed` by sensor.
 Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams,
-                    const System& system, const std::vector<char>& failed) {
+                    const Problem& problem, const std::vector<char>& failed) {
   const auto goes_on = [&](const Measurement& m) {
     const std::string& stream = streams[static_cast<std::size_t>(m.stream)].name;
     bool read = false, works = false;
-    for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-      if (system.sensors[s].stream != stream) continue;
+    for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+      if (problem.sensors[s].stream != stream) continue;
       read = true;
       works = works || failed[s] == 0;
     }
@@ -39,7 +39,7 @@ EstimatorRun::AfterFrame EstimatorRun::Process(const Frame& frame,
   if (rolled_back != nullptr) return {*rolled_back->after, rolled_back->report, {}};
   Frame visible;
   const bool all = failed_sensors.empty();
-  if (!all) visible = WithoutFailed(frame, streams, spec.system, failed_sensors);
+  if (!all) visible = WithoutFailed(frame, streams, spec.problem, failed_sensors);
   const auto started = std::chrono::steady_clock::now();
   const UpdateReport& report = spec.estimator->Process(all ? frame : visible);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
@@ -50,14 +50,14 @@ std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
   if (spec.on_plugin_failure == OnPluginFailure::kSkip) return {};
   for (const MeasurementReport& m : report.measurements()) {
     if (m.outcome != Outcome::kFailed) continue;
-    const SensorBinding& sensor = spec.system.sensors[static_cast<std::size_t>(m.sensor)];
+    const SensorBinding& sensor = spec.problem.sensors[static_cast<std::size_t>(m.sensor)];
     if (spec.on_plugin_failure == OnPluginFailure::kAbort) {
       const std::string& plugin = sensor.model->description().origin;
       return "sensor '" + sensor.name + "', model '" + sensor.model->name() + "'" +
              (plugin.empty() ? "" : " of plugin " + plugin) +
              ", failed: " + sensor.model->error_text();
     }
-    failed_sensors.resize(spec.system.sensors.size(), 0);
+    failed_sensors.resize(spec.problem.sensors.size(), 0);
     char& failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
     if (failed == 0) {
       AddEvents({{spec.estimator->timestamp(), "sensor_disabled",
@@ -77,7 +77,7 @@ void EstimatorRun::AddEstimate(std::size_t k, const FrameWithSegments& frame, co
   } else {
     metrics.AddReport(frame.in_segment, report);
     if (!report.stale) {
-      estimates.push_back({k, ValuesOf(state, spec.system.layout.blocks().size())});
+      estimates.push_back({k, ValuesOf(state, spec.problem.layout.blocks().size())});
     }
   }
   result.removed_landmarks.insert(result.removed_landmarks.end(), report.removed_landmarks.begin(),
@@ -114,11 +114,11 @@ EstimatorResult ResultOf(const EstimatorSpec& spec, const Experiment& experiment
     result.accepted_by = experiment.estimators[static_cast<std::size_t>(spec.accepted_by)].name;
   }
   result.overrides = spec.overrides;
-  result.sensors = NamesOf(spec.system.sensors);
-  const BlockId position = PositionBlockOf(spec.system);
-  if (position >= 0) result.position_block = spec.system.layout[position].name;
-  result.unobservable = UnobservableDirections(spec.system);
-  if (!ObservabilityIsTold(spec.system)) {
+  result.sensors = NamesOf(spec.problem.sensors);
+  const BlockId position = PositionBlockOf(spec.problem);
+  if (position >= 0) result.position_block = spec.problem.layout[position].name;
+  result.unobservable = UnobservableDirections(spec.problem);
+  if (!ObservabilityIsTold(spec.problem)) {
     result.events.push_back({kNoTimestamp, "observability",
                              "not looked into: the state has more than " +
                                  std::to_string(kMostObserved) + " elements"});
@@ -139,7 +139,7 @@ std::vector<EstimatorRun> BeginAll(Experiment& experiment) {
   for (std::size_t t = 0; t < experiment.truth_sigmas.size(); ++t)
     truths.at(t).sigma = experiment.truth_sigmas[t];
   if (reference >= 0) {
-    truths = BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].system);
+    truths = BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].problem);
   }
   std::vector<EstimatorRun> running;
   for (EstimatorSpec& spec : experiment.estimators) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/filter.h"
 #include "alidade/experiment/build_estimator.h"
@@ -32,7 +32,7 @@ void CheckSchema(const Node& root) {
   }
 }
 
-std::vector<Segment> ReadSegments(const Node& root, const System& system,
+std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
                                   const std::vector<StreamInfo>& streams) {
   std::vector<Segment> segments;
   const auto evaluate = root.Find("evaluate");
@@ -46,12 +46,12 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
                    "one of with: SENSOR, without: SENSOR");
       }
       const Node& sensor = with ? *with : *without;
-      const int index = system.FindSensor(sensor.Text());
+      const int index = problem.FindSensor(sensor.Text());
       if (index < 0) {
         sensor.Fail("no sensor '" + sensor.Text() + "'", "a name from `sensors`",
-                    Nearest(sensor.Text(), NamesOf(system.sensors)));
+                    Nearest(sensor.Text(), NamesOf(problem.sensors)));
       }
-      const SensorBinding& binding = system.sensors[static_cast<std::size_t>(index)];
+      const SensorBinding& binding = problem.sensors[static_cast<std::size_t>(index)];
       const int stream =
           internal::FindStream(root.At("sensors").At(binding.name), *binding.model, streams);
       segments.push_back({name, stream, with.has_value(), binding.model});
@@ -65,14 +65,14 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
 
 /// Refuses a truth that the config names where it belongs to no block, be it of `whole` or of an
 /// estimator's own state.
-void CheckTruths(const Node& source, const Experiment& experiment, const System& whole) {
+void CheckTruths(const Node& source, const Experiment& experiment, const Problem& whole) {
   const auto listed = source.Find("truth");
   if (!listed || !listed->is_map()) return;
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const auto node = listed->Find(truths[t].name);
     const auto has_block = [&](const EstimatorSpec& one) {
-      return internal::WhyNoBlock(one.system.layout, truths, t).empty();
+      return internal::WhyNoBlock(one.problem.layout, truths, t).empty();
     };
     const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
     if (!node || why.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
@@ -109,11 +109,11 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
 }
 
 /// For each stream the first sensor of the config that it goes to; behind them those of none.
-std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const System& system) {
+std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const Problem& problem) {
   std::vector<int> ranks;
   for (const StreamInfo& stream : streams) {
-    const auto first = std::ranges::find(system.sensors, stream.name, &SensorBinding::stream);
-    ranks.push_back(static_cast<int>(first - system.sensors.begin()));
+    const auto first = std::ranges::find(problem.sensors, stream.name, &SensorBinding::stream);
+    ranks.push_back(static_cast<int>(first - problem.sensors.begin()));
   }
   return ranks;
 }
@@ -165,7 +165,7 @@ const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   }
   const std::vector<StreamInfo>& streams = experiment.source->streams();
   const bool can = std::ranges::any_of(streams, [&](const StreamInfo& stream) {
-    return internal::GuidingSensor(filter->system(), stream.name) != nullptr;
+    return internal::GuidingSensor(filter->problem(), stream.name) != nullptr;
   });
   if (!can) {
     guide.Fail("estimator '" + name + "' has no sensor that tells where features are",
@@ -263,7 +263,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
   // Every sensor is checked, whether or not an estimator uses it.
-  const System whole = ReadProblem(root, host, {});
+  const Problem whole = ReadProblem(root, host, {});
   internal::CheckStreams(root, whole, streams);
   experiment.out_of_sequence.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);

@@ -11,8 +11,8 @@
 
 #include "alidade/config/config.h"
 #include "alidade/estimation/estimator.h"
-#include "alidade/estimation/support.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/estimator_capabilities.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/experiment/source.h"
 #include "alidade/plugin/plugin_host.h"
 
@@ -28,12 +28,12 @@ enum class OnDivergence { kReport, kFail };
 /// from then on, once every sensor of the estimator on it has failed; the run ends.
 enum class OnPluginFailure { kSkip, kDisable, kAbort };
 
-/// One estimator to be run, on its own system: the config with the estimator's overrides merged in.
+/// One estimator to be run, on its own problem: the config with its overrides merged in.
 struct EstimatorSpec {
   std::string name;
   std::string type;
   EstimatorKind kind = EstimatorKind::kFilter;
-  System system;
+  Problem problem;
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
   OnPluginFailure on_plugin_failure = OnPluginFailure::kSkip;

@@ -25,10 +25,10 @@ void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<dou
 /// What the models of the experiment say of a stream.
 Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
   for (const EstimatorSpec& spec : experiment.estimators) {
-    for (const SensorBinding& sensor : spec.system.sensors) {
+    for (const SensorBinding& sensor : spec.problem.sensors) {
       if (sensor.stream == stream.name) return sensor.model->measurement().geometry;
     }
-    for (const MotionBinding& motion : spec.system.motions) {
+    for (const MotionBinding& motion : spec.problem.motions) {
       if (motion.input.stream == stream.name) return motion.model->input().geometry;
     }
   }
@@ -47,11 +47,11 @@ FrameCheck::FrameCheck(const Experiment& experiment, Counts& normalised)
     truths_.push_back({truth, Geometry::Vector(truth.size)});
   }
   for (const EstimatorSpec& spec : experiment.estimators) {
-    const std::vector<int> match = MatchTruths(spec.system.layout, truths);
+    const std::vector<int> match = MatchTruths(spec.problem.layout, truths);
     for (std::size_t block = 0; block < match.size(); ++block) {
       if (match[block] < 0) continue;
       truths_[static_cast<std::size_t>(match[block])].geometry =
-          spec.system.layout.blocks()[block].geometry();
+          spec.problem.layout.blocks()[block].geometry();
     }
   }
 }

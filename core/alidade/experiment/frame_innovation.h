@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 namespace alidade::internal {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/accepted_data.h"
 
 namespace alidade::internal {
@@ -209,7 +209,7 @@ Frame FrameOrder::Accepted(std::size_t index, int by) const {
   const auto filter = static_cast<std::size_t>(by);
   const ProcessedFrame& processed = snapshots_[filter]->frames()[index];
   return AcceptedOf(processed.frame, experiment_.source->streams(),
-                    experiment_.estimators[filter].system, processed.report);
+                    experiment_.estimators[filter].problem, processed.report);
 }
 
 }  // namespace alidade::internal

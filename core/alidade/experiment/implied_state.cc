@@ -10,7 +10,7 @@ namespace alidade::internal {
 namespace {
 
 /// Whether the block is a scalar that the sensor tells from a measurement alone.
-bool IsInvertible(const System& system, const SensorBinding& binding) {
+bool IsInvertible(const Problem& problem, const SensorBinding& binding) {
   const int role = binding.model->inverse().role;
   const int roles = static_cast<int>(binding.roles.size());
   if (role < 0 || role >= roles) return false;
@@ -18,7 +18,7 @@ bool IsInvertible(const System& system, const SensorBinding& binding) {
     if (r != role && binding.roles[static_cast<std::size_t>(r)].block >= 0) return false;
   }
   const BlockId block = binding.roles[static_cast<std::size_t>(role)].block;
-  return block >= 0 && system.layout[block].geometry().ambient == 1;
+  return block >= 0 && problem.layout[block].geometry().ambient == 1;
 }
 
 /// Whether measurement and roles are scalars.
@@ -53,9 +53,9 @@ std::optional<double> SolveForFirst(const SensorModel& model, std::vector<const 
 
 }  // namespace
 
-std::vector<int> TruthsOfRoles(const System& system, const SensorBinding& binding,
+std::vector<int> TruthsOfRoles(const Problem& problem, const SensorBinding& binding,
                                const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = MatchTruths(system.layout, truths);
+  const std::vector<int> match = MatchTruths(problem.layout, truths);
   std::vector<int> found;
   for (const RoleBinding& role : binding.roles) {
     found.push_back(role.block < 0 ? -1 : match[static_cast<std::size_t>(role.block)]);
@@ -74,14 +74,14 @@ std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<in
   return roles;
 }
 
-std::optional<ImpliedState> ImpliedState::Of(const System& system, const SensorBinding& binding,
+std::optional<ImpliedState> ImpliedState::Of(const Problem& problem, const SensorBinding& binding,
                                              const std::vector<StreamInfo>& truths) {
   if (binding.model->known_size() > 0) return {};  // they would be needed, too
-  if (IsInvertible(system, binding)) {
+  if (IsInvertible(problem, binding)) {
     const auto role = static_cast<std::size_t>(binding.model->inverse().role);
     return ImpliedState(binding.model, binding.roles[role].block);
   }
-  std::vector<int> of_roles = TruthsOfRoles(system, binding, truths);
+  std::vector<int> of_roles = TruthsOfRoles(problem, binding, truths);
   if (of_roles.empty() || !IsScalar(binding)) return {};
   ImpliedState implied(binding.model, binding.roles[0].block);
   implied.rest_at_truth_ = true;

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/experiment/source.h"
 
 namespace alidade::internal {
@@ -18,7 +18,7 @@ class ImpliedState {
  public:
   /// None where the sensor implies no scalar: it has a landmark, known numbers, more elements, or
   /// roles whose truth the source does not name.
-  static std::optional<ImpliedState> Of(const System& system, const SensorBinding& binding,
+  static std::optional<ImpliedState> Of(const Problem& problem, const SensorBinding& binding,
                                         const std::vector<StreamInfo>& truths);
 
   BlockId block() const { return block_; }
@@ -37,7 +37,7 @@ class ImpliedState {
 };
 
 /// The truth of each role of a sensor; empty where one is unbound or has none.
-std::vector<int> TruthsOfRoles(const System& system, const SensorBinding& binding,
+std::vector<int> TruthsOfRoles(const Problem& problem, const SensorBinding& binding,
                                const std::vector<StreamInfo>& truths);
 
 /// The values of roles at truth; empty where one is not known.

@@ -34,7 +34,7 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
 }
 
 void internal::NoteMap(const EstimatorSpec& spec, const Source& source, EstimatorResult& result) {
-  if (!spec.system.landmarks) return;
+  if (!spec.problem.landmarks) return;
   result.landmarks = spec.estimator->landmarks();
   for (std::vector<LandmarkEstimate>* map : {&*result.landmarks, &result.removed_landmarks}) {
     for (LandmarkEstimate& landmark : *map) {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/experiment.h"
 #include "alidade/io/text_table.h"
 
@@ -292,11 +292,11 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
     if (std::ranges::count(subjects, name) == 0) subjects.push_back(name);
   };
   for (const EstimatorSpec& spec : experiment.estimators) {
-    for (const Block& block : spec.system.layout.blocks()) {
+    for (const Block& block : spec.problem.layout.blocks()) {
       add(block.name);
       add(block.owner);
     }
-    for (const SensorBinding& sensor : spec.system.sensors) add(sensor.name);
+    for (const SensorBinding& sensor : spec.problem.sensors) add(sensor.name);
   }
   return subjects;
 }

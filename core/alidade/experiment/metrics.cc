@@ -11,7 +11,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/implied_state.h"
 #include "alidade/experiment/joint_nees.h"
@@ -170,8 +170,8 @@ struct Metrics::Impl {
   internal::TrajectoryAlignment alignment;
   std::vector<Event> events;
 
-  void Track(const System& system, const std::vector<StreamInfo>& truths);
-  void FindImplied(const System& system, const std::vector<StreamInfo>& truths);
+  void Track(const Problem& problem, const std::vector<StreamInfo>& truths);
+  void FindImplied(const Problem& problem, const std::vector<StreamInfo>& truths);
   void AddImplied(const Truth& truth, const std::vector<Sums*>& into, const UpdateReport& report);
   template <class ValueOf>
   void AddErrors(Timestamp timestamp, const Truth& truth, const std::vector<Sums*>& into,
@@ -190,26 +190,26 @@ struct Metrics::Impl {
 namespace {
 
 /// That of the block; the error of an orientation or a direction is an angle.
-std::string UnitOfError(const System& system, BlockId id) {
+std::string UnitOfError(const Problem& problem, BlockId id) {
   bool is_angle = true;
-  system.layout[id].geometry().ForEachPart([&](const Geometry& part, int, int) {
+  problem.layout[id].geometry().ForEachPart([&](const Geometry& part, int, int) {
     is_angle = is_angle && part.kind != GeometryKind::kVector;
   });
-  return is_angle ? "rad" : internal::UnitOf(system, id);
+  return is_angle ? "rad" : internal::UnitOf(problem, id);
 }
 
 }  // namespace
 
-void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+void Metrics::Impl::Track(const Problem& problem, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
   for (BlockId id = 0; id < static_cast<int>(match.size()); ++id) {
     if (match[id] < 0) continue;
-    const Block& block = system.layout[id];
+    const Block& block = problem.layout[id];
     Tracked one;
     one.id = id;
     one.truth = static_cast<std::size_t>(match[id]);
     one.name = block.name;
-    one.unit = UnitOfError(system, id);
+    one.unit = UnitOfError(problem, id);
     one.geometry = block.geometry();
     one.elements = internal::TangentNames(block.name, block.space);
     one.outside.assign(block.geometry().tangent, 0);
@@ -225,17 +225,17 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
   }
 }
 
-void Metrics::Impl::FindImplied(const System& system, const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
-  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const SensorBinding& sensor = system.sensors[s];
-    const auto state = internal::ImpliedState::Of(system, sensor, truths);
+void Metrics::Impl::FindImplied(const Problem& problem, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
+  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+    const SensorBinding& sensor = problem.sensors[s];
+    const auto state = internal::ImpliedState::Of(problem, sensor, truths);
     if (!state) continue;
     const int truth = match[static_cast<std::size_t>(state->block())];
     if (truth < 0) continue;
     implied.emplace(static_cast<int>(s), Implied{*state, static_cast<std::size_t>(truth),
-                                                 system.layout[state->block()].geometry()});
-    const std::string unit = internal::UnitOf(system, state->block());
+                                                 problem.layout[state->block()].geometry()});
+    const std::string unit = internal::UnitOf(problem, state->block());
     if (!unit.empty()) units.emplace(sensor.name, unit);
   }
 }
@@ -434,22 +434,22 @@ void Metrics::Impl::WriteBounds(std::map<std::string, double>& metrics) const {
 Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truths,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
-  impl_->Track(spec.system, truths);
-  impl_->FindImplied(spec.system, truths);
-  impl_->sensors = internal::NamesOf(spec.system.sensors);
-  impl_->path = internal::PositionBlockOf(spec.system);
-  impl_->motions = internal::NamesOf(spec.system.motions);
-  impl_->has_landmarks = spec.system.landmarks.has_value();
+  impl_->Track(spec.problem, truths);
+  impl_->FindImplied(spec.problem, truths);
+  impl_->sensors = internal::NamesOf(spec.problem.sensors);
+  impl_->path = internal::PositionBlockOf(spec.problem);
+  impl_->motions = internal::NamesOf(spec.problem.motions);
+  impl_->has_landmarks = spec.problem.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
-      spec.system.sensors, [](const SensorBinding& s) { return s.outlier_rejection.has_value(); });
-  for (std::size_t s = 0; s < spec.system.sensors.size(); ++s) {
-    if (!internal::HasReprojection(spec.system.sensors[s])) continue;
+      spec.problem.sensors, [](const SensorBinding& s) { return s.outlier_rejection.has_value(); });
+  for (std::size_t s = 0; s < spec.problem.sensors.size(); ++s) {
+    if (!internal::HasReprojection(spec.problem.sensors[s])) continue;
     impl_->reprojection[static_cast<int>(s)] = {};
   }
   impl_->count_of.resize(impl_->sensors.size());
   impl_->far.resize(impl_->sensors.size());
   const bool filters = spec.estimator == nullptr || !spec.estimator->offline();
-  for (const SensorBinding& sensor : spec.system.sensors) {
+  for (const SensorBinding& sensor : spec.problem.sensors) {
     const Geometry& measured = sensor.model->measurement().geometry;
     impl_->angle.push_back(measured.kind == GeometryKind::kAngle);
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;

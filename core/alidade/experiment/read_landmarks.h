@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "alidade/config/config.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/plugin/plugin_host.h"
 
 namespace alidade::internal {
 
-/// What the entry `name` of a sensor of landmarks has besides: its landmark roles together, as the role
-/// `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
+/// What the entry `name` of a sensor of landmarks has besides: its landmark roles together, as the
+/// role `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
 /// kBadConfig.
 void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
                       const PluginHost& host, SensorOptions& options);

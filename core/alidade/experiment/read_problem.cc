@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/read_covariance.h"
 #include "alidade/config/tree.h"
 #include "alidade/estimation/owned_state.h"
@@ -22,9 +22,9 @@ using internal::NamesOf;
 
 /// Refuses an entry whose stream another one reads with another size.
 void CheckStream(const Node& entry, const std::string& name, int size, int known,
-                 const System& system) {
-  const auto found = std::ranges::find(system.streams, name, &StreamInfo::name);
-  if (found == system.streams.end() || (found->size == size && found->known == known)) return;
+                 const Problem& problem) {
+  const auto found = std::ranges::find(problem.streams, name, &StreamInfo::name);
+  if (found == problem.streams.end() || (found->size == size && found->known == known)) return;
   const auto text = [](int values, int with) {
     return std::to_string(values) + " values" +
            (with > 0 ? " and " + std::to_string(with) + " known numbers" : std::string());
@@ -153,7 +153,7 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
 }
 
 void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
-                    System& system) {
+                    Problem& problem) {
   const SharedMotion model = host.CreateMotion(entry.At("model", "a state entry").Text(), entry);
   const InputBinding input = ReadInput(entry, *model);
   const std::vector<std::string> names = ReadBlockNames(entry, *model);
@@ -186,8 +186,8 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   initial.RejectUnread();
   entry.RejectUnread();
   CheckStream(entry, input.stream, model->has_input() ? model->input().geometry.ambient : 0, 0,
-              system);
-  system.AddState(name, model, values, input);
+              problem);
+  problem.AddState(name, model, values, input);
 }
 
 /// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
@@ -261,9 +261,9 @@ class OwnedReader {
   }
 
   /// The state of a role, of which its model says `owned`.
-  OwnedState Read(const Space& role, const OwnedRole& owned, const System& system) {
+  OwnedState Read(const Space& role, const OwnedRole& owned, const Problem& problem) {
     const auto taken = [&](const Block& block) { return block.owner == name_; };
-    if (!std::exchange(read_, true) && std::ranges::any_of(system.layout.blocks(), taken)) {
+    if (!std::exchange(read_, true) && std::ranges::any_of(problem.layout.blocks(), taken)) {
       entry_.Fail(
           "it brings the state '" + name_ + '.' + role.name + "', and a state entry has its name",
           "another name for the sensor, or the role bound under `roles`");
@@ -300,14 +300,15 @@ class OwnedReader {
   }
 
   /// The time offset of a sensor whose roles are bound; nothing where none is given, or 0.
-  void AddTimeOffset(System& system, SensorBinding& sensor) {
+  void AddTimeOffset(Problem& problem, SensorBinding& sensor) {
     if (!offset_ || (!offset_->is_map() && offset_->Number() == 0.0)) return;
     OwnedRole at_first;
     at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
     const Space space{
         kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
-    const BlockId id = internal::AddOwnedState(system, name_, space, Read(space, at_first, system));
-    const std::string why = internal::OffsetInTime(system, id, sensor);
+    const BlockId id =
+        internal::AddOwnedState(problem, name_, space, Read(space, at_first, problem));
+    const std::string why = internal::OffsetInTime(problem, id, sensor);
     if (!why.empty()) offset_->Fail(why, "the key left out");
   }
 
@@ -332,22 +333,22 @@ class OwnedReader {
   std::vector<std::string> considered_, constant_;
 };
 
-BlockId FindBlock(const Node& node, const System& system) {
+BlockId FindBlock(const Node& node, const Problem& problem) {
   const std::string name = node.Text();
-  const BlockId id = system.layout.Find(name);
+  const BlockId id = problem.layout.Find(name);
   if (id >= 0) return id;
-  const std::vector<std::string> names = NamesOf(system.layout.blocks());
+  const std::vector<std::string> names = NamesOf(problem.layout.blocks());
   node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
             Nearest(name, names));
 }
 
 RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& model,
-                     const System& system) {
+                     const Problem& problem) {
   RoleBinding binding;
   if (!node.is_map()) {
-    binding.block = FindBlock(node, system);
+    binding.block = FindBlock(node, problem);
   } else {
-    binding.block = FindBlock(node.At("block", "a role"), system);
+    binding.block = FindBlock(node.At("block", "a role"), problem);
     if (const auto mode = node.Find("mode")) {
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
@@ -356,7 +357,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     }
     node.RejectUnread();
   }
-  const Block& block = system.layout[binding.block];
+  const Block& block = problem.layout[binding.block];
   if (!(block.geometry() == role.geometry)) {
     node.Fail(
         "block '" + block.name + "' is of geometry " + ToString(block.geometry()),
@@ -379,7 +380,7 @@ RobustLoss ReadLoss(const Node& node) {
 }
 
 void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
-                System& system) {
+                Problem& problem) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorOptions options{.stream = entry.At("stream", "sensor '" + name + "'").Text()};
   const SharedSensor model = host.CreateSensor(model_name, entry);
@@ -392,47 +393,47 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
     if (role.landmark()) break;  // the rest of them
     const auto node = roles.Find(role.name);
     const bool brings = !node && (role.flags & ALIDADE_ROLE_OWNED) != 0;
-    if (brings) options.owned.emplace(i, owned.Read(role, model->owned(i), system));
+    if (brings) options.owned.emplace(i, owned.Read(role, model->owned(i), problem));
     if (brings || (!node && role.optional())) {
       bound.emplace_back();
       continue;
     }
     const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
-    bound.push_back(ReadRole(given, role, *model, system));
+    bound.push_back(ReadRole(given, role, *model, problem));
     const BlockId block = bound.back().block;
     if (std::ranges::count(bound, block, &RoleBinding::block) > 1) {
-      given.Fail("block '" + system.layout[block].name + "' already fills another role",
+      given.Fail("block '" + problem.layout[block].name + "' already fills another role",
                  "a block of its own for each role");
     }
   }
   if (model->has_landmark()) internal::ReadLandmarkKeys(name, entry, *model, host, options);
   CheckStream(entry, options.stream, model->measurement().geometry.ambient, model->known_size(),
-              system);
-  system.AddSensor(name, model, bound, options);
-  owned.AddTimeOffset(system, system.sensors.back());
+              problem);
+  problem.AddSensor(name, model, bound, options);
+  owned.AddTimeOffset(problem, problem.sensors.back());
   roles.RejectUnread();
   owned.RejectUnread();
   entry.RejectUnread();
 }
 
-/// The system with the named sensors alone, in that order, and the state entries that they touch.
-System WithSensors(System system, const std::vector<std::string>& names) {
+/// The problem with the named sensors alone, in that order, and the state entries that they touch.
+Problem WithSensors(Problem problem, const std::vector<std::string>& names) {
   std::vector<SensorBinding> sensors;
   std::vector<std::string> touched;
   for (const std::string& name : names) {
-    const int index = system.FindSensor(name);
-    if (index >= 0) sensors.push_back(system.sensors[static_cast<std::size_t>(index)]);
+    const int index = problem.FindSensor(name);
+    if (index >= 0) sensors.push_back(problem.sensors[static_cast<std::size_t>(index)]);
   }
   for (const SensorBinding& sensor : sensors) {
     for (const RoleBinding& role : sensor.roles) {
-      if (role.block >= 0) touched.push_back(system.layout[role.block].owner);
+      if (role.block >= 0) touched.push_back(problem.layout[role.block].owner);
     }
   }
-  System kept;
-  kept.initial_time_s = system.initial_time_s;
-  kept.landmarks = std::move(system.landmarks);
+  Problem kept;
+  kept.initial_time_s = problem.initial_time_s;
+  kept.landmarks = std::move(problem.landmarks);
   std::vector<BlockId> moved;
-  for (const Block& block : system.layout.blocks()) {
+  for (const Block& block : problem.layout.blocks()) {
     moved.push_back(Contains(touched, block.owner)
                         ? kept.layout.Declare(block.name, block.owner, block.space, block.status)
                         : -1);
@@ -440,12 +441,12 @@ System WithSensors(System system, const std::vector<std::string>& names) {
   const auto follow = [&moved](BlockId& id) {
     if (id >= 0) id = moved[static_cast<std::size_t>(id)];
   };
-  for (MotionBinding& motion : system.motions) {
+  for (MotionBinding& motion : problem.motions) {
     if (!Contains(touched, motion.name)) continue;
     for (BlockId& id : motion.blocks) follow(id);
     kept.motions.push_back(std::move(motion));
   }
-  for (Prior& prior : system.priors) {
+  for (Prior& prior : problem.priors) {
     follow(prior.block);
     if (prior.block >= 0) kept.priors.push_back(std::move(prior));
   }
@@ -453,7 +454,7 @@ System WithSensors(System system, const std::vector<std::string>& names) {
     for (RoleBinding& role : sensor.roles) follow(role.block);
   }
   kept.sensors = std::move(sensors);
-  for (const StreamInfo& stream : system.streams) {
+  for (const StreamInfo& stream : problem.streams) {
     const auto reads = [&](const auto& one) { return one == stream.name; };
     const auto input = [](const MotionBinding& motion) { return motion.input.stream; };
     if (std::ranges::any_of(kept.sensors, reads, &SensorBinding::stream) ||
@@ -466,28 +467,29 @@ System WithSensors(System system, const std::vector<std::string>& names) {
 
 }  // namespace
 
-System ReadProblem(const Node& root, const PluginHost& host, const std::vector<std::string>& only) {
-  System system;
+Problem ReadProblem(const Node& root, const PluginHost& host,
+                    const std::vector<std::string>& only) {
+  Problem problem;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     internal::ExpectName(name, entry, "a state entry");
     if (name == "landmarks") entry.Fail("'landmarks' is not a state entry", "another name");
-    ReadStateEntry(name, entry, host, system);
+    ReadStateEntry(name, entry, host, problem);
   }
   for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
     internal::ExpectName(name, entry, "a sensor");
-    ReadSensor(name, entry, host, system);
+    ReadSensor(name, entry, host, problem);
   }
-  system.landmarks = internal::ReadLandmarks(root, system.sensors);
+  problem.landmarks = internal::ReadLandmarks(root, problem.sensors);
   constexpr double kLatestSeconds = 4.6e9;  // two timestamps may differ by twice that
   if (const auto start = root.Find("initial_time_s"))
-    system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
-  if (!only.empty()) system = WithSensors(std::move(system), only);
+    problem.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
+  if (!only.empty()) problem = WithSensors(std::move(problem), only);
   const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
-  if (const auto defect = FindDefect(system)) {
-    internal::NodeOf(*defect, root, system).Fail(defect->what, defect->remedy, defect->nearest);
+  if (std::ranges::none_of(problem.sensors, sees)) problem.landmarks.reset();
+  if (const auto defect = FindDefect(problem)) {
+    internal::NodeOf(*defect, root, problem).Fail(defect->what, defect->remedy, defect->nearest);
   }
-  return system;
+  return problem;
 }
 
 }  // namespace alidade

@@ -16,9 +16,9 @@ std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks
   return values;
 }
 
-std::vector<StreamInfo> BlocksOf(const System& system) {
+std::vector<StreamInfo> BlocksOf(const Problem& problem) {
   std::vector<StreamInfo> blocks;
-  for (const Block& block : system.layout.blocks()) {
+  for (const Block& block : problem.layout.blocks()) {
     blocks.push_back({block.name, block.geometry().ambient});
   }
   return blocks;

@@ -8,13 +8,13 @@
 /// An estimator in the place of truth.
 namespace alidade::internal {
 
-/// The blocks of a system as a source names its truths.
-std::vector<StreamInfo> BlocksOf(const System& system);
+/// The blocks of a problem as a source names its truths.
+std::vector<StreamInfo> BlocksOf(const Problem& problem);
 
 /// An estimate, as far as errors are taken from it, and the index of its frame in the run.
 struct Estimate {
   std::size_t frame;
-  std::vector<std::vector<double>> values;  ///< by block of the system; empty where it has none
+  std::vector<std::vector<double>> values;  ///< by block of the problem; empty where it has none
 };
 
 /// The values of the first `blocks` blocks of a state.

@@ -97,7 +97,7 @@ Frame AcceptedBy(int by, const std::vector<EstimatorRun>& running, const Frame& 
   const EstimatorRun& filter = running[static_cast<std::size_t>(by)];
   const int before = filter.spec.accepted_by;
   return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
-                              source.streams(), filter.spec.system,
+                              source.streams(), filter.spec.problem,
                               filter.last_report ? *filter.last_report : UpdateReport());
 }
 

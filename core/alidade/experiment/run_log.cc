@@ -2,7 +2,7 @@
 #include "alidade/experiment/run_log.h"
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/io/log.h"
 
 namespace alidade::internal {
@@ -19,8 +19,8 @@ void LogExperiment(const Experiment& experiment) {
                            "; seed " + std::to_string(experiment.seed));
   for (const EstimatorSpec& spec : experiment.estimators) {
     Log(LogLevel::kInfo, spec.name + ": type " + spec.type + "; sensors " +
-                             OrNone(Join(NamesOf(spec.system.sensors))) + "; blocks " +
-                             OrNone(Join(NamesOf(spec.system.layout.blocks()))));
+                             OrNone(Join(NamesOf(spec.problem.sensors))) + "; blocks " +
+                             OrNone(Join(NamesOf(spec.problem.layout.blocks()))));
   }
 }
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade::internal {
 namespace {

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <thread>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/given_noise.h"
 #include "alidade/plugin/param_reader.h"

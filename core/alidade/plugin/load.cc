@@ -6,7 +6,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/instruction_sets.h"

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
 #include "alidade/plugin/abi_read.h"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <set>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/io/log.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"

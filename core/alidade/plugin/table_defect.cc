@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/plugin/abi_read.h"
 #include "alidade/plugin/cpp_plugin.h"
 

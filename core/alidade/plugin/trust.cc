@@ -11,6 +11,7 @@
 #include <cstring>
 #include <vector>
 
+#include "alidade/base/error.h"
 #include "alidade/io/follow_links.h"
 
 namespace alidade {

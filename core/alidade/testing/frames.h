@@ -10,15 +10,15 @@
 
 #include "alidade/base/error.h"
 #include "alidade/estimation/estimator.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 /// Frames for an estimator, and what came of them, for tests of filters.
 namespace alidade::testing {
 
-/// A stream for each sensor of the system, in their order.
-inline std::vector<StreamInfo> StreamsOf(const System& system) {
+/// A stream for each sensor of the problem, in their order.
+inline std::vector<StreamInfo> StreamsOf(const Problem& problem) {
   std::vector<StreamInfo> streams;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     streams.push_back({sensor.stream, sensor.model->measurement().geometry.ambient, 0.0,
                        sensor.model->known_size()});
   }

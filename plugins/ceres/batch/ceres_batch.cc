@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/estimation/support.h"
+#include "alidade/estimation/estimator_capabilities.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "condensed_run.h"
 #include "fixed_lag.h"
@@ -35,16 +35,16 @@ struct BatchOptions {
 /// IncrementalSolve for its solution.
 class CeresBatch : public Estimator {
  public:
-  CeresBatch(const System& system, const BatchOptions& options,
+  CeresBatch(const Problem& problem, const BatchOptions& options,
              const std::vector<StreamInfo>& streams)
       : mode_(options.mode),
         options_(options.solve),
-        run_(system, streams, options_.max_dt_s, MayBeSparse() ? kMostInputs : kMostDenseInputs),
+        run_(problem, streams, options_.max_dt_s, MayBeSparse() ? kMostInputs : kMostDenseInputs),
         solve_(options_),
-        state_(system.InitialState(/*reserved=*/true)),
-        initialiser_(system, options_.max_dt_s, streams) {
+        state_(problem.InitialState(/*reserved=*/true)),
+        initialiser_(problem, options_.max_dt_s, streams) {
     // The full-information filter of no landmarks too: it takes what it touches to the last digit.
-    const bool as_filtering = mode_ == Mode::kFiltering && MayBeSparse() && !system.landmarks;
+    const bool as_filtering = mode_ == Mode::kFiltering && MayBeSparse() && !problem.landmarks;
     const double above = as_filtering ? 1e-9 : options.relinearise_above;
     if (mode_ == Mode::kIncremental || as_filtering) incremental_.emplace(run_, above);
   }
@@ -225,12 +225,13 @@ class CeresBatch : public Estimator {
   bool refused_ = false;  ///< a frame; there is nothing to go on with
 };
 
-constexpr Support kSupport = {.known = false, .from_measurement = true, .landmarks = true};
+constexpr EstimatorCapabilities kCapabilities = {
+    .known = false, .from_measurement = true, .landmarks = true};
 
 EstimatorMaker MakerOf(const BatchOptions& options) {
-  return [options](const System& system, const std::vector<StreamInfo>& streams) {
-    ALIDADE_EXPECTS(!FindUnsupported(system, kSupport));
-    return std::make_unique<CeresBatch>(system, options, streams);
+  return [options](const Problem& problem, const std::vector<StreamInfo>& streams) {
+    ALIDADE_EXPECTS(!FindUnsupported(problem, kCapabilities));
+    return std::make_unique<CeresBatch>(problem, options, streams);
   };
 }
 
@@ -262,7 +263,7 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
 ALIDADE_ESTIMATOR_PLUGIN(
     {"ceres_batch", "Maximum a posteriori of a whole run, by nonlinear least squares.",
      "[Bell1994]", &alidade::ceres_batch::Create, alidade::EstimatorKind::kBatch,
-     &alidade::ceres_batch::kSupport},
+     &alidade::ceres_batch::kCapabilities},
     {"fixed_lag", "Maximum a posteriori of the last frames, by nonlinear least squares.",
      "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag, alidade::EstimatorKind::kSlidingWindow,
-     &alidade::ceres_batch::kFixedLagSupport})
+     &alidade::ceres_batch::kFixedLagCapabilities})

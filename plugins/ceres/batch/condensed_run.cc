@@ -9,7 +9,7 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/rows.h"
+#include "alidade/estimation/pending_measurements.h"
 #include "alidade/state/dense_algebra.h"
 
 namespace alidade::ceres_batch {
@@ -39,11 +39,11 @@ State CondensedRun::Filled(State state) {
   return state;
 }
 
-CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s,
+CondensedRun::CondensedRun(Problem problem, const std::vector<StreamInfo>& streams, double max_dt_s,
                            int most_inputs)
-    : binding_(std::move(system), streams),
+    : binding_(std::move(problem), streams),
       initial_(Filled(binding_.initial)),
-      time_(binding_.system, streams, max_dt_s),
+      time_(binding_.problem, streams, max_dt_s),
       most_inputs_(most_inputs) {
   for (const Block& block : binding_.initial.layout().blocks()) {
     present_.push_back(block.present);
@@ -57,7 +57,7 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
-  robust_ = std::ranges::any_of(binding_.system.sensors, [](const SensorBinding& sensor) {
+  robust_ = std::ranges::any_of(binding_.problem.sensors, [](const SensorBinding& sensor) {
     return sensor.loss.kind != LossKind::kNone;
   });
   held_.assign(binding_.motion_places.size(), -1);
@@ -70,7 +70,7 @@ VariableRows CondensedRun::FindVariables() const {
   const auto n = static_cast<std::size_t>(initial_.covariance().size());
   std::vector<bool> moves(n, false), read(n, false);
   for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
-    if (binding_.system.motions[i].model->stationary()) continue;
+    if (binding_.problem.motions[i].model->stationary()) continue;
     for (const int row : binding_.motion_places[i].at) {
       if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
     }
@@ -123,7 +123,7 @@ void CondensedRun::PutPlaces() {
   places_.clear();
   xyz_places_.clear();
   for (std::size_t i = 0; i < binding_.sensor_places.size(); ++i) {
-    const SensorBinding& sensor = binding_.system.sensors[i];
+    const SensorBinding& sensor = binding_.problem.sensors[i];
     places_.push_back(PlaceBehind(i, *sensor.model));
     xyz_places_.push_back(PlaceBehind(i, sensor.xyz ? *sensor.xyz : *sensor.model));
   }
@@ -133,7 +133,7 @@ void CondensedRun::PutPlaces() {
 internal::SensorPlace CondensedRun::PlaceBehind(std::size_t sensor,
                                                 const SensorModel& model) const {
   internal::SensorPlace place = binding_.sensor_places[sensor];
-  if (!ObservesLandmarks(binding_.system.sensors[sensor])) return place;
+  if (!ObservesLandmarks(binding_.problem.sensors[sensor])) return place;
   State behind = initial_;
   std::vector<BlockId> landmark;
   for (const Space& role : model.roles()) {
@@ -202,20 +202,20 @@ void CondensedRun::EndInterval(Epoch& epoch) {
 bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
   const auto present = [this](BlockId id) { return Present(id); };
   std::vector<Event> events;  // the filter tells them
-  internal::Timeline::Piece piece;
-  for (; from < to; from = piece.end) {
-    if (time_.First(from, to, events, piece) || piece.steps > kMostSteps) {
-      return Fail("a gap before " + internal::SecondsText(piece.end) + " needs more than " +
+  internal::Timeline::SubStep sub_step;
+  for (; from < to; from = sub_step.end) {
+    if (time_.NextSubStep(from, to, events, sub_step) || sub_step.steps > kMostSteps) {
+      return Fail("a gap before " + internal::SecondsText(sub_step.end) + " needs more than " +
                   std::to_string(kMostSteps) + " steps of max_dt_s");
     }
-    for (Timestamp part = 0; part < piece.steps; ++part) {
+    for (Timestamp part = 0; part < sub_step.steps; ++part) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
-        const MotionBinding& motion = binding_.system.motions[i];
+        const MotionBinding& motion = binding_.problem.motions[i];
         if (motion.model->stationary() || !std::ranges::all_of(motion.blocks, present)) continue;
         const std::span<const double> u = time_.Input(i, from, events);
         Step& step = epoch.steps.emplace_back();
         step.motion = i;
-        step.dt_s = piece.dt_s;
+        step.dt_s = sub_step.dt_s;
         step.begins = held_[i] < 0;
         step.column = step.begins ? inputs_ : held_[i];
         step.columns = inputs_;
@@ -231,12 +231,12 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
 
 /// One factor for each measurement and sensor bound to its stream, in the order of the filter.
 void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
-  internal::Rows rows;
+  internal::PendingMeasurements rows;
   rows.Collect(frame, binding_, epoch.report);
   epoch.report = UpdateReport(epoch.report);  // whose numbers no longer lie in the rows
   ALIDADE_EXPECTS(rows.all().size() == report.measurements().size());
   for (std::size_t i = 0; i < rows.all().size(); ++i) {
-    const internal::Row& row = rows.all()[i];
+    const internal::PendingMeasurement& row = rows.all()[i];
     const bool first = report.measurements()[i].outcome == Outcome::kInitialised;
     Factor& factor = epoch.factors.emplace_back();
     factor.sensor = row.sensor;

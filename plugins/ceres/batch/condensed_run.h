@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "alidade/estimation/binding.h"
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmark_representation.h"
+#include "alidade/estimation/problem_index.h"
 #include "alidade/estimation/timeline.h"
 #include "alidade/state/state.h"
 
@@ -153,7 +153,7 @@ struct Reduced {
   Eigen::LLT<Eigen::MatrixXd> llt;  ///< of its Gauss-Newton matrix, N x N: a Schur complement
 };
 
-/// The rows of the tangent of a state, as a system of its frames has them as variables.
+/// The rows of the tangent of a state, as a problem of its frames has them as variables.
 struct VariableRows {
   struct Constant {
     std::vector<int> rows;
@@ -196,7 +196,7 @@ struct VariableRows {
 class CondensedRun {
  public:
   /// Gaps longer than `max_dt_s` are stepped in equal parts. More than `most_inputs` are refused.
-  CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s,
+  CondensedRun(Problem problem, const std::vector<StreamInfo>& streams, double max_dt_s,
                int most_inputs = kMostDenseInputs);
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
@@ -241,7 +241,7 @@ class CondensedRun {
   bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
                     bool sensitivity = true) const;
   /// The estimate of frame k, x and its covariance P: `state`, that of frame k - 1 from
-  /// System::InitialState(reserved) on, becomes the one of frame k; `report` says what became of
+  /// Problem::InitialState(reserved) on, becomes the one of frame k; `report` says what became of
   /// the measurements.
   void Put(std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p, State& state,
            UpdateReport& report) const;
@@ -296,7 +296,7 @@ class CondensedRun {
   void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
   void AddFirstValues(Epoch& epoch);
   void AddPart(Factor& factor);
-  bool has_landmarks() const { return binding_.system.landmarks.has_value(); }
+  bool has_landmarks() const { return binding_.problem.landmarks.has_value(); }
   internal::SensorPlace PlaceBehind(std::size_t sensor, const SensorModel& model) const;
   void PutPlaces();
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
@@ -341,10 +341,10 @@ class CondensedRun {
                                     const std::vector<double>& y) const;
   void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
   const SensorBinding& SensorOf(const Factor& factor) const {
-    return binding_.system.sensors[static_cast<std::size_t>(factor.sensor)];
+    return binding_.problem.sensors[static_cast<std::size_t>(factor.sensor)];
   }
   const SensorModel& ModelOf(int sensor, bool xyz) const {
-    const SensorBinding& binding = binding_.system.sensors[static_cast<std::size_t>(sensor)];
+    const SensorBinding& binding = binding_.problem.sensors[static_cast<std::size_t>(sensor)];
     return xyz ? *binding.xyz : *binding.model;
   }
   const SensorModel& ModelOf(const Factor& factor) const {
@@ -390,10 +390,10 @@ class CondensedRun {
   bool Fail(std::string why) const;  ///< false, with this problem()
   bool FailTooMany() const;
 
-  internal::Binding binding_;
+  internal::ProblemIndex binding_;
   std::vector<internal::SensorPlace> places_, xyz_places_;  ///< by sensor
   State initial_;                 ///< all blocks that have a place have a value
-  std::vector<bool> present_;     ///< at the last frame, by block of the system
+  std::vector<bool> present_;     ///< at the last frame, by block of the problem
   std::vector<bool> prior_;       ///< likewise, before the first one
   std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1
   std::vector<RowMajor> held_l_;  ///< by motion: L of the last step that begins

@@ -4,7 +4,7 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/first_values.h"
+#include "alidade/estimation/delayed_initialisation.h"
 #include "alidade/model/geometry.h"
 #include "alidade/state/dense_algebra.h"
 #include "condensed_run.h"
@@ -59,7 +59,7 @@ std::string TextOf(const SensorBinding& sensor, const Measurement& measurement) 
 /// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and
 /// offset = F offset, in the rows of the model.
 bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
-  const MotionBinding& motion = binding_.system.motions[step.motion];
+  const MotionBinding& motion = binding_.problem.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   const int n = motion.model->tangent_size(), n_w = motion.model->noise_size();
   Eigen::VectorXd w = Eigen::VectorXd::Zero(n_w);  // the mean, until L is taken
@@ -70,7 +70,7 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const Outcome outcome = internal::StepAt(
       motion, place, point.x.data(), step.u.data(), w.data(), step.dt_s,
       {next.data(), sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr});
-  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text());
+  if (outcome != Outcome::kAccepted) return Fail(internal::StepErrorOf(motion, outcome).text());
   internal::TakeStep(place, next.data(), point.x.data());
   if (!sensitivity) return true;
 
@@ -104,7 +104,7 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
   measured.Plus(z, d.data(), z);
   internal::Roles roles;
   internal::RolesAt(place, point.x.data(), point.x.data(), roles);
-  internal::Inverse at;
+  internal::InverseMeasurement at;
   const Outcome outcome = internal::InvertAt(sensor, place, measurement, prior, roles, at);
   if (outcome != Outcome::kAccepted) {
     return Fail("sensor '" + sensor.name + "' gives " + name +
@@ -215,12 +215,12 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
     step.l = held_l_[step.motion];
     return true;
   }
-  const MotionBinding& motion = binding_.system.motions[step.motion];
+  const MotionBinding& motion = binding_.problem.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   RowMajor l(motion.model->noise_size(), motion.model->noise_size());
   const Outcome outcome = internal::StepAt(motion, place, point.x.data(), step.u.data(), nullptr,
                                            step.dt_s, {.l = l.data()});
-  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text());
+  if (outcome != Outcome::kAccepted) return Fail(internal::StepErrorOf(motion, outcome).text());
   NoteChange(step.l, l);
   step.l = std::move(l);
   if (place.holds) held_l_[step.motion] = step.l;

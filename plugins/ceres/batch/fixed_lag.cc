@@ -29,21 +29,21 @@ Timestamp LagOf(double lag_s) {
 ///            landmarks that began in it or before
 ///
 /// A frame that leaves is linearised at the last solution, and stays so: see
-/// CondensedRun::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
+/// CondensedRun::MarginaliseFirst. On a linear system the window is the batch of the data so far.
 /// With landmarks it is solved by SparseSolve, else by MapSolve: a window has few inputs.
 ///
 /// Source       [Sibley2010].
 class FixedLag : public Estimator {
  public:
-  FixedLag(const System& system, double lag_s, bool lagged, const SolveOptions& options,
+  FixedLag(const Problem& problem, double lag_s, bool lagged, const SolveOptions& options,
            const std::vector<StreamInfo>& streams)
       : lag_(LagOf(lag_s)),
         lagged_(lagged),
         options_(options),
-        run_(system, streams, options.max_dt_s),
+        run_(problem, streams, options.max_dt_s),
         solve_(options),
-        state_(system.InitialState(/*reserved=*/true)),
-        initialiser_(system, options.max_dt_s, streams) {}
+        state_(problem.InitialState(/*reserved=*/true)),
+        initialiser_(problem, options.max_dt_s, streams) {}
 
   void Start(Timestamp timestamp) override {
     run_.Start(timestamp);
@@ -181,9 +181,9 @@ EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
       "output", {"current", "lagged"},
       "current: of each frame when it comes; lagged: when it leaves the window, at the end", 0);
   return [lag_s, lagged = output == 1, options = ReadSolveOptions(p)](
-             const System& system, const std::vector<StreamInfo>& streams) {
-    ALIDADE_EXPECTS(!FindUnsupported(system, kFixedLagSupport));
-    return std::make_unique<FixedLag>(system, lag_s, lagged, options, streams);
+             const Problem& problem, const std::vector<StreamInfo>& streams) {
+    ALIDADE_EXPECTS(!FindUnsupported(problem, kFixedLagCapabilities));
+    return std::make_unique<FixedLag>(problem, lag_s, lagged, options, streams);
   };
 }
 

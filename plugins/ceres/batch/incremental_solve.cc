@@ -102,7 +102,7 @@ bool IncrementalSolve::Predict(std::size_t k) {
   return true;
 }
 
-/// Landmarks that the node sees: its terms, and those that come into the system or back to it.
+/// Landmarks that the node sees: its terms, and those that come into the problem or back to it.
 bool IncrementalSolve::SeeLandmarks(std::size_t k) {
   constexpr std::size_t kPatience = 10;  // nodes
   Node& node = nodes_[k];
@@ -796,8 +796,8 @@ Eigen::MatrixXd IncrementalSolve::Covariance() const {
     of_rows(places[i], static_cast<Eigen::Index>(i)) = 1.0;
   }
   if (!rows.empty()) p(rows, rows) = Eigen::MatrixXd(root_.solve(of_rows))(places, Eigen::all);
-  const auto system = run_.binding_.initial.covariance().size();
-  return Clipped(p.topLeftCorner(system, system));
+  const auto problem = run_.binding_.initial.covariance().size();
+  return Clipped(p.topLeftCorner(problem, problem));
 }
 
 bool IncrementalSolve::PutMap(std::vector<LandmarkEstimate>& map) const {

@@ -93,7 +93,7 @@ class IncrementalSolve {
     Inverse place;
     Eigen::MatrixXd c;      ///< q = dl + C dx_f; by what a Term has columns of
     Eigen::VectorXd q;      ///< solution
-    Eigen::VectorXd sigma;  ///< of q; empty: it is not in the system yet
+    Eigen::VectorXd sigma;  ///< of q; empty: it is not in the problem yet
     std::size_t node = 0;   ///< of its prior
     std::size_t seen = 0;   ///< last
     std::size_t patience = 0;

@@ -13,8 +13,9 @@ namespace alidade::ceres_batch {
 /// which measurements give blocks their first values.
 class InitialisingFilter {
  public:
-  InitialisingFilter(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)
-      : filter_(system, {.rejection_recovery = RejectionRecovery::kNone, .max_dt_s = max_dt_s},
+  InitialisingFilter(const Problem& problem, double max_dt_s,
+                     const std::vector<StreamInfo>& streams)
+      : filter_(problem, {.rejection_recovery = RejectionRecovery::kNone, .max_dt_s = max_dt_s},
                 streams) {}
 
   Ekf& filter() { return filter_; }

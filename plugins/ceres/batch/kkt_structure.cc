@@ -202,7 +202,7 @@ void KktSystem::AddTerms() {
   landmark_constants_.clear();
   for (std::size_t i = 0; i < sensors; ++i) {
     constants[i] = ConstantsOf(run_.binding_.sensor_places[i].parts);
-    if (!run_.ObservesLandmarks(run_.binding_.system.sensors[i])) continue;
+    if (!run_.ObservesLandmarks(run_.binding_.problem.sensors[i])) continue;
     for (const int constant : constants[i]) {
       if (std::ranges::find(landmark_constants_, constant) == landmark_constants_.end()) {
         landmark_constants_.push_back(constant);

@@ -44,7 +44,7 @@ void CondensedRun::AddKnown() {
   for (std::size_t i = 0; i < reads.size(); ++i) {
     if (reads[i]) read_.push_back(static_cast<int>(i));
   }
-  for (const KnownLandmark& known : binding_.system.landmarks->known) {
+  for (const KnownLandmark& known : binding_.problem.landmarks->known) {
     current_[known.id] = {static_cast<int>(landmarks_.size()), 0};
     MapLandmark& landmark = landmarks_.emplace_back();
     landmark.id = known.id;
@@ -104,8 +104,8 @@ void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimato
   landmark.first = {epochs_.size(), index};
   if (before != current_.end()) landmark.generation = before->second.generation + 1;
   if (sensor.model->inverse().prior_size > 0) {
-    landmark.prior = PriorOf(id, sensor, *binding_.system.landmarks->prior, filter);
-    landmark.sigma = binding_.system.landmarks->prior->sigma;
+    landmark.prior = PriorOf(id, sensor, *binding_.problem.landmarks->prior, filter);
+    landmark.sigma = binding_.problem.landmarks->prior->sigma;
   }
   landmark.from = Eigen::VectorXd::Zero(sensor.model->measurement().geometry.tangent +
                                         sensor.model->inverse().prior_size);

@@ -219,7 +219,7 @@ void CondensedRun::AddBlocks(MapLandmark& landmark, State& state) const {
   landmark.l.resize(0);
   landmark.places = binding_.sensor_places;
   for (std::size_t i = 0; i < landmark.places.size(); ++i) {
-    const SensorBinding& sensor = binding_.system.sensors[i];
+    const SensorBinding& sensor = binding_.problem.sensors[i];
     if (!ObservesLandmarks(sensor)) continue;
     const std::vector<Space>& roles =
         (landmark.xyz && sensor.xyz ? *sensor.xyz : *sensor.model).roles();
@@ -272,10 +272,10 @@ void CondensedRun::DropFirst(Trajectory& about) {
   }
   if (about.empty()) return;
   about.erase(about.begin());
-  const auto system = std::ssize(binding_.initial.values());
+  const auto problem = std::ssize(binding_.initial.values());
   for (std::vector<double>& x : about) {
     x.resize(initial_.values().size());
-    std::copy(initial_.values().begin() + system, initial_.values().end(), x.begin() + system);
+    std::copy(initial_.values().begin() + problem, initial_.values().end(), x.begin() + problem);
   }
 }
 

@@ -31,20 +31,20 @@ namespace alidade {
 namespace {
 
 /// The depth filter, with a motion model besides that is of no sensor.
-System WalkingDepthFilter() {
-  System system = testing::DepthFilter();
-  testing::AddMotion(system, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
-  return system;
+Problem WalkingDepthFilter() {
+  Problem problem = testing::DepthFilter();
+  testing::AddMotion(problem, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
+  return problem;
 }
 
 TEST(ControlInput, TakesNoAllocation) {
-  System system = testing::DepthFilter();
-  testing::AddMotion(system, "car", MakeMotion(testing::Driven(0.2), "driven"),
+  Problem problem = testing::DepthFilter();
+  testing::AddMotion(problem, "car", MakeMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
-  system.motions.back().input = {"odometry", 0.05};
-  std::vector<StreamInfo> streams = testing::StreamsOf(system);
+  problem.motions.back().input = {"odometry", 0.05};
+  std::vector<StreamInfo> streams = testing::StreamsOf(problem);
   streams.push_back({"odometry", 1});
-  Ekf ekf(system, {}, streams);
+  Ekf ekf(problem, {}, streams);
   std::vector<Frame> frames;
   for (int k = 0; k < 60; ++k) frames.push_back(testing::FrameAt(0.033 * k, {{2, 0.1 * k}}));
   for (std::size_t k = 0; k < 20; ++k) ekf.Process(frames[k]);
@@ -100,7 +100,7 @@ class Allocation : public ::testing::TestWithParam<Fuse> {
     options_.gate = 0.999;
   }
 
-  System system_;
+  Problem system_;
   std::vector<StreamInfo> streams_;
   EkfOptions options_;
 };
@@ -132,19 +132,19 @@ INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
                          ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
 
 /// Adds `count` states that walk; with `considered` the first one is never corrected.
-void AddWalking(System& system, int count, bool considered) {
+void AddWalking(Problem& problem, int count, bool considered) {
   const SharedMotion model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
     const std::string name = "other_" + std::to_string(i);
-    const BlockId id = system.layout.Declare(
+    const BlockId id = problem.layout.Declare(
         name + ".value", name, model->blocks()[0],
         considered && i == 0 ? BlockStatus::kConsider : BlockStatus::kEstimated);
     Prior prior;
     prior.block = id;
     prior.mean = {0.0};
     prior.covariance = Eigen::MatrixXd::Identity(1, 1);
-    system.priors.push_back(prior);
-    system.motions.push_back({name, model, {id}});
+    problem.priors.push_back(prior);
+    problem.motions.push_back({name, model, {id}});
   }
 }
 
@@ -187,7 +187,7 @@ void ExpectNoAllocationOf(Filter& filter, int measured) {
   EXPECT_GE(initialised, 20 * change);
   EXPECT_GE(deleted, 20 * change);
   EXPECT_GE(accepted, 15 * measured);
-  if (filter.system().landmarks->max_linearity_index > 0.0) {
+  if (filter.problem().landmarks->max_linearity_index > 0.0) {
     EXPECT_GT(converted, 0);
   }
 }
@@ -205,23 +205,23 @@ EkfOptions Gated() {
 }
 
 TEST(AllocationOfLandmarks, AnUpdateOfManyTakesNone) {
-  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
-  AddWalking(system, 10, /*considered=*/true);
-  Ekf filter = testing::EkfOf(system, Gated());
+  Problem problem = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  AddWalking(problem, 10, /*considered=*/true);
+  Ekf filter = testing::EkfOf(problem, Gated());
   ExpectNoAllocationOf(filter, 100);
   EXPECT_TRUE(IsSkipped() || filter.state().covariance().size() >= 13 + 6 * 100);
 }
 
 TEST(AllocationOfLandmarks, TheIteratedEkfTakesNone) {
-  const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
-  Iekf filter(system, {Gated()}, {{"tracks", 2}});
+  const Problem problem = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  Iekf filter(problem, {Gated()}, {{"tracks", 2}});
   ExpectNoAllocationOf(filter, 20);
 }
 
 TEST(AllocationOfLandmarks, DirectionsAndSharedAnchorsTakeNone) {
-  const System system =
+  const Problem problem =
       testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), Turnover());
-  Ekf filter = testing::EkfOf(system, Gated());
+  Ekf filter = testing::EkfOf(problem, Gated());
   ExpectNoAllocationOf(filter, 20);
 }
 
@@ -229,29 +229,29 @@ TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
   LandmarkOptions options = Turnover();
   options.max_linearity_index = 10.0;
   options.prior->adapt_after = 3;
-  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options);
-  system.sensors[0].outlier_rejection = OnePointRansac{};
-  Ekf filter = testing::EkfOf(system, Gated());
+  Problem problem = testing::MapSystem(testing::InverseDepthPixels(0.01), options);
+  problem.sensors[0].outlier_rejection = OnePointRansac{};
+  Ekf filter = testing::EkfOf(problem, Gated());
   ExpectNoAllocationOf(filter, 20);
 }
 
 /// Thirty states in fifteen points that move, one measurement each.
-System ThirtyStates() {
-  System system;
+Problem ThirtyStates() {
+  Problem problem;
   for (int i = 0; i < 15; ++i) {
     const std::string name = "p" + std::to_string(i);
-    testing::AddMotion(system, name, testing::ConstantVelocityMotion(1.0),
+    testing::AddMotion(problem, name, testing::ConstantVelocityMotion(1.0),
                        {{"x", 0.1 * i, 1.0}, {"v", 0.0, 1.0}});
-    testing::AddSensor(system, "of_" + name, testing::LinearSensor(1.0, 0.1), {name + ".x"});
+    testing::AddSensor(problem, "of_" + name, testing::LinearSensor(1.0, 0.1), {name + ".x"});
   }
-  return system;
+  return problem;
 }
 
 template <class Filter, class Options>
 void ExpectNoAllocationOfThirtyStates(const Options& options) {
   if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
-  const System system = ThirtyStates();
-  Filter filter(system, options, testing::StreamsOf(system));
+  const Problem problem = ThirtyStates();
+  Filter filter(problem, options, testing::StreamsOf(problem));
   std::vector<Frame> frames;
   for (int k = 0; k < 30; ++k) {
     std::vector<std::pair<int, double>> values;

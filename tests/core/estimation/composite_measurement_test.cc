@@ -47,11 +47,11 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
 
 /// A block of each geometry, which walk at random; correlated with one another by the prior.
 template <class A, class B>
-System Walking() {
-  System system;
+Problem Walking() {
+  Problem problem;
   const auto add = [&](const char* name, const SharedMotion& model, std::vector<double> mean) {
-    AddMotion(system, name, model, {{"x", 0.0, 0.1}});
-    Prior& prior = system.priors.back();
+    AddMotion(problem, name, model, {{"x", 0.0, 0.1}});
+    Prior& prior = problem.priors.back();
     const Geometry& geometry = model->blocks()[0].geometry;
     prior.mean = std::move(mean);
     prior.mean.resize(static_cast<std::size_t>(geometry.ambient));
@@ -60,28 +60,28 @@ System Walking() {
   };
   add("a", MakeMotion(ManifoldWalk<A, 0.03>(), "walk"), {0.3, -0.2, 0.5, 0.4});
   add("b", MakeMotion(ManifoldWalk<B, 0.03>(), "walk"), {0.9, 0.1, -0.3, 0.2});
-  return system;
+  return problem;
 }
 
 /// z of both blocks at a step, near the means of the priors and off them by some noise.
-std::vector<std::vector<double>> MeasuredAt(const System& system, int k) {
+std::vector<std::vector<double>> MeasuredAt(const Problem& problem, int k) {
   std::vector<std::vector<double>> z;
   for (std::size_t i = 0; i < 2; ++i) {
-    const Geometry& geometry = system.layout.blocks()[i].geometry();
+    const Geometry& geometry = problem.layout.blocks()[i].geometry();
     std::vector<double> d(static_cast<std::size_t>(geometry.tangent));
     for (std::size_t c = 0; c < d.size(); ++c) {
       d[c] = 0.08 * std::sin(1.3 * k + 2.0 * static_cast<double>(c + i));
     }
-    z.push_back(system.priors[i].mean);
+    z.push_back(problem.priors[i].mean);
     geometry.Plus(z[i].data(), d.data(), z[i].data());
   }
   return z;
 }
 
-using MakeEstimator = std::unique_ptr<Estimator> (*)(const System&);
+using MakeEstimator = std::unique_ptr<Estimator> (*)(const Problem&);
 template <class Filter, class Options>
-std::unique_ptr<Estimator> MakeDefault(const System& system) {
-  return std::make_unique<Filter>(system, Options(), StreamsOf(system));
+std::unique_ptr<Estimator> MakeDefault(const Problem& problem) {
+  return std::make_unique<Filter>(problem, Options(), StreamsOf(problem));
 }
 constexpr MakeEstimator kEstimators[] = {
     MakeDefault<Ekf, EkfOptions>, MakeDefault<Iekf, IekfOptions>,
@@ -89,7 +89,7 @@ constexpr MakeEstimator kEstimators[] = {
 
 template <class A, class B>
 void ExpectBothAreTheTwo() {
-  System apart = Walking<A, B>(), together = apart;
+  Problem apart = Walking<A, B>(), together = apart;
   AddSensor(apart, "za", MakeSensor(ManifoldSensor<A, 0.05>(), "a"), {"a.x"});
   AddSensor(apart, "zb", MakeSensor(ManifoldSensor<B, 0.05>(), "b"), {"b.x"});
   AddSensor(together, "z", MakeSensor(BothAtOnce<A, B>(), "both"), {"a.x", "b.x"});
@@ -126,8 +126,8 @@ TEST(CompositeMeasurement, OfIndependentPartsIsTwoSensors) {
 
 // x' = x + P (P + R)^-1 (z - x), with a whole R that came with the measurement.
 TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
-  System system = Walking<Vec<2>, Vec<1>>();
-  AddSensor(system, "z", MakeSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
+  Problem problem = Walking<Vec<2>, Vec<1>>();
+  AddSensor(problem, "z", MakeSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
   Eigen::Matrix3d root;
   root << 0.1, 0, 0, 0.04, 0.08, 0, -0.03, 0.05, 0.06;
   const Eigen::Matrix3d r = root * root.transpose(), p = 0.01 * Eigen::Matrix3d::Identity();
@@ -136,7 +136,7 @@ TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   const Eigen::Vector3d updated = x + gain * (z - x);
   const Eigen::Matrix3d left = p - gain * p;
   for (const MakeEstimator make : kEstimators) {
-    const auto filter = make(system);
+    const auto filter = make(problem);
     filter->Process(Frame{0, {{0, 0, -1, {0.4, -0.1, 0.7}, {r.data(), r.data() + 9}}}});
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_NEAR(filter->state().values()[i], updated[static_cast<Eigen::Index>(i)], 1e-12);
@@ -147,11 +147,11 @@ TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
 
 // An angle within a composite wraps: 3.1 rad seen from -3.1 rad is 0.083 rad off.
 TEST(CompositeMeasurement, WrapsTheAnglesAmongItsParts) {
-  System system = Walking<Vec<1>, Angle>();
-  system.priors[1].mean = {-3.1};
-  AddSensor(system, "z", MakeSensor(BothAtOnce<Vec<1>, Angle>(), "both"), {"a.x", "b.x"});
+  Problem problem = Walking<Vec<1>, Angle>();
+  problem.priors[1].mean = {-3.1};
+  AddSensor(problem, "z", MakeSensor(BothAtOnce<Vec<1>, Angle>(), "both"), {"a.x", "b.x"});
   for (const MakeEstimator make : kEstimators) {
-    const auto filter = make(system);
+    const auto filter = make(problem);
     const UpdateReport& report = filter->Process(Frame{0, {{0, 0, -1, {0.3, 3.1}, {}}}});
     ASSERT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
     EXPECT_NEAR(report.measurements()[0].innovation[1], 6.2 - 2.0 * M_PI, 1e-12);

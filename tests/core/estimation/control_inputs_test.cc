@@ -27,12 +27,12 @@ constexpr double kNoise = 0.2, kSigma = 0.3;  // m/s^0.5, m
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 
 /// `car.position`, 1 +- 0.5 m, driven by stream `odometry`; sensor `fix` measures it.
-System Car(double timeout_s = kInfinity) {
-  System system;
-  AddMotion(system, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
-  system.motions[0].input = {"odometry", timeout_s};
-  AddSensor(system, "fix", LinearSensor(1.0, kSigma), {"car.position"});
-  return system;
+Problem Car(double timeout_s = kInfinity) {
+  Problem problem;
+  AddMotion(problem, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
+  problem.motions[0].input = {"odometry", timeout_s};
+  AddSensor(problem, "fix", LinearSensor(1.0, kSigma), {"car.position"});
+  return problem;
 }
 
 /// Fixes and speeds, at times both: t / s, fix / m, speed / (m/s); NaN: none.
@@ -100,35 +100,35 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   return kinds;
 }
 
-/// The system with a constant block next to it.
-System WithConstantBlock(System system) {
+/// The problem with a constant block next to it.
+Problem WithConstantBlock(Problem problem) {
   const BlockId id =
-      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);
-  system.priors.push_back({id, {1.0}, Eigen::MatrixXd::Zero(1, 1), ""});
-  return system;
+      problem.layout.Declare("aside.x", "aside", problem.layout[0].space, BlockStatus::kConstant);
+  problem.priors.push_back({id, {1.0}, Eigen::MatrixXd::Zero(1, 1), ""});
+  return problem;
 }
 
 TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
   const std::vector<std::string> first = {"input_stale"};  // none yet from 0 s to 0.5 s
-  for (const System& system : {Car(), WithConstantBlock(Car())}) {
-    Ekf ekf(system, {}, kStreams);
+  for (const Problem& problem : {Car(), WithConstantBlock(Car())}) {
+    Ekf ekf(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, kInfinity, 1e-12), first);
-    Iekf iekf(system, {}, kStreams);
+    Iekf iekf(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(iekf, kDrive, kInfinity, 1e-12), first);
-    SquareRootEkf root(system, {}, kStreams);
+    SquareRootEkf root(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(root, kDrive, kInfinity, 1e-12), first);
-    Ukf ukf(system, {}, kStreams);
+    Ukf ukf(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(ukf, kDrive, kInfinity, 1e-9), first);
   }
 }
 
 TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
-  for (const System& system : {Car(0.4), WithConstantBlock(Car(0.4))}) {
-    Ekf ekf(system, {}, kStreams);
+  for (const Problem& problem : {Car(0.4), WithConstantBlock(Car(0.4))}) {
+    Ekf ekf(problem, {}, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, 0.4, 1e-12);
     // Before the first, and after each but the last, for the next comes 0.5 s later or more.
     EXPECT_EQ(kinds, std::vector<std::string>(6, "input_stale"));
-    Ukf ukf(system, {}, kStreams);
+    Ukf ukf(problem, {}, kStreams);
     ExpectWrittenOut(ukf, kDrive, 0.4, 1e-9);
   }
   Ekf ekf(Car(1.5), {}, kStreams);
@@ -288,11 +288,11 @@ struct TurnedByInput : Motion<1, Vec<1>> {
 };
 
 TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
-  System system;
-  AddMotion(system, "body", MakeMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
-  system.motions[0].input = {"attitude", kInfinity};
-  system.initial_time_s = -1.0;
-  Ekf ekf(system, {}, {{"attitude", 4}});
+  Problem problem;
+  AddMotion(problem, "body", MakeMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
+  problem.motions[0].input = {"attitude", kInfinity};
+  problem.initial_time_s = -1.0;
+  Ekf ekf(problem, {}, {{"attitude", 4}});
   const auto frame = [](double t_s, const std::vector<double>& q) {
     return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}};
   };
@@ -307,13 +307,13 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
 }
 
 TEST(ControlInputs, EachModelHasItsOwnAndTheyEndOneByOne) {
-  System system = Car(0.5);
-  AddMotion(system, "other", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
-  system.motions[1].input = {"odometry", 2.0};
-  AddMotion(system, "third", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
-  system.motions[2].input = {"wheel", 1.0};
-  AddMotion(system, "still", testing::ConstantMotion(1, 0.1), {{"value", 3.0, 1.0}});
-  Ekf ekf(system, {}, {{"fix", 1}, {"odometry", 1}, {"wheel", 1}});
+  Problem problem = Car(0.5);
+  AddMotion(problem, "other", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
+  problem.motions[1].input = {"odometry", 2.0};
+  AddMotion(problem, "third", MakeMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
+  problem.motions[2].input = {"wheel", 1.0};
+  AddMotion(problem, "still", testing::ConstantMotion(1, 0.1), {{"value", 3.0, 1.0}});
+  Ekf ekf(problem, {}, {{"fix", 1}, {"odometry", 1}, {"wheel", 1}});
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 2.0}, {2, 10.0}})).inputs, (std::vector{0, 1, 2}));
   const UpdateReport& report = ekf.Process(FrameAt(4.0, {}));
   EXPECT_EQ(report.events.size(), 3u);
@@ -343,11 +343,11 @@ struct Heading : Motion<1, Vec<1>, Vec<1>> {
 };
 
 TEST(ControlInputs, WhatCannotBeObservedIsJudgedInMotion) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Heading(), "heading"),
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Heading(), "heading"),
             {{"x", 0.0, 1.0}, {"heading", 0.5, 1.0}});
-  AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"p.x"});
-  EXPECT_TRUE(UnobservableDirections(system).empty());
+  AddSensor(problem, "fix", LinearSensor(1.0, 0.3), {"p.x"});
+  EXPECT_TRUE(UnobservableDirections(problem).empty());
 }
 
 TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
@@ -370,8 +370,8 @@ TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
 
 // Of two frames at one timestamp, taken as they come, the later has the last word.
 TEST(ControlInputs, OfTwoAtOneTimestampTheLaterActs) {
-  const System system = Car();
-  Ekf ekf(system, {}, kStreams);
+  const Problem problem = Car();
+  Ekf ekf(problem, {}, kStreams);
   ekf.Process(FrameAt(0.0, {{kOdometry, 2.0}}));
   ekf.Process(FrameAt(0.0, {{kOdometry, -1.0}}));
   ekf.Process(FrameAt(1.5, {}));

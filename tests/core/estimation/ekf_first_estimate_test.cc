@@ -14,11 +14,11 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
   // 1/scale = lambda Z: dh/dZ = lambda at its start, dh/dlambda = Z as it is.
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
   EkfOptions options;
   options.jacobian = JacobianPolicy::kFirstEstimate;
-  Ekf ekf(system, options, StreamsOf(system)), latest(system, {}, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem)), latest(problem, {}, StreamsOf(problem));
   Eigen::Vector3d x(0.35, 0.0, 3.3);
   Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
   for (int k = 0; k < 5; ++k) {
@@ -46,11 +46,11 @@ TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
 }
 
 TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
-  System system = DepthFilter();
-  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  Problem problem = DepthFilter();
+  problem.priors[2] = {2, {}, {}, "inverse_scale"};
   EkfOptions options;
   options.jacobian = JacobianPolicy::kFirstEstimate;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{1, 1.05}}));
   const double lambda = 1.05 / 0.35;
   ASSERT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), lambda, 1e-12);
@@ -67,15 +67,15 @@ TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
 
 TEST(Ekf, AResetMakesANewFirstEstimate) {
   // The scale alone, its lambda far off: rejection recovery resets it to z / Z.
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.priors[0].covariance(0, 0) = 1e-6;
-  system.priors[1].covariance(0, 0) = 1e-12;
-  system.priors[2].covariance(0, 0) = 1e-12;
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  problem.priors[0].covariance(0, 0) = 1e-6;
+  problem.priors[1].covariance(0, 0) = 1e-12;
+  problem.priors[2].covariance(0, 0) = 1e-12;
   EkfOptions options;
   options.jacobian = JacobianPolicy::kFirstEstimate;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
   ASSERT_EQ(report.events.back().kind, "rejection_recovery");
@@ -116,17 +116,17 @@ struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
 
 // H d = R B(u) d: the tangent at the latest u, turned the short way to the first, R u = u0.
 TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
-  System system;
+  Problem problem;
   MotionBinding binding{"s", MakeMotion(StillDirection(), "still"), {}};
-  binding.blocks.push_back(system.layout.Declare("s.u", "s", binding.model->blocks()[0]));
+  binding.blocks.push_back(problem.layout.Declare("s.u", "s", binding.model->blocks()[0]));
   const Eigen::Vector3d first = Eigen::Vector3d(0.8, 0.1, -0.5).normalized();
   const Eigen::Matrix2d prior{{0.9, 0.2}, {0.2, 0.1}};
-  system.priors.push_back({0, {first[0], first[1], first[2]}, prior, ""});
-  system.motions.push_back(binding);
-  AddSensor(system, "direction", MakeSensor(DirectionFromVector(), "direction"), {"s.u"});
+  problem.priors.push_back({0, {first[0], first[1], first[2]}, prior, ""});
+  problem.motions.push_back(binding);
+  AddSensor(problem, "direction", MakeSensor(DirectionFromVector(), "direction"), {"s.u"});
   EkfOptions options;
   options.jacobian = JacobianPolicy::kFirstEstimate;
-  Ekf ekf(system, options, {{"direction", 3}});
+  Ekf ekf(problem, options, {{"direction", 3}});
   Frame frame = FrameAt(0.0, {});
   frame.measurements.push_back({0, 0, -1, {-0.2, 0.9, 0.3}, {}});
   ekf.Process(frame);

@@ -20,7 +20,7 @@ Eigen::Vector3d PointAt(int i) {
 }
 
 /// A known map, and a camera that may have moved by 0.1 m, or `sigma_0`, since.
-System KnownMap(double sigma_0 = 0.1) {
+Problem KnownMap(double sigma_0 = 0.1) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {
     const Eigen::Vector3d p = PointAt(i);
@@ -30,12 +30,12 @@ System KnownMap(double sigma_0 = 0.1) {
 }
 
 Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustLoss& loss = {}) {
-  System system = KnownMap(sigma_0);
-  system.sensors[0].loss = loss;
-  if (ransac) system.sensors[0].outlier_rejection = OnePointRansac{};
+  Problem problem = KnownMap(sigma_0);
+  problem.sensors[0].loss = loss;
+  if (ransac) problem.sensors[0].outlier_rejection = OnePointRansac{};
   EkfOptions gated;
   gated.gate = gate;
-  return {system, gated, {{"tracks", 2}}};
+  return {problem, gated, {{"tracks", 2}}};
 }
 
 /// What the camera sees at `r`; each `every`-th match has moved sideways, all alike.
@@ -90,12 +90,12 @@ TEST(OnePointRansac, TriesFewerTheMoreAgree) {
 // Half of the matches belong to a sensor that asks for more: as many are tried as if all did.
 TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
   const auto hypotheses = [](double first, double second) {
-    System system = KnownMap();
-    system.sensors.push_back(system.sensors[0]);
-    system.sensors[1].name = system.sensors[1].stream = "more";
-    system.sensors[0].outlier_rejection = OnePointRansac{.confidence = first};
-    system.sensors[1].outlier_rejection = OnePointRansac{.confidence = second};
-    Ekf ekf(system, {}, {{"tracks", 2}, {"more", 2}});
+    Problem problem = KnownMap();
+    problem.sensors.push_back(problem.sensors[0]);
+    problem.sensors[1].name = problem.sensors[1].stream = "more";
+    problem.sensors[0].outlier_rejection = OnePointRansac{.confidence = first};
+    problem.sensors[1].outlier_rejection = OnePointRansac{.confidence = second};
+    Ekf ekf(problem, {}, {{"tracks", 2}, {"more", 2}});
     Frame frame = Matches({0.05, -0.03, 0.0}, 2, 0.05);
     for (std::size_t i = 0; i < frame.measurements.size(); ++i) {
       frame.measurements[i].stream = i < frame.measurements.size() / 2 ? 0 : 1;
@@ -151,10 +151,10 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   int rescued[2];
   for (const int strict : {0, 1}) {
-    System system = KnownMap();
-    system.sensors[0].outlier_rejection =
+    Problem problem = KnownMap();
+    problem.sensors[0].outlier_rejection =
         OnePointRansac{.rescue_probability = strict == 1 ? 1e-6 : 0.99};
-    rescued[strict] = EkfOf(system).Process(frame).landmarks.rescued;
+    rescued[strict] = EkfOf(problem).Process(frame).landmarks.rescued;
   }
   EXPECT_GT(rescued[0], 0);
   EXPECT_EQ(rescued[1], 0);
@@ -162,11 +162,11 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
 
 // A sensor that asks for none needs nobody's support: far off, and without a gate, it is used.
 TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
-  System system = KnownMap();
-  system.sensors[0].outlier_rejection = OnePointRansac{};
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.1}});
-  AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = KnownMap();
+  problem.sensors[0].outlier_rejection = OnePointRansac{};
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.1}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   frame.measurements.push_back({0, 1, -1, {2.0}, {}});
   const UpdateReport& report = ekf.Process(frame);
@@ -178,11 +178,11 @@ TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
 // that agree with it: there is no corrected state then that the others could fit.
 TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   for (const bool overflows : {false, true}) {
-    System system = KnownMap();
-    system.sensors[0].outlier_rejection = OnePointRansac{};
-    AddMotion(system, "far", testing::ConstantMotion(1), {{"x", 1.5e308, 1.0}});
-    AddSensor(system, "z", LinearSensor(0.1, 0.3), {"far.x"});
-    Ekf ekf(system, {}, StreamsOf(system));
+    Problem problem = KnownMap();
+    problem.sensors[0].outlier_rejection = OnePointRansac{};
+    AddMotion(problem, "far", testing::ConstantMotion(1), {{"x", 1.5e308, 1.0}});
+    AddSensor(problem, "z", LinearSensor(0.1, 0.3), {"far.x"});
+    Ekf ekf(problem, {}, StreamsOf(problem));
     const std::vector<double> before = ekf.state().values();
     Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
     frame.measurements.push_back({0, 1, -1, {overflows ? 5e307 : 1.5e307}, {}});
@@ -199,9 +199,9 @@ TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
 
 // By a support that no match meets all are tried and none agrees; all fit the state as it was.
 TEST(OnePointRansac, AgreesByItsOwnThreshold) {
-  System system = KnownMap();
-  system.sensors[0].outlier_rejection = OnePointRansac{.inlier_probability = 1e-9};
-  Ekf ekf = EkfOf(system);
+  Problem problem = KnownMap();
+  problem.sensors[0].outlier_rejection = OnePointRansac{.inlier_probability = 1e-9};
+  Ekf ekf = EkfOf(problem);
   const UpdateReport& report = ekf.Process(Matches({0.05, -0.03, 0.0}, 1000, 0.0));
   EXPECT_EQ(report.landmarks.hypotheses, kPoints);
   EXPECT_EQ(report.landmarks.rescued, kPoints);
@@ -212,14 +212,14 @@ TEST(OnePointRansac, AgreesByItsOwnThreshold) {
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {
-    System system = KnownMap();
-    system.sensors[0].outlier_rejection = OnePointRansac{};
+    Problem problem = KnownMap();
+    problem.sensors[0].outlier_rejection = OnePointRansac{};
     if (by_role) {
-      system.sensors[0].roles[0].mode = RoleMode::kConsider;
+      problem.sensors[0].roles[0].mode = RoleMode::kConsider;
     } else {
-      system = WithStatus(system, "", BlockStatus::kConsider);
+      problem = WithStatus(problem, "", BlockStatus::kConsider);
     }
-    Ekf ekf = EkfOf(system);
+    Ekf ekf = EkfOf(problem);
     const UpdateReport& report = ekf.Process(frame);
     EXPECT_EQ(report.landmarks.hypotheses, kPoints) << by_role;
     EXPECT_EQ(report.landmarks.rescued, kPoints) << by_role;
@@ -230,13 +230,13 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
 // Points that entered from one camera share its uncertainty. A sensor that holds the camera sees
 // them all 0.1 m aside: one match moves them all, and all agree.
 TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
-  System system = MapSystem(Offset(0.01), {}, 0.3);
-  SensorBinding held = system.sensors[0];
+  Problem problem = MapSystem(Offset(0.01), {}, 0.3);
+  SensorBinding held = problem.sensors[0];
   held.name = held.stream = "held";
   held.roles[0].mode = RoleMode::kKnown;
   held.outlier_rejection = OnePointRansac{};
-  system.sensors.push_back(held);
-  Ekf ekf(system, {}, {{"tracks", 3}, {"held", 3}});
+  problem.sensors.push_back(held);
+  Ekf ekf(problem, {}, {{"tracks", 3}, {"held", 3}});
   std::vector<Observation> seen, aside;
   for (int i = 0; i < 10; ++i) {
     const Eigen::Vector3d p = PointAt(i);

@@ -12,12 +12,12 @@
 namespace alidade::testing {
 namespace {
 
-/// The system with a second sensor of its landmarks, first in order, on the same stream.
-System WithTwoSensors(System system) {
-  SensorBinding second = system.sensors[0];
+/// The problem with a second sensor of its landmarks, first in order, on the same stream.
+Problem WithTwoSensors(Problem problem) {
+  SensorBinding second = problem.sensors[0];
   second.name = "second";
-  system.sensors.insert(system.sensors.begin(), second);
-  return system;
+  problem.sensors.insert(problem.sensors.begin(), second);
+  return problem;
 }
 
 TEST(Landmarks, EnterWithTheObservationThatIsAskedFor) {
@@ -51,8 +51,8 @@ TEST(Landmarks, ThatTakeThePriorMayWaitForMoreObservations) {
 }
 
 TEST(Landmarks, PartsOfTheirFramesAreTimed) {
-  const auto frames = [](System system) {
-    Ekf ekf = EkfOf(std::move(system));
+  const auto frames = [](Problem problem) {
+    Ekf ekf = EkfOf(std::move(problem));
     ekf.Process(FrameOf(0.0, {{5, {0, 0, 1}}}));
     const auto started = std::chrono::steady_clock::now();
     const auto spent_s = ekf.Process(FrameOf(0.1, {{5, {0, 0, 1}}, {6, {0, 1, 1}}})).spent_s;
@@ -183,17 +183,39 @@ TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
   }
 }
 
+/// A position as it is.
+struct Gps : Sensor<Vec<3>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"fix", "m", "", "x,y,z"};
+  static constexpr int kInitialises = 0;
+  template <class T>
+  bool Predict(const T* position, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = position[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(1.0);
+  }
+  template <class T>
+  bool Initialise(const T* z, T* position) const {
+    for (int i = 0; i < 3; ++i) position[i] = z[i];
+    return true;
+  }
+};
+
 TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
-  System system = WithTwoSensors(MapSystem(Offset(0.1), {}, 0.3));
+  Problem problem = WithTwoSensors(MapSystem(Offset(0.1), {}, 0.3));
   const SharedMotion walk = MakeMotion(Walk(0.1), "walk");
-  const BlockId waits = system.layout.Declare("other.position", "other", walk->blocks()[0]);
-  system.motions.push_back({"other", walk, {waits}});
+  const BlockId waits = problem.layout.Declare("other.position", "other", walk->blocks()[0]);
+  problem.motions.push_back({"other", walk, {waits}});
   Prior prior;
   prior.block = waits;
   prior.from = "gps";
-  system.priors.push_back(prior);
-  system.sensors[0].roles[0].block = waits;
-  Ekf ekf(system, {}, {{"tracks", 3}});
+  problem.priors.push_back(prior);
+  problem.sensors[0].roles[0].block = waits;
+  problem.AddSensor("gps", Gps(), {waits});  // which does not measure here
+  Ekf ekf(problem, {}, {{"tracks", 3}});
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{5, {0, 0, 1}}}));
   ASSERT_EQ(report.measurements().size(), 2u);
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotReady);
@@ -226,9 +248,9 @@ struct Cubes : Sensor<Vec<3>, Vec<3>, Vec<3>> {
 TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
   LandmarkOptions options;
   options.known = {{1, {2.0, 2.0, 2.0}, 0.0}};
-  System system = MapSystem(Cubes(), options, 1.0);
-  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
-  Ekf ekf(system, {}, {{"tracks", 3}});
+  Problem problem = MapSystem(Cubes(), options, 1.0);
+  problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(problem, {}, {{"tracks", 3}});
   const double z = 1.5 * 1.5 * 1.5;  // r = 0.5, where H = -3 1.5^2
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {z, z, z}}}));
   EXPECT_NEAR(report.measurements()[0].s[0], 6.75 * 6.75 + 1e-6, 1e-9);
@@ -237,8 +259,8 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
 TEST(Landmarks, ToKeepAreCountedOnceWhereTwoSensorsSeeThem) {
   LandmarkOptions options;
   options.max_per_frame = 3;
-  const System system = WithTwoSensors(MapSystem(Offset(0.1), options, 0.3));
-  Ekf ekf(system, {}, {{"tracks", 3}});
+  const Problem problem = WithTwoSensors(MapSystem(Offset(0.1), options, 0.3));
+  Ekf ekf(problem, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
   ekf.Process(FrameOf(0.1, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}, {4, {1, 1, 1}}}));
   EXPECT_EQ(ekf.landmarks().size(), 3u);
@@ -248,8 +270,8 @@ TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
   options.prior->adapt_after = 3;
   options.known = {{1, {0.0, 0.0, 2.0}, 0.1}, {2, {0.0, 0.1, 4.0}, 0.1}};
-  const System system = WithTwoSensors(MapSystem(InverseDepthPixels(0.01), options));
-  Ekf ekf(system, {}, {{"tracks", 2}});
+  const Problem problem = WithTwoSensors(MapSystem(InverseDepthPixels(0.01), options));
+  Ekf ekf(problem, {}, {{"tracks", 2}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.025}}, {7, {0.1, 0.1}}}));
   const std::vector<LandmarkEstimate> landmarks = ekf.landmarks();
   ASSERT_NE(Find(landmarks, 7), nullptr);
@@ -280,9 +302,9 @@ TEST(Landmarks, ThatHaveNotConvergedAreNoPrior) {
 }
 
 TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
-  System system = MapSystem(Offset(0.1), {}, 0.3);
-  system.sensors[0].roles[0].mode = RoleMode::kKnown;
-  Ekf ekf(system, {}, {{"tracks", 3}});
+  Problem problem = MapSystem(Offset(0.1), {}, 0.3);
+  problem.sensors[0].roles[0].mode = RoleMode::kKnown;
+  Ekf ekf(problem, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
   // R alone; with the camera's own uncertainty it would be 0.1^2 + 0.3^2
   EXPECT_NEAR(ekf.landmarks().at(0).covariance(0, 0), 0.01, 1e-12);
@@ -336,9 +358,9 @@ TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
     LandmarkOptions options;
     options.min_observations = 2;
     options.max_missed_frames = max_missed_frames;
-    System system = MapSystem(Offset(0.1), options, 0.3);
-    system.motions[0].model = MakeMotion(HeldWalk(0.1), "held_walk");
-    Ekf ekf(system, {}, {{"tracks", 3}});
+    Problem problem = MapSystem(Offset(0.1), options, 0.3);
+    problem.motions[0].model = MakeMotion(HeldWalk(0.1), "held_walk");
+    Ekf ekf(problem, {}, {{"tracks", 3}});
     for (int i = 0; i < 2; ++i) ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
     EXPECT_EQ(ekf.landmarks().size(), 1u);
     ekf.Process(FrameOf(0.1, {{2, {0, 0, 1}}}));

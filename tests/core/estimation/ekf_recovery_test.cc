@@ -15,10 +15,10 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 // FAULTS 76
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
-  AddSensor(system, "broken", MakeSensor(Broken(), "broken"), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
+  AddSensor(problem, "broken", MakeSensor(Broken(), "broken"), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
   ASSERT_EQ(report.events.size(), 1u);
@@ -41,10 +41,10 @@ struct Exploding : Motion<1, Vec<1>> {
 
 // FAULTS 76
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(problem, "direct", LinearSensor(1.0, 1.0), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{0, 5.0}}));
   const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 5.0}}));
   EXPECT_TRUE(ekf.failed());
@@ -69,10 +69,10 @@ struct Asked : Linear {
 };
 
 TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  AddSensor(system, "asked", MakeSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(problem, "asked", MakeSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Asked::times = 0;
   ekf.Process(FrameAt(0.0, {{0, 5.0}}));
   EXPECT_EQ(Asked::times, 1);
@@ -84,9 +84,9 @@ TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
 }
 
 TEST(Ekf, AFailedStepMovesNothing) {
-  System system = MovingPoint();
-  AddMotion(system, "q", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  Ekf ekf(system, {}, {});
+  Problem problem = MovingPoint();
+  AddMotion(problem, "q", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   const std::vector<double> x = ekf.state().values();
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
@@ -109,10 +109,10 @@ TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
 }
 
 TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
-  System system = DepthFilter();
-  system.sensors.pop_back();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.pop_back();
+  problem.priors[0] = {0, {}, {}, "disparity"};
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Frame frame = FrameAt(0.0, {{0, 65.0}});
   frame.measurements[0].covariance = {100.0};
   ekf.Process(frame);
@@ -122,8 +122,8 @@ TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
 }
 
 TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
   for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{1, std::nan("")}}));
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
@@ -131,9 +131,9 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
 
 // Nor do covariances that are none: what is wrong with them is not the filter's.
 TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   for (const double variance : {std::nan(""), -1e6}) {
-    Ekf ekf(system, {}, StreamsOf(system));
+    Ekf ekf(problem, {}, StreamsOf(problem));
     const State before = ekf.state();
     Frame frame = FrameAt(0.0, {{1, 1.0}});
     frame.measurements[0].covariance = {variance};
@@ -167,10 +167,10 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
 
 // What S rejects counts as much as what the gate rejects: the sensor's blocks become less certain.
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "z", MakeSensor(OfSum(), "of_sum"), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "z", MakeSensor(OfSum(), "of_sum"), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Frame frame = FrameAt(0.0, {});
   frame.measurements.push_back({0, 0, -1, {0.5, 0.5}, {}});
   int recovered = 0;
@@ -185,11 +185,11 @@ TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
 
 // FAULTS 77
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kKnown;
-  system.priors[0].mean = {-1.0};
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  problem.sensors[0].roles[1].mode = RoleMode::kKnown;
+  problem.priors[0].mean = {-1.0};
+  Ekf ekf(problem, {}, StreamsOf(problem));
   for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1.0, 1e-12);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
@@ -197,8 +197,8 @@ TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
 }
 
 TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, std::nan("")}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
@@ -206,12 +206,12 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
 
 // FAULTS 77
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
-  System system = DepthFilter();
-  system.priors[0].mean = {3.0};
-  system.priors[0].covariance(0, 0) = 1e-6;
+  Problem problem = DepthFilter();
+  problem.priors[0].mean = {3.0};
+  problem.priors[0].covariance(0, 0) = 1e-6;
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
   ASSERT_FALSE(report.events.empty());
@@ -228,8 +228,8 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
 TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EkfOptions options;
   options.gate = 0.999;
-  const System system = DepthFilter();
-  Ekf ekf(system, options, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Start(0);
   bool reset = false;
   for (int k = 0; k < 20; ++k) {
@@ -247,7 +247,7 @@ using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
 TYPED_TEST_SUITE(WithoutRecovery, CarryMore);
 
 TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   using Options = std::conditional_t<std::is_same_v<TypeParam, Ukf>, UkfOptions, EkfOptions>;
   Options options;
   if constexpr (std::is_same_v<TypeParam, Ukf>) {
@@ -255,7 +255,7 @@ TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
   } else {
     options.gate = 0.999;
   }
-  TypeParam filter(system, options, StreamsOf(system));
+  TypeParam filter(problem, options, StreamsOf(problem));
   filter.Start(0);
   const Eigen::MatrixXd p = filter.state().covariance().Dense();
   for (int k = 0; k < 50; ++k) {
@@ -300,13 +300,13 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 
 // b = z - a: a, which moves with it, is put back to its prior first, and b is correlated with that.
 TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
-  AddSensor(system, "sum", MakeSensor(Sum(), "sum"), {"p.a", "p.b"});
-  AddSensor(system, "direct", LinearSensor(1.0, 0.01), {"p.a"});
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
+  AddSensor(problem, "sum", MakeSensor(Sum(), "sum"), {"p.a", "p.b"});
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.01), {"p.a"});
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{1, 1.0}}));
   for (int k = 0; k < 20; ++k) ekf.Process(FrameAt(0.0, {{0, 50.0}}));
   EXPECT_NEAR(ValueOf(ekf.state(), "p.b"), 49.0, 1e-3);
@@ -333,10 +333,10 @@ struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
 
 // Each half of it is a covariance.
 TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
-  AddSensor(system, "both", MakeSensor(Both(), "both"), {"p.a", "p.b"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
+  AddSensor(problem, "both", MakeSensor(Both(), "both"), {"p.a", "p.b"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Frame frame = FrameAt(0.0, {{0, 1.0}});
   frame.measurements[0].values = {1.0, 2.0};
   for (const double other : {5.0, 0.1}) {
@@ -350,10 +350,10 @@ TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
 }
 
 TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
-  System system = DepthFilter();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  system.priors[2] = {2, {}, {}, "inverse_scale"};
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.priors[0] = {0, {}, {}, "disparity"};
+  problem.priors[2] = {2, {}, {}, "inverse_scale"};
+  Ekf ekf(problem, {}, StreamsOf(problem));
   // The scale alone has to wait for a depth.
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements()[0].outcome, Outcome::kNotReady);
   const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
@@ -371,12 +371,12 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
 }
 
 TEST(Ekf, ABlockStartsFromTheSensorThatTheConfigNames) {
-  System system = DepthFilter();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  SensorBinding other = system.sensors[0];
+  Problem problem = DepthFilter();
+  problem.priors[0] = {0, {}, {}, "disparity"};
+  SensorBinding other = problem.sensors[0];
   other.name = other.stream = "other";
-  system.sensors.push_back(other);
-  Ekf ekf(system, {}, StreamsOf(system));
+  problem.sensors.push_back(other);
+  Ekf ekf(problem, {}, StreamsOf(problem));
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{2, 65.0}})).measurements()[0].outcome, Outcome::kNotReady);
   EXPECT_EQ(ekf.Process(FrameAt(0.1, {{0, 52.0}})).measurements()[0].outcome,
             Outcome::kInitialised);
@@ -384,11 +384,11 @@ TEST(Ekf, ABlockStartsFromTheSensorThatTheConfigNames) {
 }
 
 TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[0].mode = RoleMode::kKnown;
-  system.priors[2] = {2, {}, {}, "inverse_scale"};
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  problem.sensors[0].roles[0].mode = RoleMode::kKnown;
+  problem.priors[2] = {2, {}, {}, "inverse_scale"};
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"), 0.0);
@@ -399,13 +399,13 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
 
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
   const auto event_of = [](BlockStatus status) {
-    System system = WithStatus(DepthFilter(), "target.depth", status);
-    system.priors[0].mean = {3.0};
-    system.priors[0].covariance(0, 0) = 1e-6;
+    Problem problem = WithStatus(DepthFilter(), "target.depth", status);
+    problem.priors[0].mean = {3.0};
+    problem.priors[0].covariance(0, 0) = 1e-6;
     EkfOptions options;
     options.gate = 0.999;
     options.rejection_recovery = RejectionRecovery::kInflate;
-    Ekf ekf(system, options, StreamsOf(system));
+    Ekf ekf(problem, options, StreamsOf(problem));
     UpdateReport report;
     for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
     return report.events.empty() ? "" : report.events.back().text;
@@ -417,12 +417,12 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
 }
 
 TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
-  System system = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider);
-  system.priors[0].mean = {3.0};
-  system.priors[0].covariance(0, 0) = 1e-6;
+  Problem problem = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider);
+  problem.priors[0].mean = {3.0};
+  problem.priors[0].covariance(0, 0) = 1e-6;
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Start(0);
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
@@ -455,13 +455,13 @@ struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 };
 
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "s", MakeSensor(WithOptional(), "with_optional"), {"p.x"});
-  system.sensors[0].roles.push_back({});
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "s", MakeSensor(WithOptional(), "with_optional"), {"p.x"});
+  problem.sensors[0].roles.push_back({});
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 100.0}}));
   ASSERT_FALSE(report.events.empty());
@@ -471,11 +471,11 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrect
 }
 
 TEST(Ekf, ThatASensorLeftItsDomainIsNotedAlsoAfterAGatedMeasurement) {
-  System system = DepthFilter();
-  system.priors[1].mean = {-1.0};
+  Problem problem = DepthFilter();
+  problem.priors[1].mean = {-1.0};
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1e6}})).measurements()[0].outcome, Outcome::kGated);
   EXPECT_FALSE(ekf.diverged());
   const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 80.0}}));

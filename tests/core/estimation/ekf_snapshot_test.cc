@@ -21,10 +21,10 @@ struct Breaking : Motion<1, Vec<1>> {
 
 /// One block of known value 1 +- 1, measured directly with the given noise.
 Ekf OneBlock(double sigma) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
-  AddSensor(system, "z", LinearSensor(1.0, sigma), {"p.x"});
-  return {system, EkfOptions{}, {{"z", 1}}};
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
+  AddSensor(problem, "z", LinearSensor(1.0, sigma), {"p.x"});
+  return {problem, EkfOptions{}, {{"z", 1}}};
 }
 
 bool Has(const UpdateReport& report, const std::string& kind) {

@@ -56,9 +56,9 @@ struct Stretching : Motion<1, Vec<1>> {
 
 TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
   // F P F' = 1e20 * 1e300; the point next to it steps without trouble.
-  System system = MovingPoint();
-  AddMotion(system, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
-  Ekf ekf(system, {}, {});
+  Problem problem = MovingPoint();
+  AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   const std::vector<double> x = ekf.state().values();
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
@@ -72,9 +72,9 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
 
 TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
   // 1e20 * 1e287 is finite, though the bound that spares the copy is not.
-  System system;
-  AddMotion(system, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
-  Ekf ekf(system, {}, {});
+  Problem problem;
+  AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   ekf.Process(FrameAt(1.0, {}));
   EXPECT_FALSE(ekf.failed());
@@ -114,27 +114,27 @@ struct Opposite : Sensor<Angle, Angle> {
   }
 };
 
-System Turn() {
-  System system;
+Problem Turn() {
+  Problem problem;
   MotionBinding binding{"t", MakeMotion(TurningBlocks(), "turning"), {}};
   for (std::size_t i = 0; i < 2; ++i) {
     const Space& space = binding.model->blocks()[i];
-    const BlockId id = system.layout.Declare("t." + space.name, "t", space);
+    const BlockId id = problem.layout.Declare("t." + space.name, "t", space);
     binding.blocks.push_back(id);
     const int n = space.geometry.tangent;
     Prior prior;
     prior.block = id;
     prior.mean = i == 0 ? std::vector<double>{0.0} : std::vector<double>{1.0, 0.0, 0.0, 0.0};
     prior.covariance = Eigen::MatrixXd::Identity(n, n);
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
-  system.motions.push_back(binding);
-  return system;
+  problem.motions.push_back(binding);
+  return problem;
 }
 
 TEST(EkfStep, BlocksStayOnTheirManifold) {
-  const System system = Turn();
-  Ekf ekf(system, {}, {});
+  const Problem problem = Turn();
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   for (int k = 1; k <= 10; ++k) {
     ekf.Process(FrameAt(k, {}));
@@ -146,10 +146,10 @@ TEST(EkfStep, BlocksStayOnTheirManifold) {
 }
 
 TEST(EkfStep, ABlockThatStartsFromAMeasurementIsOnItsManifold) {
-  System system = Turn();
-  AddSensor(system, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
-  system.priors[0] = {0, {}, {}, "opposite"};
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = Turn();
+  AddSensor(problem, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
+  problem.priors[0] = {0, {}, {}, "opposite"};
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{0, -1.0}}));
   EXPECT_NEAR(ValueOf(ekf.state(), "t.a"), kPi - 1.0, 1e-12);
 }
@@ -165,10 +165,10 @@ struct Unwrapped : Opposite {
 
 // FAULTS 84
 TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
-  System system = Turn();
-  AddSensor(system, "unwrapped", MakeSensor(Unwrapped(), "unwrapped"), {"t.a"});
-  Ekf ekf(system, {}, StreamsOf(system));
-  Ukf ukf(system, {}, StreamsOf(system));
+  Problem problem = Turn();
+  AddSensor(problem, "unwrapped", MakeSensor(Unwrapped(), "unwrapped"), {"t.a"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
+  Ukf ukf(problem, {}, StreamsOf(problem));
   for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
     const UpdateReport& report = one->Process(FrameAt(0.0, {{0, -0.4}}));
     const MeasurementReport& entry = report.measurements().front();
@@ -179,12 +179,12 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
 
 // FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update takes the short way round.
 TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
-  System system = Turn();
-  AddSensor(system, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
-  system.priors[0].mean = {3.0 - kPi};  // z = 3
+  Problem problem = Turn();
+  AddSensor(problem, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
+  problem.priors[0].mean = {3.0 - kPi};  // z = 3
   for (const double turns : {0.0, 1.0, -2.0}) {
-    Ekf ekf(system, {}, StreamsOf(system));
-    Ukf ukf(system, {}, StreamsOf(system));
+    Ekf ekf(problem, {}, StreamsOf(problem));
+    Ukf ukf(problem, {}, StreamsOf(problem));
     for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
       const UpdateReport& report = one->Process(FrameAt(0.0, {{0, -3.0 + 2.0 * kPi * turns}}));
       const MeasurementReport& entry = report.measurements().front();

@@ -34,16 +34,16 @@ struct Textbook {
   }
 };
 
-System TwoSensors() {
-  System system = MovingPoint();
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
-  return system;
+Problem TwoSensors() {
+  Problem problem = MovingPoint();
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(problem, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  return problem;
 }
 
 TEST(Ekf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
-  const System system = TwoSensors();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = TwoSensors();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Start(0);
   Textbook textbook;
   Random random(11);
@@ -67,12 +67,12 @@ TEST(Ekf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
 }
 
 TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
-  const System system = TwoSensors();
+  const Problem problem = TwoSensors();
   EkfOptions per_sensor, per_measurement;
   per_sensor.fuse = Fuse::kPerSensor;
   per_measurement.fuse = Fuse::kPerMeasurement;
-  Ekf joint(system, {}, StreamsOf(system)), sensors(system, per_sensor, StreamsOf(system)),
-      measurements(system, per_measurement, StreamsOf(system));
+  Ekf joint(problem, {}, StreamsOf(problem)), sensors(problem, per_sensor, StreamsOf(problem)),
+      measurements(problem, per_measurement, StreamsOf(problem));
   Random random(12);
   for (int k = 0; k < 200; ++k) {
     // Two measurements of the first stream at one timestamp, one of the second.
@@ -90,10 +90,10 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
 
 // FAULTS 80
 TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   EkfOptions options;
   options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   const std::vector<double> x = ekf.state().values();
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
@@ -106,13 +106,13 @@ TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
 }
 
 TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1e-9}});
-  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1e-9}});
+  AddSensor(problem, "direct", LinearSensor(1.0, 1.0), {"p.x"});
   EkfOptions options;
   options.gate = 0.9;
   options.rejection_recovery = RejectionRecovery::kNone;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   Random random(13);
   constexpr int kTrials = 20000;
   int passed = 0;
@@ -126,15 +126,16 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
 
 TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   // d = BF / Z is not linear: joint and per-sensor updates differ.
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   EkfOptions options;
   options.fuse = Fuse::kPerSensor;
-  Ekf whole(system, options, StreamsOf(system)), with_invalid(system, options, StreamsOf(system));
+  Ekf whole(problem, options, StreamsOf(problem)),
+      with_invalid(problem, options, StreamsOf(problem));
   whole.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   const UpdateReport& report = with_invalid.Process(FrameAt(0.0, {{0, 80.0}, {0, -1.0}, {1, 1.0}}));
   EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInvalid);
   EXPECT_EQ(with_invalid.state().values(), whole.state().values());
-  Ekf joint(system, {}, StreamsOf(system));
+  Ekf joint(problem, {}, StreamsOf(problem));
   joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   EXPECT_NE(joint.state().values(), whole.state().values());
 }
@@ -160,17 +161,17 @@ struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 // consider state, for those of the one sensor where that one considers it.
 TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   for (const bool by_role : {false, true}) {
-    System system;
-    AddMotion(system, "x", testing::ConstantMotion(1), {{"x", 1.0, 1.5}});
-    AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.5, 0.8}});
-    if (!by_role) system = WithStatus(system, "c.x", BlockStatus::kConsider);
+    Problem problem;
+    AddMotion(problem, "x", testing::ConstantMotion(1), {{"x", 1.0, 1.5}});
+    AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.5, 0.8}});
+    if (!by_role) problem = WithStatus(problem, "c.x", BlockStatus::kConsider);
     const Eigen::Vector3d gains(1.0, -0.5, 2.0), sigmas(0.3, 0.2, 0.5);
     for (int i = 0; i < 3; ++i) {
-      AddSensor(system, "z" + std::to_string(i), MakeSensor(Biased(gains[i], sigmas[i]), "biased"),
+      AddSensor(problem, "z" + std::to_string(i), MakeSensor(Biased(gains[i], sigmas[i]), "biased"),
                 {"x.x", "c.x"});
     }
-    if (by_role) system.sensors[1].roles[1].mode = RoleMode::kConsider;
-    Ekf ekf(system, {}, StreamsOf(system));
+    if (by_role) problem.sensors[1].roles[1].mode = RoleMode::kConsider;
+    Ekf ekf(problem, {}, StreamsOf(problem));
     Eigen::Vector2d x(1.0, 0.5);
     Eigen::Matrix2d p = Eigen::Vector2d(1.5 * 1.5, 0.8 * 0.8).asDiagonal();
     const Eigen::Matrix3d r = sigmas.cwiseAbs2().asDiagonal();
@@ -219,11 +220,11 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
 
 // What cannot have come from anywhere tells of the measurement, not of the filter.
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
-  AddSensor(system, "z", MakeSensor(Implies(), "implies"), {"p.x"});
-  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
+  AddSensor(problem, "z", MakeSensor(Implies(), "implies"), {"p.x"});
+  problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(problem, {}, StreamsOf(problem));
   for (int k = 0; k < 25; ++k) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInvalid);
@@ -235,11 +236,11 @@ TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
 
 // A quaternion has three degrees of freedom: chi2(0.95, 3) = 7.81, chi2(0.95, 4) = 9.49.
 TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
-  const System system = WalkingOrientation();
+  const Problem problem = WalkingOrientation();
   EkfOptions options;
   options.gate = 0.95;
   const auto outcome_at = [&](double nis) {
-    Ekf ekf(system, options, StreamsOf(system));
+    Ekf ekf(problem, options, StreamsOf(problem));
     const double angle = std::sqrt(nis * (0.01 + 0.0025));
     Frame frame = FrameAt(0.0, {});
     frame.measurements.push_back(
@@ -252,10 +253,10 @@ TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
   // z = lambda Z, lambda a consider state; Schmidt's gain by hand.
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kConsider;
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  problem.sensors[0].roles[1].mode = RoleMode::kConsider;
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Start(0);
   ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda;
@@ -273,10 +274,10 @@ TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
 }
 
 TEST(Ekf, HeldRolesHaveNoJacobian) {
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kKnown;
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  problem.sensors[0].roles[1].mode = RoleMode::kKnown;
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda, sigma = 2.0 / 300.0 * h * h * h;
   EXPECT_NEAR(report.measurements()[0].s[0], lambda * lambda * 0.01 + sigma * sigma, 1e-15);
@@ -286,10 +287,10 @@ TEST(Ekf, HeldRolesHaveNoJacobian) {
 }
 
 TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
-  System system = DepthFilter();
-  system.sensors.pop_back();
-  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.pop_back();
+  problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const double d = 80.0, bf = 26.0;
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, d}}));
   // H1 = -d^2 / BF; the innovation stays at the prediction.
@@ -299,11 +300,11 @@ TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
 }
 
 TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
-  System system = DepthFilter();
-  system.priors[0].mean = {-0.2};
+  Problem problem = DepthFilter();
+  problem.priors[0].mean = {-0.2};
   EkfOptions options;
   options.rejection_recovery = RejectionRecovery::kNone;
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   int events = 0;
   for (int k = 0; k < 5; ++k) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 80.0}}));
@@ -317,9 +318,9 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
 
 // FAULTS 73
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
-  System system = MovingPoint();
-  AddSensor(system, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint();
+  AddSensor(problem, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport first = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   ASSERT_EQ(first.events.size(), 1u);
   EXPECT_EQ(first.events[0].kind, "conditioning");
@@ -329,8 +330,8 @@ TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
 }
 
 TEST(Ekf, FramesOfThePastAreStale) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Process(FrameAt(1.0, {{0, 80.0}}));
   const std::vector<double> x = ekf.state().values();
   EXPECT_EQ(ekf.Process(FrameAt(0.5, {{0, 80.0}})).measurements()[0].outcome, Outcome::kStale);
@@ -338,8 +339,8 @@ TEST(Ekf, FramesOfThePastAreStale) {
 }
 
 TEST(Ekf, StaleFramesInARowAreOneEvent) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const auto stale = [&](double t_s) {
     std::vector<std::string> texts;
     for (const Event& event : ekf.Process(FrameAt(t_s, {{0, 80.0}})).events) {
@@ -363,8 +364,8 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
 TEST(Ekf, AGapIsSteppedInEqualParts) {
   EkfOptions options;
   options.max_dt_s = 0.3;
-  const System system = MovingPoint(2.0);
-  Ekf ekf(system, options, {});
+  const Problem problem = MovingPoint(2.0);
+  Ekf ekf(problem, options, {});
   ekf.Start(0);
   ekf.Process(FrameAt(1.0, {}));
   Textbook textbook;
@@ -374,13 +375,13 @@ TEST(Ekf, AGapIsSteppedInEqualParts) {
 }
 
 TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
-  System system;
+  Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(1.0);
-  AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
-  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
-  system.motions[0].blocks.push_back(v);
-  system.priors.push_back({v, {2.0}, {}, ""});
-  Ekf ekf(system, {}, {});
+  AddMotion(problem, "p", model, {{"x", 1.0, 2.0}});
+  const BlockId v = problem.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
+  problem.motions[0].blocks.push_back(v);
+  problem.priors.push_back({v, {2.0}, {}, ""});
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   ekf.Process(FrameAt(0.5, {}));
   EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 2.0, 1e-15);
@@ -406,14 +407,14 @@ struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 
 // z = x^2 at x = 2: H = (4, 0), S = 17. The two roles are as many as the states.
 TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
-  AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 5.0, 1.0}});
-  AddSensor(system, "square", MakeSensor(Product(), "product"), {"p.x", "p.x"});
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
+  AddMotion(problem, "q", testing::ConstantMotion(1), {{"x", 5.0, 1.0}});
+  AddSensor(problem, "square", MakeSensor(Product(), "product"), {"p.x", "p.x"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;
-    Ekf ekf(system, options, StreamsOf(system));
+    Ekf ekf(problem, options, StreamsOf(problem));
     ekf.Start(0);
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 5.0}}));
     EXPECT_NEAR(report.measurements()[0].s[0], 17.0, 1e-13);
@@ -443,14 +444,14 @@ struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 // p ~ N(0, 4), r ~ N(0, 1), z = 6: S = 6, so p = 4 and r = -1. The blocks fill the state in another
 // order than the roles.
 TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
-  System system;
-  AddMotion(system, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
-  AddMotion(system, "cam", testing::ConstantMotion(1), {{"r", 0.0, 1.0}});
-  AddSensor(system, "offset", MakeSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
+  Problem problem;
+  AddMotion(problem, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
+  AddMotion(problem, "cam", testing::ConstantMotion(1), {{"r", 0.0, 1.0}});
+  AddSensor(problem, "offset", MakeSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;
-    Ekf ekf(system, options, StreamsOf(system));
+    Ekf ekf(problem, options, StreamsOf(problem));
     ekf.Start(0);
     ekf.Process(FrameAt(0.0, {{0, 6.0}}));
     EXPECT_NEAR(ValueOf(ekf.state(), "map.p"), 4.0, 1e-14);
@@ -462,14 +463,14 @@ TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
 // 1.5 % of R.
 TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
   for (const int n : {3, 20}) {
-    System system;
+    Problem problem;
     constexpr double kP = 0.7, kR = 7e-15;
     for (int i = 0; i < n; ++i) {
-      AddMotion(system, "b" + std::to_string(i), testing::ConstantMotion(1),
+      AddMotion(problem, "b" + std::to_string(i), testing::ConstantMotion(1),
                 {{"x", 1.0, std::sqrt(kP)}});
     }
-    AddSensor(system, "direct", MakeSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
-    Ekf ekf(system, {}, StreamsOf(system));
+    AddSensor(problem, "direct", MakeSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
+    Ekf ekf(problem, {}, StreamsOf(problem));
     EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.1}})).measurements()[0].outcome, Outcome::kAccepted);
     EXPECT_NEAR(CovarianceOf(ekf.state(), "b0.x", "b0.x") / kR, 1.0, 1e-6) << n;
     EXPECT_NEAR(CovarianceOf(ekf.state(), "b1.x", "b1.x"), kP, 1e-15) << n;

@@ -21,13 +21,13 @@ namespace {
 
 template <class Type>
 Type MakeLive() {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   if constexpr (std::is_same_v<Type, Iekf>) {
-    return Iekf(system, IekfOptions{}, StreamsOf(system));
+    return Iekf(problem, IekfOptions{}, StreamsOf(problem));
   } else if constexpr (std::is_same_v<Type, Ukf>) {
-    return Ukf(system, UkfOptions{}, StreamsOf(system));
+    return Ukf(problem, UkfOptions{}, StreamsOf(problem));
   } else {
-    return Type(system, EkfOptions{}, StreamsOf(system));
+    return Type(problem, EkfOptions{}, StreamsOf(problem));
   }
 }
 
@@ -72,9 +72,9 @@ struct Beacon : Sensor<Vec<1>, Vec<1>> {
 
 // x = 1 +- 2; z = x - 3 +- 0.3, so that S = 4.09 and x' = 1 + 4 / 4.09 (z + 2).
 TEST(LiveKnown, ComesWithAReadingAndIsNeededForAPrediction) {
-  System system = MovingPoint();
-  AddSensor(system, "z", MakeSensor(Beacon(), "beacon"), {"p.x"});
-  Ekf filter(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint();
+  AddSensor(problem, "z", MakeSensor(Beacon(), "beacon"), {"p.x"});
+  Ekf filter(problem, {}, StreamsOf(problem));
   EXPECT_THROW(filter.Push(0, {{0, {-1.5}}}), Error);
   EXPECT_THROW(static_cast<void>(filter.Expect("z", 0)), Error);
   const auto expected = filter.Expect("z", 0, -1, {3.0});
@@ -185,7 +185,7 @@ TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
   ekf.Process(FrameOf(0.1, {{3, {0.11, 0.2}}, {8, {-0.28, 0.0}}, {5, {0.01, -0.1}}}));
   const State before = ekf.state();
   const Timestamp later = ekf.timestamp() + 50'000'000;
-  const std::string& sensor = ekf.system().sensors[0].name;
+  const std::string& sensor = ekf.problem().sensors[0].name;
   const auto each = ekf.ExpectEach(sensor, later, {5, 99, 3, 8, -1});
   ASSERT_EQ(each.size(), 5u);
   EXPECT_FALSE(each[1]);
@@ -238,12 +238,12 @@ TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {
 }
 
 TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
-  System system = DepthFilter();
-  system.priors[0].mean = {-0.1};  // behind the camera
-  Ekf behind(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.priors[0].mean = {-0.1};  // behind the camera
+  Ekf behind(problem, {}, StreamsOf(problem));
   behind.Start(0);
   EXPECT_FALSE(behind.Expect("disparity", 0));
-  System waiting = DepthFilter();
+  Problem waiting = DepthFilter();
   waiting.priors[0] = {waiting.priors[0].block, {}, {}, "disparity"};
   Ekf empty(waiting, {}, StreamsOf(waiting));
   empty.Start(0);
@@ -253,19 +253,19 @@ TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
 
 TEST(Live, ExpectsNothingThatIsNotFinite) {
   for (const double x : {1.0, 7.0}) {
-    System system;
-    AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
-    AddSensor(system, "z", MakeSensor(Broken(), "broken"), {"p.x"});
-    Ekf ekf(system, {}, StreamsOf(system));
+    Problem problem;
+    AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
+    AddSensor(problem, "z", MakeSensor(Broken(), "broken"), {"p.x"});
+    Ekf ekf(problem, {}, StreamsOf(problem));
     ekf.Start(0);
     EXPECT_EQ(ekf.Expect("z", 0).has_value(), x < 5.0);
   }
 }
 
 TEST(Live, ExpectsASensorWhoseStreamTheSourceLacks) {
-  System system = DepthFilter();
-  const std::vector<StreamInfo> one = {StreamsOf(system)[1]};
-  Ekf ekf(system, {}, one), none(system, {}, {});
+  Problem problem = DepthFilter();
+  const std::vector<StreamInfo> one = {StreamsOf(problem)[1]};
+  Ekf ekf(problem, {}, one), none(problem, {}, {});
   for (Ekf* filter : {&ekf, &none}) {
     filter->Start(0);
     const auto expected = filter->Expect("disparity", 0);
@@ -282,10 +282,10 @@ TEST(Live, ExpectsNothingOfThePast) {
 }
 
 TEST(Live, AnEndedFilterExpectsNothing) {
-  System system = DepthFilter();
+  Problem problem = DepthFilter();
   EkfOptions options;
   options.max_dt_s = 1e-9;  // the next frame would need too many steps
-  Ekf ekf(system, options, StreamsOf(system));
+  Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Start(0);
   EXPECT_TRUE(ekf.Expect("disparity", 0));
   ekf.Process(FrameAt(10.0, {{0, 74.0}}));
@@ -295,9 +295,9 @@ TEST(Live, AnEndedFilterExpectsNothing) {
 
 // H is taken at what z implies for the depth: S is that of the z which is expected.
 TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
-  System system = DepthFilter();
-  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Start(0);
   const auto expected = ekf.Expect("disparity", 0);
   ASSERT_TRUE(expected);
@@ -326,8 +326,8 @@ TEST(Live, PushIsProcess) {
 }
 
 TEST(Live, AQuaternionThatIsNoneIsAnErrorAndChangesNothing) {
-  const System system = WalkingOrientation();
-  Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = WalkingOrientation();
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Start(0);
   const State before = ekf.state();
   EXPECT_THROW(ekf.Push(0, {{0, {0.0, 0.0, 0.0, 0.0}}}), Error);
@@ -386,10 +386,10 @@ static_assert(TakesTime<Timestamp> && TakesTime<int> && !TakesTime<double>);
 static_assert(ExpectsAt<Timestamp> && ExpectsAt<int> && !ExpectsAt<double>);
 
 TEST(FilterOptions, OutOfTheirRangeAreNamed) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   const auto refused = [&](const EkfOptions& options, const char* what) {
     try {
-      Ekf(system, options, StreamsOf(system));
+      Ekf(problem, options, StreamsOf(problem));
     } catch (const Error& error) {
       return std::string(error.what()).find(what) != std::string::npos;
     }

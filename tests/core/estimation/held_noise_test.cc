@@ -27,17 +27,17 @@ struct Options {
 
 /// A filter of each type.
 template <class Filter>
-std::unique_ptr<Filter> Make(const System& system, const Options& options,
+std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
                              const std::vector<StreamInfo>& streams) {
   EkfOptions common;
   common.max_dt_s = options.max_dt_s;
   common.gate = options.gate;
   if constexpr (std::is_same_v<Filter, Iekf>) {
-    return std::make_unique<Iekf>(system, IekfOptions{common}, streams);
+    return std::make_unique<Iekf>(problem, IekfOptions{common}, streams);
   } else if constexpr (std::is_same_v<Filter, Ukf>) {
-    return std::make_unique<Ukf>(system, UkfOptions{common}, streams);
+    return std::make_unique<Ukf>(problem, UkfOptions{common}, streams);
   } else {
-    return std::make_unique<Filter>(system, common, streams);
+    return std::make_unique<Filter>(problem, common, streams);
   }
 }
 
@@ -110,9 +110,9 @@ double MostApart(const std::vector<State>& a, const std::vector<State>& b) {
 template <class Filter>
 class HeldNoise : public ::testing::Test {
  protected:
-  static std::vector<State> Run(const System& system, const std::vector<Frame>& frames,
+  static std::vector<State> Run(const Problem& problem, const std::vector<Frame>& frames,
                                 const Options& options = {}) {
-    return StatesOf(*Make<Filter>(system, options, StreamsOf(system)), frames);
+    return StatesOf(*Make<Filter>(problem, options, StreamsOf(problem)), frames);
   }
   /// Rounding; that of sigma points goes with eps / alpha^2, alpha = 0.01, that of the smoother
   /// with P / P_s, up to 1e4 here.
@@ -142,7 +142,7 @@ TYPED_TEST(HeldNoise, FramesWithoutMeasurementsChangeNothing) {
 
 // What comes after rejected measurements is what comes without them.
 TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   std::vector<Frame> frames = DepthFrames(), wild;
   for (const Frame& frame : frames) {
     if (!wild.empty()) {
@@ -150,30 +150,30 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
     }
     wild.push_back(frame);
   }
-  const auto filter = Make<TypeParam>(system, {.gate = 1.0 - 1e-6}, StreamsOf(system));
+  const auto filter = Make<TypeParam>(problem, {.gate = 1.0 - 1e-6}, StreamsOf(problem));
   std::vector<State> states;
   const std::vector<State> all = StatesOf(*filter, wild);
   for (std::size_t k = 0; k < all.size(); k += 2) states.push_back(all[k]);
-  EXPECT_LT(MostApart(this->Run(system, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
+  EXPECT_LT(MostApart(this->Run(problem, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
 }
 
 // A second model whose noise adds up, next to the one that holds it.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
-  System system = DepthFilter();
-  system.motions[1].model = testing::ConstantMotion(1, 0.3);
-  const auto whole = this->Run(system, DepthFrames());
-  EXPECT_LT(MostApart(whole, this->Run(system, DepthFrames(), {0.002})), this->kTolerance);
+  Problem problem = DepthFilter();
+  problem.motions[1].model = testing::ConstantMotion(1, 0.3);
+  const auto whole = this->Run(problem, DepthFrames());
+  EXPECT_LT(MostApart(whole, this->Run(problem, DepthFrames(), {0.002})), this->kTolerance);
   const std::vector<Frame> more = WithEmptyFrames(DepthFrames(), 4);
-  EXPECT_LT(MostApart(whole, this->Run(system, more)), this->kTolerance);
+  EXPECT_LT(MostApart(whole, this->Run(problem, more)), this->kTolerance);
 }
 
 TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
-  System system = DepthFilter();
-  system.motions[0].model = MakeMotion(ConstantVelocity<1, true>(1.0), "constant_velocity");
-  const auto whole = this->Run(system, DepthFrames());
-  EXPECT_LT(MostApart(whole, this->Run(system, DepthFrames(), {0.002})), this->kTolerance);
+  Problem problem = DepthFilter();
+  problem.motions[0].model = MakeMotion(ConstantVelocity<1, true>(1.0), "constant_velocity");
+  const auto whole = this->Run(problem, DepthFrames());
+  EXPECT_LT(MostApart(whole, this->Run(problem, DepthFrames(), {0.002})), this->kTolerance);
   const std::vector<Frame> more = WithEmptyFrames(DepthFrames(), 4);
-  EXPECT_LT(MostApart(whole, this->Run(system, more)), this->kTolerance);
+  EXPECT_LT(MostApart(whole, this->Run(problem, more)), this->kTolerance);
 }
 
 /// Moves with constant velocity next to a control input that has no effect.
@@ -193,17 +193,17 @@ struct Pushed : Motion<1, Vec<1>, Vec<1>> {
 
 TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   const auto whole = this->Run(DepthFilter(), DepthFrames());
-  System system = DepthFilter();
-  system.motions[0].model = MakeMotion(Pushed(), "pushed");
-  system.motions[0].input = {"push", 0.004};  // and ends after 4 ms
-  std::vector<StreamInfo> streams = StreamsOf(system);
+  Problem problem = DepthFilter();
+  problem.motions[0].model = MakeMotion(Pushed(), "pushed");
+  problem.motions[0].input = {"push", 0.004};  // and ends after 4 ms
+  std::vector<StreamInfo> streams = StreamsOf(problem);
   streams.push_back({"push", 1});
   std::vector<Frame> frames;
   for (const Frame& frame : DepthFrames()) {
     if (!frames.empty()) frames.push_back(FrameAt(Seconds(frame.timestamp) - 0.011, {{2, 3.0}}));
     frames.push_back(frame);
   }
-  const auto all = StatesOf(*Make<TypeParam>(system, {}, streams), frames);
+  const auto all = StatesOf(*Make<TypeParam>(problem, {}, streams), frames);
   std::vector<State> states;
   for (std::size_t k = 0; k < all.size(); k += 2) states.push_back(all[k]);
   EXPECT_LT(MostApart(whole, states), this->kTolerance);
@@ -211,8 +211,8 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
 
 // The first block is known: it has no error, and no part in M.
 TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
-  const auto system = [](BlockStatus position) {
-    System made;
+  const auto problem = [](BlockStatus position) {
+    Problem made;
     MotionBinding binding{"p", testing::ConstantVelocityMotion(2.0), {}};
     binding.blocks = {
         made.layout.Declare("p.x", "p", binding.model->blocks()[0], position),
@@ -228,8 +228,8 @@ TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
   std::vector<Frame> frames;
   for (int k = 0; k < 20; ++k) frames.push_back(FrameAt(0.1 * k, {{0, std::sin(0.7 * k)}}));
   for (const BlockStatus status : {BlockStatus::kConstant, BlockStatus::kEstimated}) {
-    const auto whole = this->Run(system(status), frames);
-    EXPECT_LT(MostApart(whole, this->Run(system(status), frames, {0.03})), this->kTolerance);
+    const auto whole = this->Run(problem(status), frames);
+    EXPECT_LT(MostApart(whole, this->Run(problem(status), frames, {0.03})), this->kTolerance);
   }
 }
 
@@ -240,9 +240,9 @@ TYPED_TEST_SUITE(HeldNoiseSnapshot, Recursive);
 
 // Saved inside a gap, after one part and after several.
 TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   for (const int parts : {1, 3}) {
-    const auto filter = Make<TypeParam>(system, {}, StreamsOf(system));
+    const auto filter = Make<TypeParam>(problem, {}, StreamsOf(problem));
     filter->Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
     for (int i = 1; i <= parts; ++i) filter->Process(FrameAt(0.01 * i, {}));
     const TypeParam saved = *filter;
@@ -260,8 +260,8 @@ TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
 
 // Var(v) after a second of frames without measurements: one interval, sigma^2 T^2.
 TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
-  const System system = HeldPoint(1.0);
-  const auto filter = Make<TypeParam>(system, {}, {});
+  const Problem problem = HeldPoint(1.0);
+  const auto filter = Make<TypeParam>(problem, {}, {});
   for (int k = 0; k <= 10; ++k) filter->Process(FrameAt(0.1 * k, {}));
   EXPECT_NEAR(CovarianceOf(filter->state(), "p.v", "p.v"), 9.0 + 1.0, 1e-9);
   EXPECT_NEAR(CovarianceOf(filter->state(), "p.x", "p.x"), 4.0 + 9.0 + 0.25, 1e-9);
@@ -270,10 +270,10 @@ TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
 // x_k = Phi_k x_0 + sum Gamma w with one w from each measured frame to the next, by least squares.
 // What gives a block its first value ends the interval, as an update that tells nothing does.
 TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
-  System waits = DepthFilter();
+  Problem waits = DepthFilter();
   waits.priors[2] = {2, {}, {}, "inverse_scale"};
-  const System system = DepthFilter();
-  Ekf starts(waits, {}, StreamsOf(waits)), corrected(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf starts(waits, {}, StreamsOf(waits)), corrected(problem, {}, StreamsOf(problem));
   Ekf goes_on = corrected;
   for (Ekf* one : {&starts, &corrected, &goes_on}) one->Start(0);
   Frame vague = FrameAt(0.2, {{0, 74.0}});
@@ -294,10 +294,10 @@ TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
 TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;
-  System system = HeldPoint(kSigma);
-  AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
-  RtsSmoother rts(system, {}, StreamsOf(system)),
-      parts(system, {.max_dt_s = 0.02}, StreamsOf(system));
+  Problem problem = HeldPoint(kSigma);
+  AddSensor(problem, "z", LinearSensor(2.0, 0.3), {"p.x"});
+  RtsSmoother rts(problem, {}, StreamsOf(problem)),
+      parts(problem, {.max_dt_s = 0.02}, StreamsOf(problem));
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(2 + kFrames, 2 + kFrames);
   normal.topLeftCorner<2, 2>() = Eigen::Vector2d(1.0 / 4.0, 1.0 / 9.0).asDiagonal();
   Eigen::VectorXd right = Eigen::VectorXd::Zero(2 + kFrames);

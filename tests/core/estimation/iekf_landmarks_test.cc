@@ -15,14 +15,14 @@ namespace {
 using Eigen::VectorXd;
 
 template <class Filter, class Options = EkfOptions>
-Filter Make(const System& system, const Options& options = {}) {
-  return {system, options, {{"tracks", system.sensors[0].model->measurement().geometry.ambient}}};
+Filter Make(const Problem& problem, const Options& options = {}) {
+  return {problem, options, {{"tracks", problem.sensors[0].model->measurement().geometry.ambient}}};
 }
 
 TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
-  const System system = MapSystem(Offset(0.05), {}, 0.3);
-  Ekf ekf = Make<Ekf>(system);
-  Iekf iekf = Make<Iekf, IekfOptions>(system);
+  const Problem problem = MapSystem(Offset(0.05), {}, 0.3);
+  Ekf ekf = Make<Ekf>(problem);
+  Iekf iekf = Make<Iekf, IekfOptions>(problem);
   Random random(3);
   for (int k = 0; k < 20; ++k) {
     std::vector<Observation> observations;
@@ -79,12 +79,12 @@ struct Cost {
 TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   constexpr double kSigma = 0.05;
   const AnchoredPixels<0> pixels(kSigma);
-  const System system = MapSystem(pixels, WithPrior(), 0.3);
+  const Problem problem = MapSystem(pixels, WithPrior(), 0.3);
   const std::vector<double> later = {0.9, -0.7};
-  Ekf prediction = Make<Ekf>(system), ekf = Make<Ekf>(system);
+  Ekf prediction = Make<Ekf>(problem), ekf = Make<Ekf>(problem);
   IekfOptions options;
   options.max_iterations = 500;
-  Iekf iekf = Make<Iekf>(system, options);
+  Iekf iekf = Make<Iekf>(problem, options);
   const Frame frame = FrameOf(1.0, {{0, later}});
   for (Filter* const filter : std::initializer_list<Filter*>{&prediction, &ekf, &iekf}) {
     filter->Process(FrameOf(0.0, {{0, {0.3, 0.1}}}));

@@ -17,11 +17,11 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 TEST(Iekf, EqualsTheEkfOnALinearProblem) {
-  System system = MovingPoint();
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
-  Iekf iekf(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint();
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(problem, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
+  Iekf iekf(problem, {}, StreamsOf(problem));
   Random random(21);
   for (int k = 0; k < 200; ++k) {
     const Frame frame = FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}});
@@ -50,9 +50,9 @@ double Least(const std::function<double(double)>& c, double low, double high) {
 }
 
 TEST(Iekf, FindsTheMostProbableState) {
-  System system = DepthFilter();
-  system.sensors.pop_back();
-  Iekf iekf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.sensors.pop_back();
+  Iekf iekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 110.0}}));
   EXPECT_TRUE(report.events.empty());
   const auto cost = [](double z) {
@@ -72,11 +72,11 @@ TEST(Iekf, FindsTheMostProbableState) {
 }
 
 TEST(Iekf, TheGateIsThatOfThePrediction) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   IekfOptions options;
   options.gate = 0.999;
-  Iekf iekf(system, options, StreamsOf(system));
-  Ekf ekf(system, options, StreamsOf(system));
+  Iekf iekf(problem, options, StreamsOf(problem));
+  Ekf ekf(problem, options, StreamsOf(problem));
   const std::vector<double> x = iekf.state().values();
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 300.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
@@ -129,18 +129,18 @@ struct Creased : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-System FarArcTangent() {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
-  AddSensor(system, "s", MakeSensor(ArcTangent(), "arc_tangent"), {"p.x"});
-  return system;
+Problem FarArcTangent() {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
+  AddSensor(problem, "s", MakeSensor(ArcTangent(), "arc_tangent"), {"p.x"});
+  return problem;
 }
 
 // FAULTS 81: the best is kept
 TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   // From 3 a whole Gauss-Newton step leads to -9.5, from there to 116, and so on.
-  const System system = FarArcTangent();
-  Iekf iekf(system, {}, StreamsOf(system));
+  const Problem problem = FarArcTangent();
+  Iekf iekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
   EXPECT_TRUE(report.events.empty()) << report.events[0].text;
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 0.0, 1e-6);
@@ -148,10 +148,10 @@ TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
 
 // FAULTS 81
 TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
-  const System system = FarArcTangent();
+  const Problem problem = FarArcTangent();
   IekfOptions options;
   options.max_iterations = 2;
-  Iekf iekf(system, options, StreamsOf(system));
+  Iekf iekf(problem, options, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
   ASSERT_EQ(report.events.size(), 1u);
   EXPECT_EQ(report.events[0].kind, "not_converged");
@@ -164,11 +164,11 @@ TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
 // The last iterate x is where H was last taken: P = (1 / P0 + H^2 / R)^-1 there, and the step left
 // is (P0 H (r + H dx) / S - dx) / sqrt(P), worked out here by hand.
 TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
-  const System system = FarArcTangent();
+  const Problem problem = FarArcTangent();
   for (const int most : {2, 3}) {
     IekfOptions options;
     options.max_iterations = most;
-    Iekf iekf(system, options, StreamsOf(system));
+    Iekf iekf(problem, options, StreamsOf(problem));
     const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
     ASSERT_EQ(report.events.size(), 1u) << most;
     int count = 0;
@@ -191,23 +191,23 @@ TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
 TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
   for (const int most : {2, 3}) {
     int linearisations = 0;
-    System system;
-    AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
-    AddSensor(system, "s", MakeSensor(CountedArcTangent{{}, &linearisations}, "counted"), {"p.x"});
+    Problem problem;
+    AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
+    AddSensor(problem, "s", MakeSensor(CountedArcTangent{{}, &linearisations}, "counted"), {"p.x"});
     IekfOptions options;
     options.max_iterations = most;
-    Iekf(system, options, StreamsOf(system)).Process(FrameAt(0.0, {{0, 0.0}}));
+    Iekf(problem, options, StreamsOf(problem)).Process(FrameAt(0.0, {{0, 0.0}}));
     EXPECT_EQ(linearisations, most);
   }
 }
 
 // The first step leads from 2.5 to 1.34, where h is defined but its derivative is not.
 TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
-  AddSensor(system, "plain", LinearSensor(1.0, 1.0), {"p.x"});
-  AddSensor(system, "creased", MakeSensor(Creased{}, "creased"), {"p.x"});
-  Iekf iekf(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
+  AddSensor(problem, "plain", LinearSensor(1.0, 1.0), {"p.x"});
+  AddSensor(problem, "creased", MakeSensor(Creased{}, "creased"), {"p.x"});
+  Iekf iekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 2.5}, {1, 0.0}}));
   for (const MeasurementReport& entry : report.measurements()) {
     EXPECT_EQ(entry.outcome, Outcome::kAccepted);
@@ -223,10 +223,10 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
 }
 
 TEST(Iekf, WithoutNoiseTheUpdateIsThatOfTheEkf) {
-  System system = MovingPoint();
-  AddSensor(system, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
-  Iekf iekf(system, {}, StreamsOf(system));
-  Ekf ekf(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint();
+  AddSensor(problem, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
+  Iekf iekf(problem, {}, StreamsOf(problem));
+  Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 3.0}}));
   ekf.Process(FrameAt(0.0, {{0, 3.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
@@ -263,32 +263,32 @@ struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
   }
 };
 
-System TurnedVector() {
-  System system;
+Problem TurnedVector() {
+  Problem problem;
   MotionBinding binding{"s", MakeMotion(Still(), "still"), {}};
   const std::vector<double> means[2] = {{1.0, 0.0, 0.0, 0.0}, {0.6, 0.0, 0.8}};
   for (std::size_t i = 0; i < 2; ++i) {
     const Space& space = binding.model->blocks()[i];
-    const BlockId id = system.layout.Declare("s." + space.name, "s", space);
+    const BlockId id = problem.layout.Declare("s." + space.name, "s", space);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;
     prior.mean = means[i];
     const int n = space.geometry.tangent;
     prior.covariance = 0.5 * Eigen::MatrixXd::Identity(n, n);
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
-  system.motions.push_back(binding);
-  AddSensor(system, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
-  return system;
+  problem.motions.push_back(binding);
+  AddSensor(problem, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
+  return problem;
 }
 
 TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
-  const System system = TurnedVector();
+  const Problem problem = TurnedVector();
   IekfOptions options;
   options.max_iterations = 100;
   options.tolerance = 1e-8;
-  Iekf iekf(system, options, StreamsOf(system));
+  Iekf iekf(problem, options, StreamsOf(problem));
   Frame frame;
   frame.timestamp = 0;
   const double z[3] = {-0.3, 0.9, 0.2};
@@ -297,12 +297,12 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
   // The slope of the cost over the tangent at the prior vanishes at the estimate.
   const Geometry geometries[2] = {Geometry::UnitQuaternion(), Geometry::UnitVector()};
   double d[5];
-  geometries[0].Minus(iekf.state().value(0), system.priors[0].mean.data(), d);
-  geometries[1].Minus(iekf.state().value(1), system.priors[1].mean.data(), d + 3);
+  geometries[0].Minus(iekf.state().value(0), problem.priors[0].mean.data(), d);
+  geometries[1].Minus(iekf.state().value(1), problem.priors[1].mean.data(), d + 3);
   const auto cost = [&] {
     double q[4], u[3], h[3], sum = 0.0;
-    geometries[0].Plus(system.priors[0].mean.data(), d, q);
-    geometries[1].Plus(system.priors[1].mean.data(), d + 3, u);
+    geometries[0].Plus(problem.priors[0].mean.data(), d, q);
+    geometries[1].Plus(problem.priors[1].mean.data(), d + 3, u);
     Turned().Predict(q, u, h);
     for (int i = 0; i < 3; ++i) sum += std::pow((z[i] - h[i]) / 0.1, 2);
     for (const double element : d) sum += element * element / 0.5;
@@ -323,8 +323,8 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
 }
 
 TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
-  const System few = TurnedVector();
-  System many = TurnedVector();
+  const Problem few = TurnedVector();
+  Problem many = TurnedVector();
   for (int i = 0; i < 20; ++i) {
     AddMotion(many, "m" + std::to_string(i), testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   }
@@ -375,16 +375,16 @@ struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 
 /// After z = 2 = x^k c with R = .01 and c held; x = c = 1 before, as correlated as Difference says.
 State AfterAHeldRole(int power) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
-  AddMotion(system, "q", testing::ConstantMotion(1), {{"c", 1.0, std::sqrt(1.9)}});
-  AddSensor(system, "difference", MakeSensor(Difference(), "difference"), {"p.x", "q.c"});
-  AddSensor(system, "power", MakeSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
-  system.sensors[1].roles[1].mode = RoleMode::kKnown;
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
+  AddMotion(problem, "q", testing::ConstantMotion(1), {{"c", 1.0, std::sqrt(1.9)}});
+  AddSensor(problem, "difference", MakeSensor(Difference(), "difference"), {"p.x", "q.c"});
+  AddSensor(problem, "power", MakeSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
+  problem.sensors[1].roles[1].mode = RoleMode::kKnown;
   IekfOptions options;
   options.max_iterations = 50;
   options.tolerance = 1e-9;
-  Iekf iekf(system, options, StreamsOf(system));
+  Iekf iekf(problem, options, StreamsOf(problem));
   iekf.Process(FrameAt(0.0, {{0, 0.0}}));
   EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "q.c"), 0.9, 1e-12);
   EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0, 1e-12);
@@ -410,10 +410,10 @@ TEST(Iekf, HoldsARoleInEveryIteration) {
 }
 
 TEST(Iekf, RefusesWhatItCannotDo) {
-  System considered = DepthFilter();
+  Problem considered = DepthFilter();
   considered.sensors[1].roles[1].mode = RoleMode::kConsider;
   EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), Error);
-  System measured = DepthFilter();
+  Problem measured = DepthFilter();
   measured.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), Error);
   IekfOptions first;

@@ -17,64 +17,64 @@ TEST(UnobservableDirections, StereoAndScaleTellEverything) {
 }
 
 TEST(UnobservableDirections, ScaleAloneCannotTellLambdaFromDepth) {
-  System system = testing::DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  const auto directions = UnobservableDirections(system);
+  Problem problem = testing::DepthFilter();
+  problem.sensors.erase(problem.sensors.begin());
+  const auto directions = UnobservableDirections(problem);
   ASSERT_EQ(directions.size(), 1u);
   EXPECT_EQ(directions[0],
             (Names{"target.depth", "target.depth_rate", "template.inverse_distance"}));
 }
 
 TEST(UnobservableDirections, StereoAloneSaysNothingOfLambda) {
-  System system = testing::DepthFilter();
-  system.sensors.pop_back();
-  const auto directions = UnobservableDirections(system);
+  Problem problem = testing::DepthFilter();
+  problem.sensors.pop_back();
+  const auto directions = UnobservableDirections(problem);
   ASSERT_EQ(directions.size(), 1u);
   EXPECT_EQ(directions[0], Names{"template.inverse_distance"});
 }
 
 TEST(UnobservableDirections, AHeldBlockIsNotEstimated) {
-  System system = testing::DepthFilter();
-  system.sensors[1].roles[1].mode = RoleMode::kKnown;
-  const auto directions = UnobservableDirections(system);
+  Problem problem = testing::DepthFilter();
+  problem.sensors[1].roles[1].mode = RoleMode::kKnown;
+  const auto directions = UnobservableDirections(problem);
   ASSERT_EQ(directions.size(), 1u);
   EXPECT_EQ(directions[0], Names{"template.inverse_distance"});
 }
 
 TEST(UnobservableDirections, WhereNothingMeasuresNothingIsSeen) {
-  System system = testing::DepthFilter();
-  system.sensors.clear();
+  Problem problem = testing::DepthFilter();
+  problem.sensors.clear();
   EXPECT_EQ(
-      UnobservableDirections(system),
+      UnobservableDirections(problem),
       (std::vector<Names>{{"target.depth"}, {"target.depth_rate"}, {"template.inverse_distance"}}));
 }
 
 TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
   constexpr int kPairs = 150;
-  System system;
+  Problem problem;
   for (int i = 0; i < kPairs; ++i) {
     const std::string name = "p" + std::to_string(i);
-    testing::AddMotion(system, name, testing::ConstantVelocityMotion(1.0),
+    testing::AddMotion(problem, name, testing::ConstantVelocityMotion(1.0),
                        {{"x", 1.0, 1e-3}, {"v", 0.0, 1e3}});
     if (i % 50 == 7) continue;
-    testing::AddSensor(system, name, testing::LinearSensor(1.0, 1.0), {name + ".x"});
+    testing::AddSensor(problem, name, testing::LinearSensor(1.0, 1.0), {name + ".x"});
   }
-  EXPECT_EQ(UnobservableDirections(system),
+  EXPECT_EQ(UnobservableDirections(problem),
             (std::vector<Names>{{"p7.x"}, {"p7.v"}, {"p57.x"}, {"p57.v"}, {"p107.x"}, {"p107.v"}}));
 }
 
 TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   const auto state_of = [](int size) {
-    System system;
+    Problem problem;
     const SharedMotion model = testing::ConstantMotion(size);
-    const BlockId id = system.layout.Declare("c.value", "c", model->blocks()[0]);
-    system.motions.push_back({"c", model, {id}});
+    const BlockId id = problem.layout.Declare("c.value", "c", model->blocks()[0]);
+    problem.motions.push_back({"c", model, {id}});
     Prior prior;
     prior.block = id;
     prior.mean.assign(static_cast<std::size_t>(size), 0.0);
     prior.covariance = Eigen::MatrixXd::Identity(size, size);
-    system.priors.push_back(prior);
-    return system;
+    problem.priors.push_back(prior);
+    return problem;
   };
   EXPECT_EQ(UnobservableDirections(state_of(500)).size(), 500u);
   EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
@@ -82,26 +82,26 @@ TEST(UnobservableDirections, AreNotLookedForInALargeState) {
 
 // FAULTS 78: one camera that nothing else moves or measures cannot tell how large the world is.
 TEST(UnobservableDirections, OneCameraCannotTellScale) {
-  const auto system = [](const LandmarkOptions& options) {
+  const auto problem = [](const LandmarkOptions& options) {
     return testing::MapSystem(testing::InverseDepthPixels(0.01), options);
   };
-  EXPECT_EQ(UnobservableDirections(system(testing::WithPrior())), (std::vector<Names>{{"scale"}}));
+  EXPECT_EQ(UnobservableDirections(problem(testing::WithPrior())), (std::vector<Names>{{"scale"}}));
   const auto anchored =
       testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), testing::WithPrior());
   EXPECT_EQ(UnobservableDirections(anchored), (std::vector<Names>{{"scale"}}));
   // One landmark whose place is known is a scale.
   LandmarkOptions known = testing::WithPrior();
   known.known = {{1, {0.0, 0.0, 2.0}, 0.01}};
-  EXPECT_TRUE(UnobservableDirections(system(known)).empty());
+  EXPECT_TRUE(UnobservableDirections(problem(known)).empty());
   // So is any offset in metres.
   EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
 }
 
 // FAULTS 78: where the camera starts is not known either: the whole world may be elsewhere.
 TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
-  const System system =
+  const Problem problem =
       testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.5);
-  const auto directions = UnobservableDirections(system);
+  const auto directions = UnobservableDirections(problem);
   ASSERT_EQ(directions.size(), 4u);
   EXPECT_EQ(directions[0], Names{"scale"});
   for (std::size_t i = 0; i < 3; ++i) {
@@ -110,24 +110,24 @@ TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
 }
 
 /// Adds a block that starts at `mean`, each element of its tangent known to `sigma`.
-BlockId AddBlock(System& system, const std::string& name, const Space& space,
+BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
                  const std::vector<double>& mean, double sigma) {
-  const BlockId id = system.layout.Declare(name, name.substr(0, name.find('.')), space);
+  const BlockId id = problem.layout.Declare(name, name.substr(0, name.find('.')), space);
   const int n = space.geometry.tangent;
-  system.priors.push_back({id, mean, sigma * sigma * Eigen::MatrixXd::Identity(n, n), {}});
+  problem.priors.push_back({id, mean, sigma * sigma * Eigen::MatrixXd::Identity(n, n), {}});
   return id;
 }
 
 /// A body `b` driven by its accelerometer, and a sensor of its position or velocity.
-System Accelerated(const std::string& measured) {
-  System system;
+Problem Accelerated(const std::string& measured) {
+  Problem problem;
   const SharedMotion model = MakeMotion(testing::Accelerated(), "accelerated");
-  const BlockId p = AddBlock(system, "b.position", model->blocks()[0], {0.0, 0.0, 0.0}, 1.0);
-  const BlockId v = AddBlock(system, "b.velocity", model->blocks()[1], {0.0, 0.0, 0.0}, 1.0);
-  const BlockId q = AddBlock(system, "b.orientation", model->blocks()[2], {1, 0, 0, 0}, 0.2);
-  system.motions.push_back({"b", model, {p, v, q}, {"accelerometer"}});
-  testing::AddSensor(system, "fix", MakeSensor(testing::Position3(), "position"), {measured});
-  return system;
+  const BlockId p = AddBlock(problem, "b.position", model->blocks()[0], {0.0, 0.0, 0.0}, 1.0);
+  const BlockId v = AddBlock(problem, "b.velocity", model->blocks()[1], {0.0, 0.0, 0.0}, 1.0);
+  const BlockId q = AddBlock(problem, "b.orientation", model->blocks()[2], {1, 0, 0, 0}, 0.2);
+  problem.motions.push_back({"b", model, {p, v, q}, {"accelerometer"}});
+  testing::AddSensor(problem, "fix", MakeSensor(testing::Position3(), "position"), {measured});
+  return problem;
 }
 
 // A rotation about the acceleration shows once the acceleration has another direction.
@@ -138,8 +138,8 @@ TEST(UnobservableDirections, AnAccelerometerThatChangesAndAPositionTellTheOrient
 // R u alone is seen: one of three rotations is not.
 TEST(UnobservableDirections, AConstantAccelerometerLeavesARotation) {
   using internal::Excitation;
-  const System system = Accelerated("b.position");
-  EXPECT_EQ(internal::UnobservableDirections(system, Excitation::kConstant),
+  const Problem problem = Accelerated("b.position");
+  EXPECT_EQ(internal::UnobservableDirections(problem, Excitation::kConstant),
             (std::vector<Names>{{"b.orientation"}}));
 }
 
@@ -149,16 +149,16 @@ TEST(UnobservableDirections, WhatNoInputExcitesIsReported) {
 }
 
 /// A vehicle `car` driven by its odometry, and a receiver of satellites on a mast.
-System CarWithMast() {
-  System system;
+Problem CarWithMast() {
+  Problem problem;
   const SharedMotion model = MakeMotion(testing::Unicycle(), "unicycle");
-  const BlockId p = AddBlock(system, "car.position", model->blocks()[0], {0.0, 0.0}, 1.0);
-  const BlockId heading = AddBlock(system, "car.heading", model->blocks()[1], {0.3}, 0.2);
-  const BlockId mast = AddBlock(system, "car.mast", model->blocks()[2], {0.5, 0.1}, 0.5);
-  system.motions.push_back({"car", model, {p, heading, mast}, {"odometry"}});
-  testing::AddSensor(system, "fix", MakeSensor(testing::OnMast(), "on_mast"),
+  const BlockId p = AddBlock(problem, "car.position", model->blocks()[0], {0.0, 0.0}, 1.0);
+  const BlockId heading = AddBlock(problem, "car.heading", model->blocks()[1], {0.3}, 0.2);
+  const BlockId mast = AddBlock(problem, "car.mast", model->blocks()[2], {0.5, 0.1}, 0.5);
+  problem.motions.push_back({"car", model, {p, heading, mast}, {"odometry"}});
+  testing::AddSensor(problem, "fix", MakeSensor(testing::OnMast(), "on_mast"),
                      {"car.position", "car.heading", "car.mast"});
-  return system;
+  return problem;
 }
 
 // On a circle any circle about the same centre does: 4 numbers for 5 unknowns.
@@ -183,11 +183,11 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
 // Three steps of 0.02 s move x by j (0.02 s)^3: 8e-8 sigma where a jerk is known to 0.01 m/s^3
 // next to a position known to 1 m. It is small, but no rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
-  System system;
-  testing::AddMotion(system, "p", MakeMotion(Chain(), "chain"),
+  Problem problem;
+  testing::AddMotion(problem, "p", MakeMotion(Chain(), "chain"),
                      {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}, {"a", 0.0, 1.0}, {"j", 0.0, 0.01}});
-  testing::AddSensor(system, "fix", testing::LinearSensor(1.0, 1.0), {"p.x"});
-  EXPECT_EQ(UnobservableDirections(system), std::vector<Names>{});
+  testing::AddSensor(problem, "fix", testing::LinearSensor(1.0, 1.0), {"p.x"});
+  EXPECT_EQ(UnobservableDirections(problem), std::vector<Names>{});
 }
 
 }  // namespace

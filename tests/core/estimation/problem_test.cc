@@ -32,14 +32,14 @@ std::string RefusalOf(const Call& call) {
 /// What is thrown when `add` is called with a problem that has the state `target`.
 template <class Add>
 std::string Refusal(const Add& add) {
-  System problem;
+  Problem problem;
   const auto target =
       problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
   return RefusalOf([&] { add(problem, target); });
 }
 
 TEST(Problem, OfCodeIsThatOfBindingsByHand) {
-  System problem;
+  Problem problem;
   const auto target =
       problem.AddState("target", Point(1.0), {{"velocity", 0.0, 0.5}, {"position", 0.35, 0.1}});
   const auto model = problem.AddState("template", Constant<1>(1), {{"value", 3.3, 0.5}});
@@ -47,7 +47,7 @@ TEST(Problem, OfCodeIsThatOfBindingsByHand) {
       problem.AddSensor("disparity", StereoDisparity(400.0, 0.065, 1.0), {target["position"]});
   const auto scale = problem.AddSensor("inverse_scale", Scale2d::FromPixels(300.0, 1.0),
                                        {target["position"], model["value"]});
-  const System by_hand = testing::DepthFilter();
+  const Problem by_hand = testing::DepthFilter();
   Ekf ekf(problem), other(by_hand, {}, testing::StreamsOf(by_hand));
   for (int k = 0; k < 20; ++k) {
     const Timestamp now = TimestampFromSeconds(0.1 * k);
@@ -63,7 +63,7 @@ TEST(Problem, OfCodeIsThatOfBindingsByHand) {
 }
 
 TEST(Problem, ASensorBringsTheStatesThatItOwns) {
-  System problem;
+  Problem problem;
   const auto receiver =
       problem.AddState("receiver", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 10.0}});
   const std::size_t before = problem.motions.size();
@@ -75,7 +75,7 @@ TEST(Problem, ASensorBringsTheStatesThatItOwns) {
 }
 
 TEST(Problem, ABlockMayStartFromAMeasurement) {
-  System problem;
+  Problem problem;
   const auto target = problem.AddState(
       "target", Point(1.0),
       {InitialValue::FromMeasurement("position", "stereo"), {"velocity", 0.0, 0.5}});
@@ -88,7 +88,7 @@ TEST(Problem, ABlockMayStartFromAMeasurement) {
 }
 
 TEST(Problem, ABlockMayHaveAnotherNameAndACovariance) {
-  System problem;
+  Problem problem;
   const Eigen::Matrix3d covariance = Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal();
   InitialValue start = InitialValue::WithCovariance("value", {1.0, 2.0, 3.0}, covariance);
   start.name = "place";
@@ -100,7 +100,7 @@ TEST(Problem, ABlockMayHaveAnotherNameAndACovariance) {
 }
 
 TEST(Problem, SensorsMayReadOneStream) {
-  System problem;
+  Problem problem;
   const auto target =
       problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
   const StereoDisparity stereo(400.0, 0.065, 1.0);
@@ -113,7 +113,7 @@ TEST(Problem, SensorsMayReadOneStream) {
 }
 
 TEST(Problem, AStateOfASensorMayStartOtherwiseThanItsModelSays) {
-  System problem;
+  Problem problem;
   const auto receiver =
       problem.AddState("receiver", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 10.0}});
   const Pseudorange model(1.0);
@@ -129,51 +129,51 @@ TEST(Problem, AStateOfASensorMayStartOtherwiseThanItsModelSays) {
 
 TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   const StereoDisparity stereo(400.0, 0.065, 1.0);
-  EXPECT_EQ(Refusal([](System& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
+  EXPECT_EQ(Refusal([](Problem& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
             "state 'target' is there already");
-  EXPECT_EQ(Refusal([](System& p, auto&) {
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"position", 0.0, 1.0}});
             }),
             "state 'b' needs an initial value of 'velocity'");
-  EXPECT_EQ(Refusal([](System& p, auto&) {
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
             }),
             "state 'b' has no block 'depth'; its blocks are position, velocity");
-  EXPECT_EQ(Refusal([](System& p, auto&) {
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
             }),
             "state 'b' needs 3 numbers as the initial value of 'value', a vector(3), not 2");
-  EXPECT_EQ(Refusal([](System& p, auto&) {
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, -1.0}});
             }),
             "state 'b' needs a finite standard deviation of at least 0, or 1 of them, with the "
             "initial value of 'value', a vector(1)");
-  EXPECT_EQ(Refusal([](System&, auto& target) { static_cast<void>(target["depth"]); }),
+  EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
             "state 'target' has no block 'depth'; its blocks are position, velocity");
-  EXPECT_EQ(Refusal([&](System& p, auto&) { p.AddSensor("s", stereo, {}); }),
+  EXPECT_EQ(Refusal([&](Problem& p, auto&) { p.AddSensor("s", stereo, {}); }),
             "sensor 's' needs a block that fills its role 'depth', a vector(1)");
-  EXPECT_EQ(Refusal([&](System& p, auto& t) {
+  EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"], t["velocity"]});
             }),
             "sensor 's' has 1 role to be filled, not 2: depth");
-  EXPECT_EQ(Refusal([&](System& p, auto&) {
+  EXPECT_EQ(Refusal([&](Problem& p, auto&) {
               const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
               p.AddSensor("s", stereo, {wide["value"]});
             }),
             "sensor 's' has a role 'depth', a vector(1); block 'wide.value' is a vector(2)");
-  EXPECT_EQ(Refusal([](System& p, auto& t) {
+  EXPECT_EQ(Refusal([](Problem& p, auto& t) {
               p.AddSensor("s", Scale2d::FromPixels(300.0, 1.0), {t["position"], t["position"]});
             }),
             "sensor 's' has block 'target.position' in two roles; expected one for each");
   EXPECT_EQ(
-      Refusal([&](System& p, auto& t) {
+      Refusal([&](Problem& p, auto& t) {
         p.AddSensor("a", stereo, {t["position"]}, {.stream = "camera"});
         const auto wide = p.AddState("wide", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 1.0}});
         p.AddSensor("b", Pseudorange(1.0), {wide["value"]}, {.stream = "camera"});
       }),
       "sensor 'b' reads 1 values with 3 known numbers from stream 'camera', and another 1 "
       "values with 0 known numbers");
-  EXPECT_EQ(Refusal([](System& p, auto&) {
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<3>(3),
                          {InitialValue::WithCovariance("value", {0.0, 0.0, 0.0},
                                                        Eigen::Matrix2d::Identity())});
@@ -184,7 +184,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
 
 TEST(Problem, AFilterRefusesABlockThatCannotStart) {
   const auto refusal = [](const std::string& block, const std::string& sensor) {
-    System problem;
+    Problem problem;
     const auto start = [&](const std::string& name) {
       if (name == block) return InitialValue::FromMeasurement(name, sensor);
       return InitialValue(name, 0.5, 1.0);
@@ -204,7 +204,7 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
 }
 
 TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
-  System problem;
+  Problem problem;
   const auto start = InitialValue::FromMeasurement;
   const auto a = problem.AddState("a", Constant<1>(1), {start("value", "a_by_b")});
   const auto b = problem.AddState("b", Constant<1>(1), {start("value", "b_by_a")});
@@ -216,7 +216,7 @@ TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
 }
 
 TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {
-  System problem;
+  Problem problem;
   const auto target =
       problem.AddState("target", Point(1.0), {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.5}});
   const auto model = problem.AddState("template", Constant<1>(1), {{"value", 3.3, 0.5}});

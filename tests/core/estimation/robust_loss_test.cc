@@ -40,19 +40,19 @@ TEST(RobustLoss, HasTheTextbookValues) {
 }
 
 /// x ~ N(0, 4), measured with R = 1 under the loss.
-System Measured(const RobustLoss& loss) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 2.0}});
-  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
-  system.sensors[0].loss = loss;
-  return system;
+Problem Measured(const RobustLoss& loss) {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 2.0}});
+  AddSensor(problem, "direct", LinearSensor(1.0, 1.0), {"p.x"});
+  problem.sensors[0].loss = loss;
+  return problem;
 }
 
 /// One measurement z of it.
 template <class Filter>
 UpdateReport Measure(const RobustLoss& loss, double z, State& state) {
-  const System system = Measured(loss);
-  Filter filter(system, {}, StreamsOf(system));
+  const Problem problem = Measured(loss);
+  Filter filter(problem, {}, StreamsOf(problem));
   const UpdateReport report = filter.Process(FrameAt(0.0, {{0, z}}));
   state = filter.state();
   return report;
@@ -82,18 +82,18 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
 // R / w is beyond any number: the measurement is left out, and the good one next to it is used.
 TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   for (const RobustLoss& loss : {kCauchy, kHuber}) {
-    System system = Measured({});
-    AddSensor(system, "far", LinearSensor(1.0, 1.0), {"p.x"});
-    system.sensors[1].loss = loss;
+    Problem problem = Measured({});
+    AddSensor(problem, "far", LinearSensor(1.0, 1.0), {"p.x"});
+    problem.sensors[1].loss = loss;
     for (const double far : {1e155, 1e200}) {
-      TypeParam filter(system, {}, StreamsOf(system));
+      TypeParam filter(problem, {}, StreamsOf(problem));
       const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2.0}, {1, far}}));
       EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted) << far;
       EXPECT_EQ(report.measurements()[1].outcome, Outcome::kGated) << far;
       EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 1.6, 1e-12) << far;
       EXPECT_NEAR(CovarianceOf(filter.state(), "p.x", "p.x"), 0.8, 1e-12) << far;
     }
-    TypeParam filter(system, {}, StreamsOf(system));  // w is a number here, and R / w too
+    TypeParam filter(problem, {}, StreamsOf(problem));  // w is a number here, and R / w too
     const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2.0}, {1, 1e150}}));
     EXPECT_EQ(report.measurements()[1].outcome, Outcome::kAccepted);
     const double pull = loss.kind == LossKind::kHuber ? 0.8 * 1.345 * std::sqrt(5.0) : 0.0;
@@ -141,15 +141,15 @@ struct Normal {
 // One weight for both elements, R correlated and of the measurement itself. `fuse: per_*` takes d
 // of the second after the first; a gate sees S before the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
-  System system;
+  Problem problem;
   const SharedMotion still = testing::ConstantMotion(2);
-  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
-  system.motions.push_back({"p", still, {id}});
+  const BlockId id = problem.layout.Declare("p.x", "p", still->blocks()[0]);
+  problem.motions.push_back({"p", still, {id}});
   const Eigen::Matrix2d p0 = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();
-  system.priors.push_back({id, {0.0, 0.0}, p0, ""});
+  problem.priors.push_back({id, {0.0, 0.0}, p0, ""});
   for (const char* name : {"one", "two"}) {
-    AddSensor(system, name, MakeSensor(PairOfElements{}, "pair"), {"p.x"});
-    system.sensors.back().loss = kCauchy;
+    AddSensor(problem, name, MakeSensor(PairOfElements{}, "pair"), {"p.x"});
+    problem.sensors.back().loss = kCauchy;
   }
   const Eigen::Matrix2d r = (Eigen::Matrix2d() << 0.25, 0.15, 0.15, 0.16).finished();
   const Eigen::Vector2d z[] = {{7.0, -4.0}, {1.0, 0.5}};
@@ -162,7 +162,7 @@ TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   for (const Eigen::Vector2d& one : z) expected.Take(one, r, kCauchy);
   OptionsOf<TypeParam> options;
   Common(options).fuse = Fuse::kPerSensor;
-  TypeParam filter(system, options, StreamsOf(system));
+  TypeParam filter(problem, options, StreamsOf(problem));
   const UpdateReport report = filter.Process(frame);
   EXPECT_GT(report.measurements()[0].nis, 20.0);
   for (int i = 0; i < 2; ++i) {
@@ -172,7 +172,7 @@ TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
     }
   }
   Common(options).gate = 0.9999;  // chi2(0.9999, 2) = 18.4
-  TypeParam gated(system, options, StreamsOf(system));
+  TypeParam gated(problem, options, StreamsOf(problem));
   const UpdateReport& gates = gated.Process(frame);
   EXPECT_EQ(gates.measurements()[0].outcome, Outcome::kGated);
   EXPECT_EQ(gates.measurements()[1].outcome, Outcome::kAccepted);
@@ -188,8 +188,8 @@ TEST(RobustLoss, HuberLeavesAnInlierAsItIs) {
 
 // x does not move: every smoothed estimate is that of all measurements, 1 / P = 1/4 + w + 1.
 TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
-  const System system = Measured(kHuber);
-  RtsSmoother rts(system, {}, StreamsOf(system));
+  const Problem problem = Measured(kHuber);
+  RtsSmoother rts(problem, {}, StreamsOf(problem));
   const double w = 1.345 / (10.0 / std::sqrt(5.0)), first = w * 10.0 / (0.25 + w);
   const double second = first + 0.1;  // an inlier
   rts.Process(FrameAt(0.0, {{0, 10.0}}));

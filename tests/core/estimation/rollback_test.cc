@@ -74,12 +74,12 @@ void ExpectSame(const State& a, const State& b) {
 /// In order and with delays.
 template <class Type, class Options>
 void ExpectTheBitsOfTheInOrderRun(const Options& options) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   const std::vector<Frame> frames = Swinging(60);
-  Type in_order(system, options, StreamsOf(system));
+  Type in_order(problem, options, StreamsOf(problem));
   std::map<Timestamp, std::string> expected, found;
   for (const Frame& frame : frames) expected[frame.timestamp] = Text(in_order.Process(frame));
-  Rollback late(Type(system, options, StreamsOf(system)), kWindow_s);
+  Rollback late(Type(problem, options, StreamsOf(problem)), kWindow_s);
   std::size_t processed = 0;
   for (const Frame& frame : Delayed(frames, kWindow_s)) {
     for (const ProcessedFrame& one : late.Process(frame)) {
@@ -106,8 +106,8 @@ TEST(Rollback, GivesTheBitsOfTheInOrderRun) {
 }
 
 TEST(Rollback, AFrameGivesItsReportAndThoseOfTheLaterOnes) {
-  const System system = DepthFilter();
-  Rollback late(Ekf(system, {}, StreamsOf(system)), 1.0);
+  const Problem problem = DepthFilter();
+  Rollback late(Ekf(problem, {}, StreamsOf(problem)), 1.0);
   const auto timestamps = [&](double t_s) {
     std::vector<double> found;
     for (const ProcessedFrame& one : late.Process(FrameAt(t_s, {{0, 80.0}}))) {
@@ -126,8 +126,8 @@ TEST(Rollback, AFrameGivesItsReportAndThoseOfTheLaterOnes) {
 }
 
 TEST(Rollback, AFrameBeforeTheFirstBecomesTheFirst) {
-  const System system = DepthFilter();
-  Ekf in_order(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Ekf in_order(problem, {}, StreamsOf(problem));
   Rollback late(in_order, 1.0);
   late.Process(FrameAt(0.5, {{0, 80.0}}));
   late.Process(FrameAt(0.0, {{0, 78.0}}));
@@ -137,9 +137,9 @@ TEST(Rollback, AFrameBeforeTheFirstBecomesTheFirst) {
 }
 
 TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
-  const System system = DepthFilter();
-  Rollback late(Ekf(system, {}, StreamsOf(system)), 0.5);
-  Ekf in_order(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  Rollback late(Ekf(problem, {}, StreamsOf(problem)), 0.5);
+  Ekf in_order(problem, {}, StreamsOf(problem));
   for (const double t_s : {1.0, 1.5, 2.0}) {
     late.Process(FrameAt(t_s, {{0, 80.0}}));
     in_order.Process(FrameAt(t_s, {{0, 80.0}}));
@@ -162,15 +162,15 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
 
 // The distance of 10^9 s and of its opposite to now does not fit into a Timestamp.
 TEST(Rollback, TimesFarApartAreBeyondEveryWindow) {
-  const System system = DepthFilter();
-  Rollback late(Ekf(system, {}, StreamsOf(system)), 9.1e9);
+  const Problem problem = DepthFilter();
+  Rollback late(Ekf(problem, {}, StreamsOf(problem)), 9.1e9);
   late.Process(FrameAt(9e9, {}));
   EXPECT_TRUE(late.Process(FrameAt(-9e9, {})).front().report.stale);
 }
 
 TEST(Rollback, PushIsProcessAndRefusesWhatAFilterDoes) {
-  const System system = DepthFilter();
-  Rollback pushed(Ekf(system, {}, StreamsOf(system)), 1.0), processed(pushed.filter(), 1.0);
+  const Problem problem = DepthFilter();
+  Rollback pushed(Ekf(problem, {}, StreamsOf(problem)), 1.0), processed(pushed.filter(), 1.0);
   for (const double t_s : {1.0, 2.0, 1.5}) {
     pushed.Push(TimestampFromSeconds(t_s), {{0, {80.0 + t_s}}});
     processed.Process(FrameAt(t_s, {{0, 80.0 + t_s}}));
@@ -181,8 +181,8 @@ TEST(Rollback, PushIsProcessAndRefusesWhatAFilterDoes) {
 }
 
 TEST(Rollback, AWindowThatIsNoneIsMisuse) {
-  const System system = DepthFilter();
-  const Ekf ekf(system, {}, StreamsOf(system));
+  const Problem problem = DepthFilter();
+  const Ekf ekf(problem, {}, StreamsOf(problem));
   EXPECT_THROW(Rollback(ekf, -1.0), ContractViolation);
   EXPECT_THROW(Rollback(ekf, std::nan("")), ContractViolation);
 }

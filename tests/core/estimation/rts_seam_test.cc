@@ -114,18 +114,18 @@ struct SeamDistance {
 /// Follows a direction that crosses z = 0, where the basis turns over, again and again. All angles
 /// are `sigma` times the same numbers.
 SeamDistance Follow(double sigma) {
-  System system;
+  Problem problem;
   MotionBinding binding{"d", MakeMotion(Wander(sigma), "wander"), {}};
-  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model->blocks()[0]));
+  binding.blocks.push_back(problem.layout.Declare("d.n", "d", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   const double y0 = 10.0 * sigma, z0 = 0.5 * sigma;
   prior.mean = {std::sqrt(1.0 - y0 * y0 - z0 * z0), y0, z0};
   prior.covariance = sigma * sigma * Eigen::Matrix2d{{2.5, 0.5}, {0.5, 1.0}};
-  system.priors.push_back(prior);
-  system.motions.push_back(binding);
-  AddSensor(system, "seen", MakeSensor(Direction(sigma), "direction"), {"d.n"});
-  RtsSmoother rts(system, {}, StreamsOf(system));
+  problem.priors.push_back(prior);
+  problem.motions.push_back(binding);
+  AddSensor(problem, "seen", MakeSensor(Direction(sigma), "direction"), {"d.n"});
+  RtsSmoother rts(problem, {}, StreamsOf(problem));
   DirectionBatch batch{prior, sigma};
   Random random(3);
   int crossings = 0;

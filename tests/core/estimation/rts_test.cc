@@ -43,12 +43,13 @@ struct DenseBatch {
 
 TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
   constexpr int kFrames = 80;
-  System system = MovingPoint(0.7);
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  Problem problem = MovingPoint(0.7);
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(problem, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   EkfOptions per_sensor;
   per_sensor.fuse = Fuse::kPerSensor;
-  RtsSmoother joint(system, {}, StreamsOf(system)), apart(system, per_sensor, StreamsOf(system));
+  RtsSmoother joint(problem, {}, StreamsOf(problem)),
+      apart(problem, per_sensor, StreamsOf(problem));
   DenseBatch batch(kFrames, 2);
   batch.normal.topLeftCorner<2, 2>() = Eigen::Vector2d(1.0 / 4.0, 1.0 / 9.0).asDiagonal();
   batch.right.head<2>() = Eigen::Vector2d(1.0 / 4.0, -0.5 / 9.0);
@@ -86,13 +87,13 @@ TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
 }
 
 TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
-  System system = MovingPoint();
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  Problem problem = MovingPoint();
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
   EkfOptions options;
   options.gate = 0.999;
   options.max_dt_s = 0.1;
-  RtsSmoother rts(system, options, StreamsOf(system));
-  Ekf ekf(system, options, StreamsOf(system));
+  RtsSmoother rts(problem, options, StreamsOf(problem));
+  Ekf ekf(problem, options, StreamsOf(problem));
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.0}}), FrameAt(0.35, {{0, 0.8}}),
                                      FrameAt(0.4, {{0, 1e6}}), FrameAt(1.0, {{0, 0.5}})};
   for (const Frame& frame : frames) {
@@ -111,7 +112,7 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   EXPECT_LT(sigma[0], 0.09);  // better than the measurement alone
   // The same parts as frames without a measurement: 0.35 s in 4 of them, 0.6 s in 6.
   options.max_dt_s = std::numeric_limits<double>::infinity();
-  RtsSmoother in_frames(system, options, StreamsOf(system));
+  RtsSmoother in_frames(problem, options, StreamsOf(problem));
   std::vector<double> of_frames;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Timestamp last = i == 0 ? 0 : frames[i - 1].timestamp, gap = frames[i].timestamp - last;
@@ -129,12 +130,12 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
 // The depth filter is not linear. The smoother's own recursion, with the inverse that the adjoint
 // form does without: x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-) C', C = P F' P-^-1.
 TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   EkfOptions options;
   options.gate = 0.999;
   options.rejection_recovery = RejectionRecovery::kNone;
-  RtsSmoother rts(system, options, StreamsOf(system));
-  Ekf ekf(system, options, StreamsOf(system));
+  RtsSmoother rts(problem, options, StreamsOf(problem));
+  Ekf ekf(problem, options, StreamsOf(problem));
   struct Pass {
     Eigen::Vector3d predicted, x;
     Eigen::Matrix3d p_predicted, p;
@@ -170,17 +171,17 @@ TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
 }
 
 TEST(RtsSmoother, HasNothingToGoBackTo) {
-  const System system = DepthFilter();
-  EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Clone(), nullptr);
+  const Problem problem = DepthFilter();
+  EXPECT_EQ(RtsSmoother(problem, {}, StreamsOf(problem)).Clone(), nullptr);
 }
 
 TEST(RtsSmoother, AllBlocksMayBeConstant) {
-  const System system = WithStatus(DepthFilter(), "", BlockStatus::kConstant);
-  RtsSmoother smoother(system, {}, StreamsOf(system));
+  const Problem problem = WithStatus(DepthFilter(), "", BlockStatus::kConstant);
+  RtsSmoother smoother(problem, {}, StreamsOf(problem));
   for (int k = 0; k < 3; ++k) smoother.Process(FrameAt(0.1 * k, {{0, 80.0}}));
   int frames = 0;
   smoother.Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
-    EXPECT_NEAR(ValueOf(state, "target.depth"), system.priors[0].mean[0], 0.2);
+    EXPECT_NEAR(ValueOf(state, "target.depth"), problem.priors[0].mean[0], 0.2);
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
     ++frames;
   });
@@ -188,7 +189,7 @@ TEST(RtsSmoother, AllBlocksMayBeConstant) {
 }
 
 TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
-  System considered = DepthFilter();
+  Problem considered = DepthFilter();
   const BlockId id = considered.layout.Find("template.inverse_distance");
   StateLayout layout;
   for (const Block& b : considered.layout.blocks()) {
@@ -197,7 +198,7 @@ TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
   }
   considered.layout = layout;
   EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), Error);
-  System waiting = DepthFilter();
+  Problem waiting = DepthFilter();
   waiting.priors[0].from = "disparity";
   EXPECT_THROW(RtsSmoother(waiting, {}, StreamsOf(waiting)), Error);
 }

@@ -39,12 +39,12 @@ struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
-/// The same system, with nine states of no sensor's behind its own.
-System AmongOthers(System system) {
+/// The same problem, with nine states of no sensor's behind its own.
+Problem AmongOthers(Problem problem) {
   for (int i = 0; i < 9; ++i) {
-    AddMotion(system, "aside" + std::to_string(i), ConstantMotion(1), {{"x", 0.0, 1.0}});
+    AddMotion(problem, "aside" + std::to_string(i), ConstantMotion(1), {{"x", 0.0, 1.0}});
   }
-  return system;
+  return problem;
 }
 
 void ExpectEqual(std::span<const double> a, std::span<const double> b) {
@@ -69,10 +69,10 @@ std::vector<double> Leading(std::span<const double> gain, int columns, std::size
 }
 
 /// Both filters over the same frames; counts how often each outcome and kind of event was seen.
-std::map<std::string, int> Compare(const System& system, const EkfOptions& options,
+std::map<std::string, int> Compare(const Problem& problem, const EkfOptions& options,
                                    const std::vector<Frame>& frames) {
-  const System other = AmongOthers(system);
-  Ekf few(system, options, StreamsOf(system)), many(other, options, StreamsOf(other));
+  const Problem other = AmongOthers(problem);
+  Ekf few(problem, options, StreamsOf(problem)), many(other, options, StreamsOf(other));
   std::map<std::string, int> seen;
   for (const Frame& frame : frames) {
     const UpdateReport& a = few.Process(frame);
@@ -174,9 +174,9 @@ TEST(SmallEkf, IsResetAsALargeOne) {
 
 // The block that waits lies before others that have a prior.
 TEST(SmallEkf, StartsABlockFromAMeasurementAsALargeOne) {
-  System system = DepthFilter();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  auto seen = Compare(system, {}, WildFrom(0, 0, 20));
+  Problem problem = DepthFilter();
+  problem.priors[0] = {0, {}, {}, "disparity"};
+  auto seen = Compare(problem, {}, WildFrom(0, 0, 20));
   EXPECT_EQ(seen["initialised"], 1);
   EXPECT_EQ(seen["accepted"], 19);
 }
@@ -196,16 +196,16 @@ TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
 }
 
 TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
-  System system;
-  const BlockId x = system.layout.Declare("a.x", "a", testing::ConstantMotion(2)->blocks()[0]);
-  system.motions.push_back({"a", testing::ConstantMotion(2, 0.4), {x}});
+  Problem problem;
+  const BlockId x = problem.layout.Declare("a.x", "a", testing::ConstantMotion(2)->blocks()[0]);
+  problem.motions.push_back({"a", testing::ConstantMotion(2, 0.4), {x}});
   Prior prior;
   prior.block = x;
   prior.mean = {1.5, 0.7};
   prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
-  system.priors.push_back(prior);
-  AddSensor(system, "first", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
-  AddSensor(system, "second", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
+  problem.priors.push_back(prior);
+  AddSensor(problem, "first", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
+  AddSensor(problem, "second", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
   EkfOptions options;
   options.gate = 0.999;
   std::vector<Frame> frames;
@@ -218,7 +218,7 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
     }
     frames.push_back(frame);
   }
-  const auto seen = Compare(system, options, frames);
+  const auto seen = Compare(problem, options, frames);
   EXPECT_GT(seen.count("gated"), 0u);
 }
 
@@ -232,18 +232,18 @@ struct LoudPair : CorrelatedPair {
 
 TEST(SmallEkf, TakesAGivenNoiseInPlaceOfTheModels) {
   const auto make = [](const SharedSensor& sensor, const SharedMotion& motion) {
-    System system = HeldPoint(0.7);
-    system.motions[0].model = motion;
-    const BlockId x = system.layout.Declare("a.x", "a", ConstantMotion(2)->blocks()[0]);
-    system.motions.push_back({"a", ConstantMotion(2, 0.4), {x}});
-    system.priors.push_back({x, {1.5, 0.7}, Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}}, {}});
-    AddSensor(system, "pair", sensor, {"a.x"});
-    AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
-    return system;
+    Problem problem = HeldPoint(0.7);
+    problem.motions[0].model = motion;
+    const BlockId x = problem.layout.Declare("a.x", "a", ConstantMotion(2)->blocks()[0]);
+    problem.motions.push_back({"a", ConstantMotion(2, 0.4), {x}});
+    problem.priors.push_back({x, {1.5, 0.7}, Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}}, {}});
+    AddSensor(problem, "pair", sensor, {"a.x"});
+    AddSensor(problem, "z", LinearSensor(2.0, 0.3), {"p.x"});
+    return problem;
   };
-  const System own = make(MakeSensor(CorrelatedPair(), "pair"), ConstantVelocityMotion(0.7));
-  const System given = make(SensorOfNoise(LoudPair(), {0.3, 0.0, 0.1, 0.2}),
-                            MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7}));
+  const Problem own = make(MakeSensor(CorrelatedPair(), "pair"), ConstantVelocityMotion(0.7));
+  const Problem given = make(SensorOfNoise(LoudPair(), {0.3, 0.0, 0.1, 0.2}),
+                             MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7}));
   Ekf a(own, {}, StreamsOf(own)), b(given, {}, StreamsOf(given));
   for (int k = 0; k < 20; ++k) {
     Frame frame = FrameAt(0.1 * k, {{1, 2.0 * std::cos(0.1 * k)}});
@@ -283,22 +283,22 @@ struct Spinning : Motion<0, Vec<2>> {
 TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
   for (const SharedMotion& model :
        {MakeMotion(Shaken(), "shaken"), MakeMotion(Spinning(), "turning")}) {
-    System system;
-    const BlockId x = system.layout.Declare("a.x", "a", model->blocks()[0]);
-    system.motions.push_back({"a", model, {x}});
+    Problem problem;
+    const BlockId x = problem.layout.Declare("a.x", "a", model->blocks()[0]);
+    problem.motions.push_back({"a", model, {x}});
     Prior prior;
     prior.block = x;
     prior.mean = {1.5, 0.7};
     prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
-    system.priors.push_back(prior);
-    AddSensor(system, "pair", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
+    problem.priors.push_back(prior);
+    AddSensor(problem, "pair", MakeSensor(CorrelatedPair(), "pair"), {"a.x"});
     std::vector<Frame> frames;
     for (int k = 0; k < 20; ++k) {
       Frame frame = FrameAt(0.1 * k, {});
       frame.measurements.push_back({frame.timestamp, 0, -1, {1.0, 3.0}, {}});
       frames.push_back(frame);
     }
-    EXPECT_EQ(Compare(system, {}, frames)["accepted"], 20);
+    EXPECT_EQ(Compare(problem, {}, frames)["accepted"], 20);
   }
 }
 
@@ -320,15 +320,15 @@ struct Repeated : Sensor<Vec<K>, Vec<1>> {
 
 // A gain of 3 rows for the 2 states that had a value then has as many numbers as one of 2 for 3.
 TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
-  System system = DepthFilter();
-  system.priors[2] = {2, {}, {}, "inverse_scale"};
-  AddSensor(system, "three", MakeSensor(Repeated<3>(), "three"), {"target.depth"});
-  AddSensor(system, "two", MakeSensor(Repeated<2>(), "two"), {"target.depth"});
+  Problem problem = DepthFilter();
+  problem.priors[2] = {2, {}, {}, "inverse_scale"};
+  AddSensor(problem, "three", MakeSensor(Repeated<3>(), "three"), {"target.depth"});
+  AddSensor(problem, "two", MakeSensor(Repeated<2>(), "two"), {"target.depth"});
   std::vector<Frame> frames = {FrameAt(0.0, {{0, 74.0}, {2, 0.35}}), FrameAt(0.1, {{1, 1.0}}),
                                FrameAt(0.2, {{0, 74.0}, {3, 0.35}})};
   frames[0].measurements[1].values = {0.35, 0.34, 0.36};
   frames[2].measurements[1].values = {0.35, 0.34};
-  EXPECT_EQ(Compare(system, {}, frames)["accepted"], 4);
+  EXPECT_EQ(Compare(problem, {}, frames)["accepted"], 4);
 }
 
 // ---- every number of states ---------------------------------------------------------------------
@@ -367,55 +367,55 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
 };
 
 /// Adds a block of three that walk, `t.x`, with correlated priors.
-void AddTriple(System& system) {
+void AddTriple(Problem& problem) {
   const SharedMotion walk = testing::ConstantMotion(3, 0.2);
-  const BlockId id = system.layout.Declare("t.x", "t", walk->blocks()[0]);
-  system.motions.push_back({"t", walk, {id}});
+  const BlockId id = problem.layout.Declare("t.x", "t", walk->blocks()[0]);
+  problem.motions.push_back({"t", walk, {id}});
   const Eigen::Matrix3d p{{0.09, 0.02, 0.01}, {0.02, 0.04, -0.01}, {0.01, -0.01, 0.16}};
-  system.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
+  problem.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
 }
 
 /// `n` states: from 4 on three that walk together, of the rest as many as can in pairs of position
 /// and velocity. All motions have noise; sensors tie the first scalar to the others.
-System OfSize(int n) {
-  System system;
+Problem OfSize(int n) {
+  Problem problem;
   const bool triple = n >= 4;
   const int rest = triple ? n - 3 : n;
   std::vector<std::string> scalars;
   for (int i = 0; i < rest / 2; ++i) {
     const std::string name = "p" + std::to_string(i);
-    AddMotion(system, name, testing::ConstantVelocityMotion(0.7),
+    AddMotion(problem, name, testing::ConstantVelocityMotion(0.7),
               {{"x", 1.0, 0.3}, {"v", 0.0, 0.2}});
     scalars.push_back(name + ".x");
   }
   if (rest % 2 == 1) {
-    AddMotion(system, "s", testing::ConstantMotion(1, 0.3), {{"x", 1.0, 0.3}});
+    AddMotion(problem, "s", testing::ConstantMotion(1, 0.3), {{"x", 1.0, 0.3}});
     scalars.emplace_back("s.x");
   }
-  if (triple) AddTriple(system);
-  AddSensor(system, "first", LinearSensor(2.0, 0.5), {scalars[0]});
-  if (triple) AddSensor(system, "mixed", MakeSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
+  if (triple) AddTriple(problem);
+  AddSensor(problem, "first", LinearSensor(2.0, 0.5), {scalars[0]});
+  if (triple) AddSensor(problem, "mixed", MakeSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
   for (std::size_t i = 1; i < scalars.size() && i < 3; ++i) {
-    AddSensor(system, "both" + std::to_string(i), MakeSensor(Both(), "both"),
+    AddSensor(problem, "both" + std::to_string(i), MakeSensor(Both(), "both"),
               {scalars[0], scalars[scalars.size() - i]});
   }
-  return system;
+  return problem;
 }
 
 class SmallEkfOfSize : public ::testing::TestWithParam<int> {};
 
 // Frames with one measurement, with two, and with all: updates of 1 to 6 rows.
 TEST_P(SmallEkfOfSize, DoesWhatALargeOneDoes) {
-  const System system = OfSize(GetParam());
-  ASSERT_EQ(system.InitialState().covariance().size(), GetParam());
-  const int sensors = static_cast<int>(std::ssize(system.sensors));
+  const Problem problem = OfSize(GetParam());
+  ASSERT_EQ(problem.InitialState().covariance().size(), GetParam());
+  const int sensors = static_cast<int>(std::ssize(problem.sensors));
   std::vector<Frame> frames;
   for (int k = 0; k < 80; ++k) {
     Frame frame = FrameAt(0.05 * k, {});
     const int count = k % 4 == 0 ? 1 : k % 4 == 1 ? 2 : sensors;
     for (int i = 0; i < std::min(count, sensors); ++i) {
       const int stream = (k / 4 + i) % sensors;
-      const std::string& name = system.sensors[static_cast<std::size_t>(stream)].name;
+      const std::string& name = problem.sensors[static_cast<std::size_t>(stream)].name;
       const double noise = 0.4 * std::sin(3.0 * k + stream) + (k % 17 == 11 ? 9.0 : 0.0);
       std::vector<double> z = {2.0 + noise};
       if (name == "mixed") z = {3.0 + noise};
@@ -426,7 +426,7 @@ TEST_P(SmallEkfOfSize, DoesWhatALargeOneDoes) {
   }
   EkfOptions options;
   options.gate = 0.999;
-  auto seen = Compare(system, options, frames);
+  auto seen = Compare(problem, options, frames);
   EXPECT_GT(seen["accepted"], 60);
   EXPECT_GT(seen["gated"], 0);
 }

@@ -41,18 +41,18 @@ struct Fixture : Motion<0, UnitVector> {
 
 /// A direction at z = 0.05 that the measurement takes across z = 0, where the basis of
 /// its tangent plane turns over.
-System DirectionNearTheSeam() {
-  System system;
+Problem DirectionNearTheSeam() {
+  Problem problem;
   MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};
-  binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model->blocks()[0]));
+  binding.blocks.push_back(problem.layout.Declare("d.n", "d", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {std::sqrt(0.5 - 0.00125), std::sqrt(0.5 - 0.00125), 0.05};
   prior.covariance = (Eigen::Matrix2d() << 0.04, 0.01, 0.01, 0.01).finished();
-  system.priors.push_back(prior);
-  system.motions.push_back(binding);
-  AddSensor(system, "seen", MakeSensor(MeasuredDirection{}, "direction"), {"d.n"});
-  return system;
+  problem.priors.push_back(prior);
+  problem.motions.push_back(binding);
+  AddSensor(problem, "seen", MakeSensor(MeasuredDirection{}, "direction"), {"d.n"});
+  return problem;
 }
 
 /// P of a direction as a covariance of the vector: B P B'.
@@ -67,9 +67,9 @@ Eigen::Matrix3d InSpace(const State& state) {
 // In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with
 // the direction, by the smallest rotation.
 TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  // FAULTS 84
-  const System system = DirectionNearTheSeam();
-  SquareRootEkf filter(system, {}, StreamsOf(system));
-  const Eigen::Vector3d before(system.priors[0].mean.data());
+  const Problem problem = DirectionNearTheSeam();
+  SquareRootEkf filter(problem, {}, StreamsOf(problem));
+  const Eigen::Vector3d before(problem.priors[0].mean.data());
   double basis[6];
   UnitVector::Basis(before.data(), basis);
   const Eigen::Matrix<double, 3, 2> b =
@@ -81,13 +81,13 @@ TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  
   const Eigen::Vector3d after(filter.state().value(0));
   ASSERT_LT(after[2], 0.0);
   const Eigen::Matrix2d r = Eigen::Vector2d(0.0025, 0.04).asDiagonal();
-  const Eigen::Matrix2d p = (system.priors[0].covariance.inverse() + r.inverse().eval()).inverse();
+  const Eigen::Matrix2d p = (problem.priors[0].covariance.inverse() + r.inverse().eval()).inverse();
   const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(before, after).matrix();
   const Eigen::Matrix3d expected = turn * b * p * b.transpose() * turn.transpose();
   EXPECT_LT((InSpace(filter.state()) - expected).norm(), 1e-12);
   const Eigen::MatrixXd root = filter.root() * filter.root().transpose();
   EXPECT_LT((root - filter.state().covariance().Dense()).norm(), 1e-15);
-  Ekf ekf(system, {}, StreamsOf(system));
+  Ekf ekf(problem, {}, StreamsOf(problem));
   ekf.Process(frame);
   EXPECT_LT((InSpace(ekf.state()) - expected).norm(), 1e-12);
 }

@@ -49,9 +49,9 @@ struct DirectTextbook {
 };
 
 TEST(SquareRootEkf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
-  System system = MovingPoint(0.7);
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  SquareRootEkf filter(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint(0.7);
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  SquareRootEkf filter(problem, {}, StreamsOf(problem));
   filter.Start(0);
   DirectTextbook textbook;
   Random random(21);
@@ -72,15 +72,15 @@ TEST(SquareRootEkf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
 }
 
 TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;
     options.gate = 0.999;
     options.rejection_recovery = RejectionRecovery::kNone;
     options.max_dt_s = 0.02;
-    SquareRootEkf filter(system, options, StreamsOf(system));
-    Ekf ekf(system, options, StreamsOf(system));
+    SquareRootEkf filter(problem, options, StreamsOf(problem));
+    Ekf ekf(problem, options, StreamsOf(problem));
     Random random(22);
     for (int k = 0; k < 150; ++k) {
       const double depth = 0.3 + 0.1 * std::sin(0.08 * k);
@@ -104,12 +104,12 @@ TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
 // 1e-16 of the largest prior one and less, below the rounding of P.
 TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot) {
   constexpr double kPrior = 1e3, kSigma = 1e-7;
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
-  AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
-  AddSensor(system, "sum", MakeSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
-  AddSensor(system, "nearly", MakeSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
-  SquareRootEkf filter(system, {}, StreamsOf(system));
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
+  AddMotion(problem, "q", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
+  AddSensor(problem, "sum", MakeSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
+  AddSensor(problem, "nearly", MakeSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
+  SquareRootEkf filter(problem, {}, StreamsOf(problem));
 
   const Eigen::RowVector2d sum(1.0, 1.0), nearly(1.0, 1.001);
   Eigen::Matrix2d difference = Eigen::Vector2d(kPrior * kPrior, kPrior * kPrior).asDiagonal();
@@ -139,10 +139,10 @@ TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot)
 }
 
 TEST(SquareRootEkf, ASingularPriorStaysSingular) {
-  System system = MovingPoint(0.0);
-  system.priors[1].covariance.setZero();
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  SquareRootEkf filter(system, {}, StreamsOf(system));
+  Problem problem = MovingPoint(0.0);
+  problem.priors[1].covariance.setZero();
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  SquareRootEkf filter(problem, {}, StreamsOf(problem));
   filter.Start(0);
   for (int k = 1; k <= 20; ++k) filter.Process(FrameAt(0.1 * k, {{0, 1.0}}));
   EXPECT_EQ(CovarianceOf(filter.state(), "p.v", "p.v"), 0.0);

@@ -28,9 +28,9 @@ using testing::NumericSensorJacobian;
 using testing::Pointers;
 using testing::SensorJacobian;
 
-BlockId AddOffset(System& system, double mean, double sigma) {
-  AddMotion(system, "clock", testing::ConstantMotion(1), {{"offset", mean, sigma}});
-  return system.layout.Find("clock.offset");
+BlockId AddOffset(Problem& problem, double mean, double sigma) {
+  AddMotion(problem, "clock", testing::ConstantMotion(1), {{"offset", mean, sigma}});
+  return problem.layout.Find("clock.offset");
 }
 
 std::vector<std::string> NamesOf(const SharedSensor& sensor) {
@@ -41,13 +41,13 @@ std::vector<std::string> NamesOf(const SharedSensor& sensor) {
 
 // z = 2 (x + v delta)
 TEST(TimeOffset, SeesAPointWhereItIsThen) {
-  System system = testing::MovingPoint();
-  AddSensor(system, "z", LinearSensor(2.0, 0.1), {"p.x"});
-  const BlockId offset = AddOffset(system, 0.0, 0.1);
-  SensorBinding& sensor = system.sensors[0];
-  ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+  Problem problem = testing::MovingPoint();
+  AddSensor(problem, "z", LinearSensor(2.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(problem, 0.0, 0.1);
+  SensorBinding& sensor = problem.sensors[0];
+  ASSERT_EQ(internal::OffsetInTime(problem, offset, sensor), "");
   EXPECT_EQ(NamesOf(sensor.model), (std::vector<std::string>{"x", "p.v", "time_offset"}));
-  EXPECT_EQ(sensor.roles[1].block, system.layout.Find("p.v"));
+  EXPECT_EQ(sensor.roles[1].block, problem.layout.Find("p.v"));
   EXPECT_EQ(sensor.roles[2].block, offset);
   EXPECT_EQ(sensor.model->inverse().role, -1) << "x is no longer where z says";
   for (const double delta : {0.0, 0.25, -0.5}) {
@@ -65,25 +65,25 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
 TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   const Camera camera(640, 480, 400, 400, 320, 240);
   for (const bool anchored : {false, true}) {
-    System system;
+    Problem problem;
     const SharedMotion pose =
         MakeMotion(QuaternionPose({0.3, 0.3, 0.3}, {0.2, 0.2, 0.2}), "quaternion_pose");
     MotionBinding motion{"cam", pose, {}};
     for (const Space& block : pose->blocks()) {
-      motion.blocks.push_back(system.layout.Declare("cam." + block.name, "cam", block));
+      motion.blocks.push_back(problem.layout.Declare("cam." + block.name, "cam", block));
     }
-    system.motions.push_back(motion);
-    const BlockId offset = AddOffset(system, 0.0, 0.1);
+    problem.motions.push_back(motion);
+    const BlockId offset = AddOffset(problem, 0.0, 0.1);
     SensorBinding sensor{
         "pixels",
         "pixels",
         anchored ? MakeSensor(InverseDepthFeature<Anchored>(camera, 1.0), "feature")
                  : MakeSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature"),
-        {{system.layout.Find("cam.position")}, {system.layout.Find("cam.orientation")}}};
+        {{problem.layout.Find("cam.position")}, {problem.layout.Find("cam.orientation")}}};
     sensor.roles.resize(sensor.model->roles().size());
     const int inverse = sensor.model->inverse().role;
     if (anchored) sensor.xyz = MakeSensor(InverseDepthFeature<Xyz>(camera, 1.0), "feature");
-    ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+    ASSERT_EQ(internal::OffsetInTime(problem, offset, sensor), "");
     const std::vector<std::string> names = NamesOf(sensor.model);
     EXPECT_EQ(names[4], "time_offset");
     EXPECT_EQ(names.size(), anchored ? 8u : 6u);
@@ -135,12 +135,13 @@ struct Refusing : ConstantVelocity<1, false> {
 
 // What fails is the motion model, and its words are those that are heard.
 TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Refusing(1.0), "refusing"), {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
-  AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
-  const BlockId offset = AddOffset(system, 0.0, 0.1);
-  SensorBinding& sensor = system.sensors[0];
-  ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Refusing(1.0), "refusing"),
+            {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
+  AddSensor(problem, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(problem, 0.0, 0.1);
+  SensorBinding& sensor = problem.sensors[0];
+  ASSERT_EQ(internal::OffsetInTime(problem, offset, sensor), "");
   double z = 0.0;
   const Blocks fast{{0.0}, {4e8}, {0.1}};
   EXPECT_EQ(sensor.model->Predict(Pointers(fast).data(), &z), Status::kError);
@@ -148,13 +149,13 @@ TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
 }
 
 TEST(TimeOffset, RefusesWhatItCannotDo) {
-  System still;
+  Problem still;
   AddMotion(still, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(still, "z", LinearSensor(1.0, 0.1), {"p.x"});
   const BlockId offset = AddOffset(still, 0.0, 0.1);
   EXPECT_NE(internal::OffsetInTime(still, offset, still.sensors[0]).find("sees the same"),
             std::string::npos);
-  System moving = testing::MovingPoint();
+  Problem moving = testing::MovingPoint();
   AddSensor(moving, "z", LinearSensor(1.0, 0.1), {"p.x"});
   moving.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   EXPECT_NE(internal::OffsetInTime(moving, AddOffset(moving, 0.0, 0.1), moving.sensors[0])
@@ -165,12 +166,12 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
 // A point swings; one sensor is on time, the other one stamps 20 ms late what it saw: it saw at
 // t - 0.02. The truth is a sine, no motion model.
 TEST(TimeOffset, IsFoundInDataThatAreLate) {
-  System system = testing::MovingPoint(2.0);
-  AddSensor(system, "good", LinearSensor(1.0, 0.01), {"p.x"});
-  AddSensor(system, "late", LinearSensor(1.0, 0.01), {"p.x"});
-  const BlockId offset = AddOffset(system, 0.0, 0.05);
-  ASSERT_EQ(internal::OffsetInTime(system, offset, system.sensors[1]), "");
-  Ekf filter(system, {}, testing::StreamsOf(system));
+  Problem problem = testing::MovingPoint(2.0);
+  AddSensor(problem, "good", LinearSensor(1.0, 0.01), {"p.x"});
+  AddSensor(problem, "late", LinearSensor(1.0, 0.01), {"p.x"});
+  const BlockId offset = AddOffset(problem, 0.0, 0.05);
+  ASSERT_EQ(internal::OffsetInTime(problem, offset, problem.sensors[1]), "");
+  Ekf filter(problem, {}, testing::StreamsOf(problem));
   std::mt19937_64 engine(5);
   std::normal_distribution<double> noise(0.0, 0.01);
   const auto truth = [](double t_s) { return std::sin(1.5 * t_s) + 1.0; };

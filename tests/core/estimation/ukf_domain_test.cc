@@ -15,11 +15,11 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
-  System system = DepthFilter();
-  system.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m: points at 0.35 - 1.7 m
+  Problem problem = DepthFilter();
+  problem.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m: points at 0.35 - 1.7 m
   UkfOptions options;
   options.alpha = 1.0;
-  Ukf ukf(system, options, StreamsOf(system));
+  Ukf ukf(problem, options, StreamsOf(problem));
   const UpdateReport& first = ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   for (const MeasurementReport& entry : first.measurements()) {
     EXPECT_EQ(entry.outcome, Outcome::kAccepted);
@@ -48,9 +48,9 @@ struct Stubborn : Motion<1, Vec<1>> {
 };
 
 TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
-  System system;
-  AddMotion(system, "p", MakeMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
-  Ukf ukf(system, {}, {});
+  Problem problem;
+  AddMotion(problem, "p", MakeMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
+  Ukf ukf(problem, {}, {});
   ukf.Start(0);
   const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
   EXPECT_TRUE(ukf.failed());
@@ -75,20 +75,20 @@ struct Near : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-System NearZero(double x) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
-  AddSensor(system, "near", MakeSensor(Near{}, "near"), {"p.x"});
-  return system;
+Problem NearZero(double x) {
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
+  AddSensor(problem, "near", MakeSensor(Near{}, "near"), {"p.x"});
+  return problem;
 }
 
 // Points 1e-3 sigma from an estimate 1e-3 sigma from the end of the domain. The moments of a linear
 // h are those of the EKF at any spread, but for eps 5 / (2 c^2) = 6e-10 at the narrowest.
 TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
-    const System system = NearZero(x);
-    Ekf ekf(system, {}, StreamsOf(system));
-    Ukf ukf(system, {}, StreamsOf(system));
+    const Problem problem = NearZero(x);
+    Ekf ekf(problem, {}, StreamsOf(problem));
+    Ukf ukf(problem, {}, StreamsOf(problem));
     const Frame frame = FrameAt(0.0, {{0, 5.02}});
     const UpdateReport &expected = ekf.Process(frame), &found = ukf.Process(frame);
     EXPECT_EQ(HasEvent(found, "guarded"), x < 1e-3) << x;
@@ -105,8 +105,8 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
 // Points that near would tell nothing but rounding.
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
-    const System system = NearZero(x);
-    Ukf ukf(system, {}, StreamsOf(system));
+    const Problem problem = NearZero(x);
+    Ukf ukf(problem, {}, StreamsOf(problem));
     const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 5.02}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
     EXPECT_TRUE(report.measurements()[0].h.empty());
@@ -122,16 +122,16 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
 }
 
 TEST(Ukf, ASpreadThatLosesAllDigitsIsRefused) {
-  const System system = NearZero(1.0);
+  const Problem problem = NearZero(1.0);
   UkfOptions options;
   options.alpha = 1e-5;
-  EXPECT_THROW(Ukf(system, options, StreamsOf(system)), Error);
+  EXPECT_THROW(Ukf(problem, options, StreamsOf(problem)), Error);
 }
 
 TEST(Ukf, ASensorNotDefinedAtTheEstimateIsOutOfDomain) {
-  System system = DepthFilter();
-  system.priors[0].mean = {-0.2};
-  Ukf ukf(system, {}, StreamsOf(system));
+  Problem problem = DepthFilter();
+  problem.priors[0].mean = {-0.2};
+  Ukf ukf(problem, {}, StreamsOf(problem));
   const std::vector<double> before = ukf.state().values();
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 80.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);

@@ -34,26 +34,27 @@ struct Wandering : Motion<G::kTangent, G> {
 
 /// `n` tangent elements in blocks of the geometry G, each with its own sensor.
 template <class G>
-System Wanderers(int n) {
-  System system;
+Problem Wanderers(int n) {
+  Problem problem;
   const SharedMotion model = MakeMotion(Wandering<G>(), "wandering");
   for (int i = 0; i < n / G::kTangent; ++i) {
     const std::string name = "b" + std::to_string(i);
-    const BlockId id = system.layout.Declare(name + ".x", name, model->blocks()[0]);
-    system.motions.push_back({name, model, {id}});
+    const BlockId id = problem.layout.Declare(name + ".x", name, model->blocks()[0]);
+    problem.motions.push_back({name, model, {id}});
     Prior prior;
     prior.block = id;
     prior.mean.resize(G::kAmbient);
     model->blocks()[0].geometry.Identity(prior.mean.data());
     prior.covariance =
         kPriorSigma * kPriorSigma * Eigen::MatrixXd::Identity(G::kTangent, G::kTangent);
-    system.priors.push_back(prior);
-    AddSensor(system, name, MakeSensor(ManifoldSensor<G, kSensorSigma>(), "itself"), {name + ".x"});
+    problem.priors.push_back(prior);
+    AddSensor(problem, name, MakeSensor(ManifoldSensor<G, kSensorSigma>(), "itself"),
+              {name + ".x"});
   }
-  return system;
+  return problem;
 }
 
-System WanderersOf(GeometryKind kind, int n) {
+Problem WanderersOf(GeometryKind kind, int n) {
   switch (kind) {
     case GeometryKind::kVector:
       return Wanderers<Vec<3>>(n);
@@ -85,16 +86,16 @@ class UkfOf : public ::testing::TestWithParam<GeometryAlphaSize> {};
 // 2e-3 of themselves; the estimates, by that part of an innovation of 0.04 at each correction.
 TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
   const auto [kind, alpha, n] = GetParam();
-  const System system = WanderersOf(kind, n);
-  const Geometry& geometry = system.layout[0].geometry();
-  const std::size_t count = system.layout.blocks().size();
+  const Problem problem = WanderersOf(kind, n);
+  const Geometry& geometry = problem.layout[0].geometry();
+  const std::size_t count = problem.layout.blocks().size();
   UkfOptions options;
   options.alpha = alpha;
-  Ukf ukf(system, options, StreamsOf(system));
-  Ekf ekf(system, {}, StreamsOf(system));
+  Ukf ukf(problem, options, StreamsOf(problem));
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Random random(41);
   std::vector<std::vector<double>> truth;
-  for (const Prior& prior : system.priors) truth.push_back(prior.mean);
+  for (const Prior& prior : problem.priors) truth.push_back(prior.mean);
   std::vector<double> p(count, kPriorSigma * kPriorSigma);
   for (int k = 0; k < 1000; ++k) {
     for (std::size_t b = 0; b < count && k > 0; ++b) {
@@ -158,18 +159,18 @@ struct Dragged : Motion<2, Vec<2>> {
 
 // N = 4, so c = 2: the points of v lie at 2 sigma and are slowed by 1 - 0.3 dt 2 sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
-  System system;
+  Problem problem;
   const SharedMotion model = MakeMotion(Dragged(), "dragged");
-  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[0]);
-  system.motions.push_back({"p", model, {v}});
-  system.priors.push_back({v, {0.0, 0.0}, 0.25 * Eigen::Matrix2d::Identity(), ""});
-  Ekf ekf(system, {}, {});
+  const BlockId v = problem.layout.Declare("p.v", "p", model->blocks()[0]);
+  problem.motions.push_back({"p", model, {v}});
+  problem.priors.push_back({v, {0.0, 0.0}, 0.25 * Eigen::Matrix2d::Identity(), ""});
+  Ekf ekf(problem, {}, {});
   ekf.Start(0);
   ekf.Process(FrameAt(0.1, {}));
   ASSERT_TRUE(ekf.failed()) << "the derivative is to be not a number";
   UkfOptions options;
   options.alpha = 1.0;
-  Ukf ukf(system, options, {});
+  Ukf ukf(problem, options, {});
   ukf.Start(0);
   const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
   EXPECT_TRUE(report.events.empty()) << report.events[0].text;
@@ -196,10 +197,10 @@ struct Breaking : Motion<1, Vec<1>> {
 
 TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
   for (const bool in_noise : {false, true}) {
-    System system;
-    AddMotion(system, "p", MakeMotion(Breaking(in_noise), "breaking"), {{"v", 1.0, 0.5}});
-    Ekf ekf(system, {}, {});
-    Ukf ukf(system, {}, {});
+    Problem problem;
+    AddMotion(problem, "p", MakeMotion(Breaking(in_noise), "breaking"), {{"v", 1.0, 0.5}});
+    Ekf ekf(problem, {}, {});
+    Ukf ukf(problem, {}, {});
     for (Estimator* filter : std::initializer_list<Estimator*>{&ekf, &ukf}) {
       filter->Start(0);
       const UpdateReport& report = filter->Process(FrameAt(2.0, {}));
@@ -215,18 +216,18 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
 
 template <class G>
 void ExpectReportsOfTheEkf() {
-  const System system = WithStatus(Wanderers<G>(6), "", BlockStatus::kConstant);
-  Ekf ekf(system, {}, StreamsOf(system));
-  Ukf ukf(system, {}, StreamsOf(system));  // kappa = 0
+  const Problem problem = WithStatus(Wanderers<G>(6), "", BlockStatus::kConstant);
+  Ekf ekf(problem, {}, StreamsOf(problem));
+  Ukf ukf(problem, {}, StreamsOf(problem));  // kappa = 0
   Random random(42);
   for (int k = 0; k < 3; ++k) {
     Frame frame = FrameAt(0.1 * k, {});
-    const Prior& prior = system.priors[0];
+    const Prior& prior = problem.priors[0];
     frame.measurements.push_back(
         {frame.timestamp,
          0,
          -1,
-         Disturbed(system.layout[0].geometry(), prior.mean, kSensorSigma, random),
+         Disturbed(problem.layout[0].geometry(), prior.mean, kSensorSigma, random),
          {}});
     const UpdateReport &expected = ekf.Process(frame), &found = ukf.Process(frame);
     EXPECT_TRUE(found.events.empty());

@@ -17,17 +17,17 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 // P starts singular (v known exactly), Q has rank 1, w of the points is not small.
 TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
-  System system = MovingPoint(0.7);
-  system.priors[1].covariance.setZero();
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
+  Problem problem = MovingPoint(0.7);
+  problem.priors[1].covariance.setZero();
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(problem, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   for (const double alpha : {1.0, 0.5, 1e-3}) {
     for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
       UkfOptions options;
       options.alpha = alpha;
       options.kappa = 0.5;
       options.filter.fuse = fuse;
-      Ukf ukf(system, options, StreamsOf(system));
+      Ukf ukf(problem, options, StreamsOf(problem));
       ukf.Start(0);
       Eigen::Vector2d x(1.0, -0.5);
       Eigen::Matrix2d p = Eigen::Vector2d(4.0, 0.0).asDiagonal();
@@ -72,14 +72,14 @@ struct Square : Sensor<Vec<1>, Vec<1>> {
 // x ~ N(m, s^2): E[x^2] = m^2 + s^2, Var[x^2] = 4 m^2 s^2 + 2 s^4, Cov[x, x^2] = 2 m s^2; exact for
 // c^2 = 3 and beta = 0.
 TEST(Ukf, GetsTheMomentsOfASquareExactly) {
-  System system;
-  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
-  AddSensor(system, "square", MakeSensor(Square{}, "square"), {"p.x"});
+  Problem problem;
+  AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
+  AddSensor(problem, "square", MakeSensor(Square{}, "square"), {"p.x"});
   UkfOptions options;
   options.alpha = 1.0;
   options.beta = 0.0;
   options.kappa = 2.0;
-  Ukf ukf(system, options, StreamsOf(system));
+  Ukf ukf(problem, options, StreamsOf(problem));
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 4.0}}));
   const MeasurementReport& entry = report.measurements()[0];
   const double m = 1.5, v = 0.64, s = 4.0 * m * m * v + 2.0 * v * v + 0.25, k = 2.0 * m * v / s;
@@ -120,29 +120,29 @@ struct Compass : Sensor<UnitQuaternion, UnitQuaternion> {
 };
 
 /// Orientation that starts at (1, 0, 0, 0) +- 0.05 rad.
-System Orientation() {
-  System system;
+Problem Orientation() {
+  Problem problem;
   MotionBinding binding{"body", MakeMotion(TurningOrientation(0.01), "turning"), {}};
-  const BlockId id = system.layout.Declare("body.q", "body", binding.model->blocks()[0]);
+  const BlockId id = problem.layout.Declare("body.q", "body", binding.model->blocks()[0]);
   binding.blocks.push_back(id);
   Prior prior;
   prior.block = id;
   prior.mean = {1.0, 0.0, 0.0, 0.0};
   prior.covariance = 0.0025 * Eigen::Matrix3d::Identity();
-  system.priors.push_back(prior);
-  system.motions.push_back(binding);
-  AddSensor(system, "compass", MakeSensor(Compass{}, "compass"), {"body.q"});
-  return system;
+  problem.priors.push_back(prior);
+  problem.motions.push_back(binding);
+  AddSensor(problem, "compass", MakeSensor(Compass{}, "compass"), {"body.q"});
+  return problem;
 }
 
 // Isotropic covariances and an identity measurement: 1/P+ = 1/(P + Q) + 1/R at every orientation,
 // and the estimate lies on the great circle to the measurement, to second order in sigma.
 TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
-  const System system = Orientation();
+  const Problem problem = Orientation();
   UkfOptions options;
   options.alpha = 1.0;
-  Ukf ukf(system, options, StreamsOf(system));
-  Ekf ekf(system, {}, StreamsOf(system));
+  Ukf ukf(problem, options, StreamsOf(problem));
+  Ekf ekf(problem, {}, StreamsOf(problem));
   Random random(32);
   Eigen::Quaterniond truth(1.0, 0.0, 0.0, 0.0);
   double p = 0.0025;
@@ -175,13 +175,13 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
 // Stereo draws the points of the joint update nearer; the gate has seen those of the other sensor
 // as they were, and so has the report.
 TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
-  System system = DepthFilter();
-  system.priors[0].covariance(0) = 1.0;
-  system.sensors.pop_back();
-  AddSensor(system, "square", MakeSensor(Square{}, "square"), {"target.depth"});
+  Problem problem = DepthFilter();
+  problem.priors[0].covariance(0) = 1.0;
+  problem.sensors.pop_back();
+  AddSensor(problem, "square", MakeSensor(Square{}, "square"), {"target.depth"});
   UkfOptions options;
   options.alpha = 1.0;
-  Ukf joint(system, options, StreamsOf(system));
+  Ukf joint(problem, options, StreamsOf(problem));
   const UpdateReport& report = joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 0.1}}));
   EXPECT_TRUE(HasEvent(report, "guarded"));
   ASSERT_EQ(report.measurements().size(), 2u);
@@ -189,7 +189,7 @@ TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   ASSERT_EQ(square.outcome, Outcome::kAccepted);
   EXPECT_NEAR(square.nis, square.innovation[0] * square.innovation[0] / square.s[0], 1e-12);
   EXPECT_NEAR(square.innovation[0], 0.1 - square.h[0], 1e-15);
-  Ukf alone(system, options, StreamsOf(system));
+  Ukf alone(problem, options, StreamsOf(problem));
   const UpdateReport& single = alone.Process(FrameAt(0.0, {{1, 0.1}}));
   EXPECT_EQ(square.h, single.measurements()[0].h);
   EXPECT_EQ(square.s, single.measurements()[0].s);
@@ -212,17 +212,17 @@ struct First : Sensor<Vec<1>, Vec<2>> {
 
 // FAULTS 82
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
-  System system;
+  Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
-  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model->blocks()[0]));
+  binding.blocks.push_back(problem.layout.Declare("p.x", "p", binding.model->blocks()[0]));
   Prior prior;
   prior.block = 0;
   prior.mean = {1.0, 2.0};
   prior.covariance = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished();  // eigenvalue -0.1
-  system.priors.push_back(prior);
-  system.motions.push_back(binding);
-  AddSensor(system, "first", MakeSensor(First{}, "first"), {"p.x"});
-  Ukf ukf(system, {}, StreamsOf(system));
+  problem.priors.push_back(prior);
+  problem.motions.push_back(binding);
+  AddSensor(problem, "first", MakeSensor(First{}, "first"), {"p.x"});
+  Ukf ukf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 1.5}}));
   EXPECT_TRUE(HasEvent(report, "repaired"));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
@@ -233,11 +233,11 @@ TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
 }
 
 TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
-  System system = DepthFilter();
-  system.sensors[1].roles[1].mode = RoleMode::kKnown;
+  Problem problem = DepthFilter();
+  problem.sensors[1].roles[1].mode = RoleMode::kKnown;
   UkfOptions options;
   options.filter.gate = 0.999;
-  Ukf ukf(system, options, StreamsOf(system));
+  Ukf ukf(problem, options, StreamsOf(problem));
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 1e9}, {1, 1.1}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
   EXPECT_EQ(report.measurements()[1].outcome, Outcome::kAccepted);
@@ -251,33 +251,33 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
 
 // x' = x + v dt, but x is known.
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
-  System system;
+  Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);
-  const BlockId x = system.layout.Declare("p.x", "p", model->blocks()[0], BlockStatus::kConstant);
-  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1]);
-  system.motions.push_back({"p", model, {x, v}});
-  system.priors.push_back({x, {1.0}, {}, ""});
-  system.priors.push_back({v, {-0.5}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
-  Ukf ukf(system, {}, {});
+  const BlockId x = problem.layout.Declare("p.x", "p", model->blocks()[0], BlockStatus::kConstant);
+  const BlockId v = problem.layout.Declare("p.v", "p", model->blocks()[1]);
+  problem.motions.push_back({"p", model, {x, v}});
+  problem.priors.push_back({x, {1.0}, {}, ""});
+  problem.priors.push_back({v, {-0.5}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
+  Ukf ukf(problem, {}, {});
   ukf.Start(0);
   ukf.Process(FrameAt(0.5, {}));
   EXPECT_EQ(ValueOf(ukf.state(), "p.x"), 1.0);
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.v", "p.v"), 4.0 + 0.49 * 0.25, 1e-12);
 }
 
-// A linear problem, so all three filters agree; v is known, and neither moved nor corrected.
+// A linear system, so all three filters agree; v is known, and neither moved nor corrected.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
-  System system;
+  Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);
-  const BlockId v = system.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
-  const BlockId x = system.layout.Declare("p.x", "p", model->blocks()[0]);
-  system.motions.push_back({"p", model, {x, v}});
-  system.priors.push_back({v, {-0.5}, {}, ""});
-  system.priors.push_back({x, {1.0}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
-  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
-  Ukf ukf(system, {}, StreamsOf(system));
-  SquareRootEkf root(system, {}, StreamsOf(system));
+  const BlockId v = problem.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant);
+  const BlockId x = problem.layout.Declare("p.x", "p", model->blocks()[0]);
+  problem.motions.push_back({"p", model, {x, v}});
+  problem.priors.push_back({v, {-0.5}, {}, ""});
+  problem.priors.push_back({x, {1.0}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
+  AddSensor(problem, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  Ekf ekf(problem, {}, StreamsOf(problem));
+  Ukf ukf(problem, {}, StreamsOf(problem));
+  SquareRootEkf root(problem, {}, StreamsOf(problem));
   Random random(33);
   for (int k = 0; k < 50; ++k) {
     const Frame frame = FrameAt(0.04 * k, {{0, random.Normal()}});

@@ -95,20 +95,20 @@ struct HandWritten {
 };
 
 /// `a.x`, measured by `direct`; `aside`: with a constant block.
-System Direct(HandWritten& hand, bool aside) {
-  System system;
+Problem Direct(HandWritten& hand, bool aside) {
+  Problem problem;
   const auto model = std::make_shared<PluginMotion>(hand.Make(ALIDADE_KIND_MOTION));
-  const BlockId x = system.layout.Declare("a.x", "a", model->blocks()[0]);
-  system.motions.push_back({"a", model, {x}});
-  system.priors.push_back({x, {1.0, 2.0}, Eigen::Matrix2d::Identity(), ""});
+  const BlockId x = problem.layout.Declare("a.x", "a", model->blocks()[0]);
+  problem.motions.push_back({"a", model, {x}});
+  problem.priors.push_back({x, {1.0, 2.0}, Eigen::Matrix2d::Identity(), ""});
   if (aside) {
     const BlockId id =
-        system.layout.Declare("aside.x", "aside", model->blocks()[0], BlockStatus::kConstant);
-    system.priors.push_back({id, {0.0, 0.0}, Eigen::Matrix2d::Zero(), ""});
+        problem.layout.Declare("aside.x", "aside", model->blocks()[0], BlockStatus::kConstant);
+    problem.priors.push_back({id, {0.0, 0.0}, Eigen::Matrix2d::Zero(), ""});
   }
-  AddSensor(system, "direct", std::make_shared<PluginSensor>(hand.Make(ALIDADE_KIND_SENSOR)),
+  AddSensor(problem, "direct", std::make_shared<PluginSensor>(hand.Make(ALIDADE_KIND_SENSOR)),
             {"a.x"});
-  return system;
+  return problem;
 }
 
 class Unwritten : public ::testing::TestWithParam<bool> {};
@@ -116,8 +116,8 @@ class Unwritten : public ::testing::TestWithParam<bool> {};
 TEST_P(Unwritten, OutputOfASensorIsNotFiniteAtEveryMeasurement) {
   for (const Left left : {Left::kNothing, Left::kPrediction, Left::kSensorL, Left::kSensorH}) {
     HandWritten hand(left);
-    const System system = Direct(hand, GetParam());
-    Ekf ekf(system, {}, StreamsOf(system));
+    const Problem problem = Direct(hand, GetParam());
+    Ekf ekf(problem, {}, StreamsOf(problem));
     ekf.Start(0);
     for (int k = 0; k < 4; ++k) {
       Frame frame = FrameAt(0.1 * k, {});
@@ -133,8 +133,8 @@ TEST_P(Unwritten, OutputOfASensorIsNotFiniteAtEveryMeasurement) {
 TEST_P(Unwritten, OutputOfAMotionModelEndsTheFilterAtItsFirstStep) {
   for (const Left left : {Left::kNothing, Left::kMotionL, Left::kF, Left::kG}) {
     HandWritten hand(left);
-    const System system = Direct(hand, GetParam());
-    Ekf ekf(system, {}, StreamsOf(system));
+    const Problem problem = Direct(hand, GetParam());
+    Ekf ekf(problem, {}, StreamsOf(problem));
     ekf.Start(0);
     const UpdateReport& report = ekf.Process(FrameAt(0.1, {}));
     EXPECT_EQ(HasEvent(report, "not_finite"), left != Left::kNothing) << static_cast<int>(left);

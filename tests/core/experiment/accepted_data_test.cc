@@ -43,10 +43,10 @@ EstimatorSpec MakeEkf(const std::string& name, double gate) {
   EstimatorSpec named;
   named.name = name;
   named.type = "ekf";
-  named.system = DepthFilter();
+  named.problem = DepthFilter();
   EkfOptions options;
   options.gate = gate;
-  named.estimator = std::make_unique<Ekf>(named.system, options, StreamsOf(named.system));
+  named.estimator = std::make_unique<Ekf>(named.problem, options, StreamsOf(named.problem));
   return named;
 }
 
@@ -110,16 +110,16 @@ class GivenFrames : public Source {
 };
 
 /// Three ekf, of which the first has a gate; the others see what the one before accepted.
-Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
+Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
                      std::vector<Frame> frames) {
   Experiment experiment;
   for (int i = 0; i < 3; ++i) {
     EstimatorSpec& named = experiment.estimators.emplace_back();
     named.name = "ekf" + std::to_string(i);
-    named.system = system;
+    named.problem = problem;
     EkfOptions options;
     if (i == 0) options.gate = 0.999;
-    named.estimator = std::make_unique<Ekf>(system, options, streams);
+    named.estimator = std::make_unique<Ekf>(problem, options, streams);
     named.accepted_by = i - 1;
   }
   experiment.source = std::make_unique<GivenFrames>(std::move(streams), std::move(frames));
@@ -128,14 +128,14 @@ Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
 
 // Nobody measures the odometry: all of it is passed on, where a fix is gated too.
 TEST(AcceptedBy, PassesOnTheControlInputs) {
-  System system;
-  AddMotion(system, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
-  system.motions[0].input.stream = "odometry";
-  AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"car.position"});
+  Problem problem;
+  AddMotion(problem, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
+  problem.motions[0].input.stream = "odometry";
+  AddSensor(problem, "fix", LinearSensor(1.0, 0.3), {"car.position"});
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.5}, {1, 2.0}}),
                                      FrameAt(1.0, {{0, 50.0}, {1, -1.0}}), FrameAt(2.0, {{1, 0.5}}),
                                      FrameAt(3.0, {{0, 2.6}})};
-  Experiment experiment = MakeChain(system, {{"fix", 1}, {"odometry", 1}}, frames);
+  Experiment experiment = MakeChain(problem, {{"fix", 1}, {"odometry", 1}}, frames);
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.estimators[0].counts.at("gated:fix"), 1);
   for (std::size_t e = 0; e < 3; ++e) {
@@ -150,8 +150,8 @@ TEST(AcceptedBy, PassesOnTheControlInputs) {
 
 /// Two landmarks before a camera at rest; the first is seen 0.5 aside at the second frame.
 Experiment MakeChainOfMaps() {
-  const System system = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
-  return MakeChain(system, {{"tracks", 2}},
+  const Problem problem = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
+  return MakeChain(problem, {{"tracks", 2}},
                    {FrameOf(0.0, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}}),
                     FrameOf(0.1, {{0, {0.6, 0.1}}, {1, {-0.1, 0.1}}}),
                     FrameOf(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
@@ -195,7 +195,8 @@ struct Once : Ekf {
 TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
   Experiment experiment = MakeFiltered(false);
   EstimatorSpec& filter = experiment.estimators[0];
-  filter.estimator = std::make_unique<Once>(filter.system, EkfOptions{}, StreamsOf(filter.system));
+  filter.estimator =
+      std::make_unique<Once>(filter.problem, EkfOptions{}, StreamsOf(filter.problem));
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.frames, kFrames);
   EXPECT_EQ(run.estimators[1].counts.at("accepted:inverse_scale"), 1);
@@ -208,7 +209,7 @@ TEST(AcceptedBy, ASensorOfWhichTheFilterTookNothingIsNamed) {
   EkfOptions options;
   options.gate = 1e-9;
   options.rejection_recovery = RejectionRecovery::kNone;
-  filter.estimator = std::make_unique<Ekf>(filter.system, options, StreamsOf(filter.system));
+  filter.estimator = std::make_unique<Ekf>(filter.problem, options, StreamsOf(filter.problem));
   const RunResult run = alidade::Run(experiment, {});
   const auto event = std::ranges::find(run.estimators[1].events, "unused", &Event::kind);
   ASSERT_NE(event, run.estimators[1].events.end());

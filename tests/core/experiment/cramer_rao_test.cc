@@ -32,8 +32,8 @@ const std::vector<StreamInfo> kTruths = {{"depth"}, {"depth_rate"}, {"inverse_di
 
 // The same by the information form, with the derivatives written out at truth.
 TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
-  const System system = testing::DepthFilter();
-  CramerRaoBound bound(system, testing::StreamsOf(system), kTruths);
+  const Problem problem = testing::DepthFilter();
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), kTruths);
   Eigen::Matrix3d p = Eigen::Vector3d(0.1 * 0.1, 0.5 * 0.5, 0.5 * 0.5).asDiagonal();
   Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
   f(0, 1) = 0.1;
@@ -72,11 +72,11 @@ struct DoubleWell : Motion<1, Vec<1>> {
 };
 
 TEST(CramerRaoBound, TakesTheMotionAtTruth) {
-  System system;
-  testing::AddMotion(system, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
-  testing::AddSensor(system, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
-  system.initial_time_s = -0.1;  // a step before the first frame, from about where that one is
-  CramerRaoBound bound(system, testing::StreamsOf(system), {{"x"}});
+  Problem problem;
+  testing::AddMotion(problem, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
+  testing::AddSensor(problem, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
+  problem.initial_time_s = -0.1;  // a step before the first frame, from about where that one is
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"x"}});
   const double dt_s = 0.1, q = dt_s * dt_s;
   double p = 0.25, before = 0.0;
   for (int k = 0; k < 30; ++k) {
@@ -90,11 +90,11 @@ TEST(CramerRaoBound, TakesTheMotionAtTruth) {
 }
 
 TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
-  System system = testing::MovingPoint();
-  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.5), {"p.x"});
-  const std::vector<StreamInfo> streams = testing::StreamsOf(system);
-  Ekf ekf(system, {}, streams);
-  CramerRaoBound bound(system, streams, {{"x"}, {"v"}});
+  Problem problem = testing::MovingPoint();
+  testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.5), {"p.x"});
+  const std::vector<StreamInfo> streams = testing::StreamsOf(problem);
+  Ekf ekf(problem, {}, streams);
+  CramerRaoBound bound(problem, streams, {{"x"}, {"v"}});
   for (int k = 0; k < 20; ++k) {
     const Frame frame = FrameAt(0.1 * k, {{0, std::sin(9.0 * k)}});
     ekf.Process(frame);
@@ -106,13 +106,13 @@ TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
 
 // A loss, a Schmidt gain and a Jacobian at what the measurement implies all make a filter worse.
 TEST(CramerRaoBound, IsThatOfTheBestFilter) {
-  System worse = testing::DepthFilter();
+  Problem worse = testing::DepthFilter();
   worse.sensors[0].loss = {LossKind::kCauchy, 0.1};
   worse.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   worse.sensors[1].roles[1].mode = RoleMode::kConsider;
-  const System system = testing::DepthFilter();
-  const std::vector<StreamInfo> streams = testing::StreamsOf(system);
-  CramerRaoBound bound(system, streams, kTruths), same(worse, streams, kTruths);
+  const Problem problem = testing::DepthFilter();
+  const std::vector<StreamInfo> streams = testing::StreamsOf(problem);
+  CramerRaoBound bound(problem, streams, kTruths), same(worse, streams, kTruths);
   for (int k = 0; k < 10; ++k) {
     ASSERT_TRUE(bound.Add(SwingingFrame(k)) && same.Add(SwingingFrame(k)));
   }
@@ -120,8 +120,8 @@ TEST(CramerRaoBound, IsThatOfTheBestFilter) {
 }
 
 TEST(CramerRaoBound, EndsWhereTruthIsNotKnown) {
-  const System system = testing::DepthFilter();
-  CramerRaoBound bound(system, testing::StreamsOf(system), kTruths);
+  const Problem problem = testing::DepthFilter();
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), kTruths);
   EXPECT_TRUE(bound.Add(SwingingFrame(0)));
   SourceFrame without = SwingingFrame(1);
   without.truth[1].clear();
@@ -130,19 +130,19 @@ TEST(CramerRaoBound, EndsWhereTruthIsNotKnown) {
 }
 
 TEST(CramerRaoBound, TellsWhyThereIsNone) {
-  const System system = testing::DepthFilter();
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, kTruths), "");
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, {{"depth"}, {"depth_rate"}}),
+  const Problem problem = testing::DepthFilter();
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, kTruths), "");
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, {{"depth"}, {"depth_rate"}}),
             "'template.inverse_distance' has no truth");
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, {{"depth", 1, 0.1}, {"depth_rate"}}),
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, {{"depth", 1, 0.1}, {"depth_rate"}}),
             "the truth of 'target.depth' is not exact");
   EXPECT_EQ(CramerRaoBound::WhyNone(
-                testing::WithStatus(system, "target.depth_rate", BlockStatus::kConsider), kTruths),
+                testing::WithStatus(problem, "target.depth_rate", BlockStatus::kConsider), kTruths),
             "'target.depth_rate' is a consider state");
-  const System constant =
-      testing::WithStatus(system, "template.inverse_distance", BlockStatus::kConstant);
+  const Problem constant =
+      testing::WithStatus(problem, "template.inverse_distance", BlockStatus::kConstant);
   EXPECT_EQ(CramerRaoBound::WhyNone(constant, {{"depth"}, {"depth_rate"}}), "");
-  System slam = system;
+  Problem slam = problem;
   slam.landmarks.emplace();
   EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths), "");
   slam.sensors[1].stream = slam.sensors[0].stream;
@@ -244,8 +244,8 @@ template <class Model>
 void ExpectJointBound(const Model& model, double max_linearity_index) {
   LandmarkOptions options = testing::WithPrior(0.8, 0.25);
   options.max_linearity_index = max_linearity_index;
-  const System system = testing::MapSystem(model, options, 0.05);
-  CramerRaoBound bound(system, testing::StreamsOf(system), {{"position", 3}}, PlaceOf);
+  const Problem problem = testing::MapSystem(model, options, 0.05);
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"position", 3}}, PlaceOf);
   for (int k = 0; k < 12; ++k) {
     ASSERT_TRUE(bound.Add(MappingFrame(k, 0.02)));
     const Eigen::Matrix3d expected = CovarianceByInformation(k);
@@ -316,35 +316,35 @@ struct TurnedPixels : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitVector,
   }
 };
 
-System TurningSystem() {
-  System system;
+Problem TurningSystem() {
+  Problem problem;
   MotionBinding binding{"cam", MakeMotion(TurningWalk(), "turning_walk"), {}};
   for (const Space& space : binding.model->blocks()) {
-    const BlockId id = system.layout.Declare("cam." + space.name, "cam", space);
+    const BlockId id = problem.layout.Declare("cam." + space.name, "cam", space);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;
     prior.mean = {0.0, 0.0, 0.0};
     if (space.geometry.ambient == 4) prior.mean = {1.0, 0.0, 0.0, 0.0};
     prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
   SensorBinding sensor{"tracks", "tracks", MakeSensor(TurnedPixels(), "tracks"), {}};
   sensor.roles.resize(sensor.model->roles().size());
   for (std::size_t i = 0; i < 2; ++i) sensor.roles[i].block = binding.blocks[i];
-  system.motions.push_back(std::move(binding));
-  system.sensors.push_back(std::move(sensor));
-  system.landmarks = testing::WithPrior(0.5, 0.25);
-  return system;
+  problem.motions.push_back(std::move(binding));
+  problem.sensors.push_back(std::move(sensor));
+  problem.landmarks = testing::WithPrior(0.5, 0.25);
+  return problem;
 }
 
 /// Where the filter's data are exact and all begins at truth, it has its Jacobians there. The data
 /// of the bound have noise.
-void ExpectThatOfExactData(const System& system, const std::vector<StreamInfo>& truths,
+void ExpectThatOfExactData(const Problem& problem, const std::vector<StreamInfo>& truths,
                            const CramerRaoBound::TrueLandmark& place,
                            const std::function<SourceFrame(int k, double noise)>& frame) {
-  Ekf ekf = testing::EkfOf(system);
-  CramerRaoBound bound(system, testing::StreamsOf(system), truths, place);
+  Ekf ekf = testing::EkfOf(problem);
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), truths, place);
   for (int k = 0; k < 10; ++k) {
     ekf.Process(frame(k, 0.0));
     ASSERT_TRUE(bound.Add(frame(k, 0.02))) << k;
@@ -384,7 +384,7 @@ TEST(CramerRaoBound, OfATurningCamera) {
 TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   LandmarkOptions options;
   options.known = {{0, *PlaceOf(0), 0.02}, {1, *PlaceOf(1), 0.0}};
-  const System system = testing::MapSystem(testing::Offset(0.05), options, 0.2);
+  const Problem problem = testing::MapSystem(testing::Offset(0.05), options, 0.2);
   const auto frame = [](int k, double noise) {
     SourceFrame made{{TimestampFromSeconds(0.1 * k), {}}, {{0.0, 0.0, 0.0}}};
     for (int id = k < 3 ? 2 : 0; id < 5; ++id) {  // the known ones later
@@ -397,7 +397,7 @@ TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
     }
     return made;
   };
-  ExpectThatOfExactData(system, {{"position", 3}}, PlaceOf, frame);
+  ExpectThatOfExactData(problem, {{"position", 3}}, PlaceOf, frame);
 }
 
 /// Of a landmark on the ground, which has two coordinates.
@@ -435,20 +435,20 @@ struct XyzByPrior : testing::XyzPixels {
 
 TEST(CramerRaoBound, TellsWhyLandmarksCannotStartAtTruth) {
   const std::vector<StreamInfo> truths{{"position", 3}};
-  System system = testing::MapSystem(testing::Offset(0.1), LandmarkOptions());
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths), "");
-  system.sensors[0].model = MakeSensor(OnGround(), "ground");
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
+  Problem problem = testing::MapSystem(testing::Offset(0.1), LandmarkOptions());
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths), "");
+  problem.sensors[0].model = MakeSensor(OnGround(), "ground");
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths),
             "'tracks' has landmarks of a representation of its own");
-  system.sensors[0].model = MakeSensor(XyzByPrior(), "xyz");
-  EXPECT_EQ(CramerRaoBound::WhyNone(system, truths),
+  problem.sensors[0].model = MakeSensor(XyzByPrior(), "xyz");
+  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths),
             "'tracks' places landmarks as xyz by a prior, by whose mean the Jacobians are");
 }
 
 TEST(CramerRaoBound, EndsAtALandmarkWithoutTruth) {
-  const System system =
+  const Problem problem =
       testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.05);
-  CramerRaoBound bound(system, testing::StreamsOf(system), {{"position", 3}}, PlaceOf);
+  CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"position", 3}}, PlaceOf);
   SourceFrame frame = MappingFrame(0, 0.0);
   EXPECT_TRUE(bound.Add(frame));
   frame = MappingFrame(1, 0.0);

@@ -203,10 +203,10 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
   const auto run = [&ends](std::vector<SourceFrame> given, OutOfSequence order) {
     Experiment experiment = MakeGiven(std::move(given), order);
     EstimatorSpec& alone = experiment.estimators[1];
-    alone.system.priors[0].mean = {-0.2};
+    alone.problem.priors[0].mean = {-0.2};
     alone.on_divergence = OnDivergence::kFail;
     alone.estimator =
-        std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(alone.problem, EkfOptions{}, experiment.source->streams());
     const RunResult result = alidade::Run(experiment, {});
     for (const EstimatorSpec& one : experiment.estimators) {
       ends.push_back(one.estimator->timestamp());
@@ -248,9 +248,9 @@ TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
   const auto run = [&frames](OutOfSequence order, std::vector<std::string>& log) {
     Experiment experiment = MakeGiven(frames, order);
     EstimatorSpec& named = experiment.estimators[1];
-    named.system.priors[0].mean = {-0.2};
+    named.problem.priors[0].mean = {-0.2};
     auto mortal =
-        std::make_unique<Mortal>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Mortal>(named.problem, EkfOptions{}, experiment.source->streams());
     mortal->at = frames[2].timestamp;
     named.estimator = std::move(mortal);
     const LogSubscription subscription(
@@ -307,7 +307,7 @@ TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
                                     OutOfSequence::kRollback);
   EstimatorSpec& named = experiment.estimators[0];
   auto watching =
-      std::make_unique<Watching>(named.system, EkfOptions{}, experiment.source->streams());
+      std::make_unique<Watching>(named.problem, EkfOptions{}, experiment.source->streams());
   const auto seen = watching->timestamps;
   named.estimator = std::move(watching);
   alidade::Run(experiment, {});
@@ -335,7 +335,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
                                     OutOfSequence::kRollback);
   EstimatorSpec& named = experiment.estimators[1];
   auto throwing =
-      std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
+      std::make_unique<Throwing>(named.problem, EkfOptions{}, experiment.source->streams());
   throwing->at = TimestampFromSeconds(0.04);
   named.estimator = std::move(throwing);
   const RunResult result = alidade::Run(experiment, {});
@@ -351,7 +351,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
 /// An estimator that cannot go back.
 class Forward : public Estimator {
  public:
-  explicit Forward(const System& system) : state_(system.InitialState()) {}
+  explicit Forward(const Problem& problem) : state_(problem.InitialState()) {}
   void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override { return report_; }
   const State& state() const override { return state_; }
@@ -366,7 +366,7 @@ class Forward : public Estimator {
 
 TEST(Rollback, IsNotForAnEstimatorThatCannotGoBack) {
   Experiment experiment = MakeGiven({GivenAt(0.0, {})}, OutOfSequence::kRollback);
-  experiment.estimators[0].estimator = std::make_unique<Forward>(experiment.estimators[0].system);
+  experiment.estimators[0].estimator = std::make_unique<Forward>(experiment.estimators[0].problem);
   EXPECT_EQ(alidade::Run(experiment, {}).code, ExitCode::kInternal);
 }
 

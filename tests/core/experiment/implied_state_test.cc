@@ -11,34 +11,34 @@
 namespace alidade::internal {
 namespace {
 
-const SensorBinding& SensorOf(const System& system, const std::string& name) {
-  for (const SensorBinding& sensor : system.sensors) {
+const SensorBinding& SensorOf(const Problem& problem, const std::string& name) {
+  for (const SensorBinding& sensor : problem.sensors) {
     if (sensor.name == name) return sensor;
   }
   throw std::out_of_range(name);
 }
 
 TEST(ImpliedState, OfASensorThatInitialisesAlone) {
-  const System system = testing::DepthFilter();
-  const auto depth = ImpliedState::Of(system, SensorOf(system, "disparity"), {});
+  const Problem problem = testing::DepthFilter();
+  const auto depth = ImpliedState::Of(problem, SensorOf(problem, "disparity"), {});
   ASSERT_TRUE(depth);
   EXPECT_FALSE(depth->rest_at_truth());
-  EXPECT_EQ(system.layout[depth->block()].name, "target.depth");
+  EXPECT_EQ(problem.layout[depth->block()].name, "target.depth");
   const double d = 65.0, none = -1.0;  // px; f B = 26 px m
   EXPECT_DOUBLE_EQ(depth->From({}, &d).value(), 0.4);
   EXPECT_FALSE(depth->From({}, &none));
 }
 
 TEST(ImpliedState, OfAnotherWithItsRestAtTruth) {
-  const System system = testing::DepthFilter();
-  const SensorBinding& scale = SensorOf(system, "inverse_scale");
-  const auto depth = ImpliedState::Of(system, scale, {{"depth", 1}, {"inverse_distance", 1}});
+  const Problem problem = testing::DepthFilter();
+  const SensorBinding& scale = SensorOf(problem, "inverse_scale");
+  const auto depth = ImpliedState::Of(problem, scale, {{"depth", 1}, {"inverse_distance", 1}});
   ASSERT_TRUE(depth);
   EXPECT_TRUE(depth->rest_at_truth());
   const double z = 1.25;  // lambda Z
   EXPECT_NEAR(depth->From({{0.3}, {2.5}}, &z).value(), 0.5, 1e-12);
   EXPECT_FALSE(depth->From({{0.3}, {}}, &z)) << "lambda is not known at this time";
-  EXPECT_FALSE(ImpliedState::Of(system, scale, {{"depth", 1}})) << "nor at any";
+  EXPECT_FALSE(ImpliedState::Of(problem, scale, {{"depth", 1}})) << "nor at any";
 }
 
 TEST(ImpliedStateMetrics, AreTheErrorOfSingleMeasurements) {

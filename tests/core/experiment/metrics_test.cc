@@ -47,9 +47,9 @@ class MetricsOf {
  public:
   MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0)
       : source_(truths), state_(layout) {
-    named_.system.layout = layout;
+    named_.problem.layout = layout;
     const SharedSensor sensor = MakeSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity");
-    named_.system.sensors.push_back({"stereo", "disparity", sensor, {}});
+    named_.problem.sensors.push_back({"stereo", "disparity", sensor, {}});
     std::vector<Segment> list;
     for (int i = 0; i < segments; ++i) list.push_back({"s" + std::to_string(i), 0, true, sensor});
     in_segment_.assign(segments, false);

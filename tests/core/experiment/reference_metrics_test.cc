@@ -14,7 +14,7 @@ namespace {
 
 /// Knows at the end that the depth was 0.3 m, but not at the first frame; or fails to.
 struct Known : Estimator {
-  Known(const System& system, bool fails) : state_(system.InitialState()), failed_(fails) {}
+  Known(const Problem& problem, bool fails) : state_(problem.InitialState()), failed_(fails) {}
   void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override {
     ++frames_;
@@ -59,8 +59,8 @@ Experiment MakeCompared(bool fails = false) {
   experiment.source = std::make_unique<Blind>(60);
   EstimatorSpec named;
   named.name = "known";
-  named.system = DepthFilter();
-  named.estimator = std::make_unique<Known>(named.system, fails);
+  named.problem = DepthFilter();
+  named.estimator = std::make_unique<Known>(named.problem, fails);
   experiment.estimators.push_back(std::move(named));
   experiment.reference = 2;
   return experiment;
@@ -164,15 +164,15 @@ TEST(Reference, KeepsNoCovariances) {
   for (const char* name : {"one", "two"}) {
     EstimatorSpec& named = experiment.estimators.emplace_back();
     named.name = name;
-    named.system = DepthFilter();
-    named.system.sensors.pop_back();
+    named.problem = DepthFilter();
+    named.problem.sensors.pop_back();
     const SharedMotion model = testing::ConstantMotion(299);
-    const BlockId id = named.system.layout.Declare("wide.x", "wide", model->blocks()[0]);
-    named.system.motions.push_back({"wide", model, {id}});
-    named.system.priors.push_back(
+    const BlockId id = named.problem.layout.Declare("wide.x", "wide", model->blocks()[0]);
+    named.problem.motions.push_back({"wide", model, {id}});
+    named.problem.priors.push_back(
         {id, std::vector<double>(299, 0.0), Eigen::MatrixXd::Identity(299, 299), ""});
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   }
   experiment.reference = 0;
   const RunResult run = alidade::Run(experiment, {});

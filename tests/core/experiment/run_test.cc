@@ -30,9 +30,9 @@ struct Exploding : Motion<1, Vec<1>> {
 EstimatorSpec ExplodingEstimator(const std::vector<StreamInfo>& streams) {
   EstimatorSpec named;
   named.name = "exploding";
-  testing::AddMotion(named.system, "p", MakeMotion(Exploding(), "exploding"), {{"x", 1.0, 1.0}});
-  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
-  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, streams);
+  testing::AddMotion(named.problem, "p", MakeMotion(Exploding(), "exploding"), {{"x", 1.0, 1.0}});
+  testing::AddSensor(named.problem, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
+  named.estimator = std::make_unique<Ekf>(named.problem, EkfOptions{}, streams);
   return named;
 }
 
@@ -56,9 +56,10 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
 TEST(Run, DivergenceUnderFailEndsTheRun) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec& alone = experiment.estimators[1];
-  alone.system.priors[0].mean = {-0.2};
+  alone.problem.priors[0].mean = {-0.2};
   alone.on_divergence = OnDivergence::kFail;
-  alone.estimator = std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
+  alone.estimator =
+      std::make_unique<Ekf>(alone.problem, EkfOptions{}, experiment.source->streams());
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kDiverged);
   EXPECT_EQ(result.frames, 1);
@@ -69,10 +70,10 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec& alone = experiment.estimators[1];
   alone.on_divergence = OnDivergence::kFail;
-  alone.system.priors[0].mean = {-0.2};
+  alone.problem.priors[0].mean = {-0.2};
   EkfOptions options;
   options.rejection_recovery_after = 1;
-  alone.estimator = std::make_unique<Ekf>(alone.system, options, experiment.source->streams());
+  alone.estimator = std::make_unique<Ekf>(alone.problem, options, experiment.source->streams());
   const RunResult result = alidade::Run(experiment, {});
   ASSERT_EQ(result.code, ExitCode::kDiverged);
   const std::vector<Event>& events = result.estimators[1].events;
@@ -83,7 +84,7 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
 
 /// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
 struct Hindsight : Estimator {
-  explicit Hindsight(const System& system) : state_(system.InitialState()) {}
+  explicit Hindsight(const Problem& problem) : state_(problem.InitialState()) {}
   void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override {
     ++frames_;
@@ -114,7 +115,7 @@ struct Hindsight : Estimator {
 TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec& alone = experiment.estimators[1];
-  alone.estimator = std::make_unique<Hindsight>(alone.system);
+  alone.estimator = std::make_unique<Hindsight>(alone.problem);
   Experiment truths = MakeExperiment();
   SourceFrame frame;
   double squares = 0.0, known = 0.0;
@@ -144,7 +145,7 @@ struct Speechless : Hindsight {
 TEST(Run, AnEstimatorThatFailsSaysNothingOfItsSensors) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec& alone = experiment.estimators[1];
-  alone.estimator = std::make_unique<Speechless>(alone.system);
+  alone.estimator = std::make_unique<Speechless>(alone.problem);
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kDiverged);
   const std::vector<Event>& events = result.estimators[1].events;
@@ -213,7 +214,7 @@ TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   const auto run = [](bool fails) {
     Experiment experiment = MakeExperiment();
     EstimatorSpec& alone = experiment.estimators[1];
-    alone.estimator = std::make_unique<Interrupted>(alone.system);
+    alone.estimator = std::make_unique<Interrupted>(alone.problem);
     if (fails) {
       experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
     }
@@ -252,10 +253,11 @@ EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   experiment.source = std::make_unique<Walking>(seed);
   EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
-  testing::AddMotion(named.system, "p", testing::ConstantMotion(1, 0.1 * factor),
+  testing::AddMotion(named.problem, "p", testing::ConstantMotion(1, 0.1 * factor),
                      {{"depth", 0.0, 2.0 * factor}});
-  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, factor), {"p.depth"});
-  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  testing::AddSensor(named.problem, "disparity", testing::LinearSensor(1.0, factor), {"p.depth"});
+  named.estimator =
+      std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   return alidade::Run(experiment, {}).estimators[0];
 }
 
@@ -352,13 +354,13 @@ std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
   EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
   const SharedMotion model = MakeMotion(Turn(), "turn");
-  const BlockId id = named.system.layout.Declare("car.heading", "car", model->blocks()[0]);
-  named.system.motions.push_back({"car", model, {id}});
-  named.system.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
-  testing::AddSensor(named.system, "disparity", MakeSensor(Compass(), "compass"), {"car.heading"});
+  const BlockId id = named.problem.layout.Declare("car.heading", "car", model->blocks()[0]);
+  named.problem.motions.push_back({"car", model, {id}});
+  named.problem.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
+  testing::AddSensor(named.problem, "disparity", MakeSensor(Compass(), "compass"), {"car.heading"});
   EkfOptions options;
   options.gate = gate;
-  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  named.estimator = std::make_unique<Ekf>(named.problem, options, experiment.source->streams());
   return TextsOf(alidade::Run(experiment, {}).estimators[0], "unit");
 }
 
@@ -392,8 +394,8 @@ TEST(Run, RadiansAreNoEvent) {
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
   EstimatorSpec& ekf = experiment.estimators[0];
-  ekf.system.initial_time_s = 49.5 * 0.033;
-  ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
+  ekf.problem.initial_time_s = 49.5 * 0.033;
+  ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
   const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
   EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
@@ -417,13 +419,13 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   experiment = MakeExperiment();
   EstimatorSpec& ekf = experiment.estimators[0];
   const SharedSensor linear = testing::LinearSensor(1.0, 1.0);
-  testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
-  for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
+  testing::AddSensor(ekf.problem, "elsewhere", linear, {"target.depth"});
+  for (Prior& prior : ekf.problem.priors) prior.covariance *= 1e-12;  // sure of what is wrong
   EkfOptions options;
   options.gate = 1e-6;
   options.rejection_recovery = RejectionRecovery::kNone;
-  ekf.system.motions.clear();
-  ekf.estimator = std::make_unique<Ekf>(ekf.system, options, experiment.source->streams());
+  ekf.problem.motions.clear();
+  ekf.estimator = std::make_unique<Ekf>(ekf.problem, options, experiment.source->streams());
   EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]),
             (Texts{"sensor 'disparity' used none of 30 measurements: 30 gated",
                    "sensor 'inverse_scale' used none of 60 measurements: 60 gated",
@@ -466,11 +468,12 @@ TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   experiment.source = std::make_unique<EachSecond>(100);
   EstimatorSpec& named = experiment.estimators.emplace_back();
   named.name = "ekf";
-  testing::AddMotion(named.system, "car", MakeMotion(testing::Driven(0.2), "driven"),
+  testing::AddMotion(named.problem, "car", MakeMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
-  named.system.motions[0].input = {"inverse_scale", 0.5};
-  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"car.position"});
-  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  named.problem.motions[0].input = {"inverse_scale", 0.5};
+  testing::AddSensor(named.problem, "disparity", testing::LinearSensor(1.0, 1.0), {"car.position"});
+  named.estimator =
+      std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   const RunResult run = alidade::Run(experiment, {});
   const EstimatorResult& ekf = run.estimators[0];
   EXPECT_EQ(std::ranges::count(ekf.events, "input_stale", &Event::kind), 1);
@@ -513,8 +516,8 @@ struct Mapless : Hindsight {
 TEST(Run, AFailureAtTheEndKeepsTheResults) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec& first = experiment.estimators[0];
-  first.system.landmarks.emplace();
-  first.estimator = std::make_unique<Mapless>(first.system);
+  first.problem.landmarks.emplace();
+  first.estimator = std::make_unique<Mapless>(first.problem);
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kFailed);
   EXPECT_EQ(result.code, ExitCode::kInternal);
@@ -536,7 +539,7 @@ TEST(Run, TheFirstFailureIsTheReason) {
   const auto reason = [](bool explodes) {
     Experiment experiment = MakeExperiment();
     EstimatorSpec& alone = experiment.estimators[1];
-    alone.estimator = std::make_unique<FailsLate>(alone.system);
+    alone.estimator = std::make_unique<FailsLate>(alone.problem);
     if (explodes) {
       experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
     }
@@ -595,7 +598,7 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
             "2 values of 'depth', not 1"},
            {[](SourceFrame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
     Experiment experiment = MakeExperiment();
-    const SharedSensor stereo = experiment.estimators[0].system.sensors[1].model;
+    const SharedSensor stereo = experiment.estimators[0].problem.sensors[1].model;
     experiment.segments.push_back({"near", 1, true, stereo});
     experiment.source = std::make_unique<Spoiling>(one.spoil);
     const RunResult result = alidade::Run(experiment, {});

@@ -63,23 +63,23 @@ struct Direction : Sensor<UnitVector, UnitVector> {
   }
 };
 
-System WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
-  System system;
+Problem WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
+  Problem problem;
   MotionBinding binding{"s", MakeMotion(Wander(), "wander"), {}};
   const std::vector<double> means[2] = {{1.0, 0.0, 0.0, 0.0}, {0.6, 0.0, 0.8}};
   for (std::size_t i = 0; i < 2; ++i) {
     const Space& space = binding.model->blocks()[i];
     Prior prior;
-    prior.block = system.layout.Declare("s." + space.name, "s", space);
+    prior.block = problem.layout.Declare("s." + space.name, "s", space);
     prior.mean = means[i];
     prior.covariance = i == 0 ? Eigen::MatrixXd(p_q) : Eigen::MatrixXd(p_u);
     binding.blocks.push_back(prior.block);
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
-  system.motions.push_back(binding);
-  AddSensor(system, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
-  AddSensor(system, "direction", MakeSensor(Direction(), "direction"), {"s.u"});
-  return system;
+  problem.motions.push_back(binding);
+  AddSensor(problem, "turned", MakeSensor(Turned(), "turned"), {"s.q", "s.u"});
+  AddSensor(problem, "direction", MakeSensor(Direction(), "direction"), {"s.u"});
+  return problem;
 }
 
 // Corrections are of up to 0.5 rad: P has to turn with the unit vector.
@@ -87,13 +87,13 @@ TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
   const Eigen::Matrix3d p_q = Eigen::Vector3d(0.3, 0.2, 0.1).asDiagonal();
   Eigen::Matrix2d p_u;
   p_u << 0.5, 0.2, 0.2, 0.3;
-  const System system = WanderSystem(p_q, p_u);
+  const Problem problem = WanderSystem(p_q, p_u);
   EkfOptions options;
   options.fuse = Fuse::kPerMeasurement;
-  Ekf engine(system, options, StreamsOf(system));
+  Ekf engine(problem, options, StreamsOf(problem));
   StaticEkf<Wander> filter{Wander()};
-  filter.Set<0>(system.priors[0].mean.data(), p_q);
-  filter.Set<1>(system.priors[1].mean.data(), p_u);
+  filter.Set<0>(problem.priors[0].mean.data(), p_q);
+  filter.Set<1>(problem.priors[1].mean.data(), p_u);
   bool above = false, below = false;
   Frame frame;
   for (int k = 0; k < 400; ++k) {

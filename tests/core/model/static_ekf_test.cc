@@ -45,11 +45,11 @@ StaticOutcome ToStatic(Outcome outcome) {
 }
 
 TEST(StaticEkf, IsTheEngineComposedAtCompileTime) {
-  const System system = DepthFilter();
+  const Problem problem = DepthFilter();
   EkfOptions options;
   options.fuse = Fuse::kPerMeasurement;
   options.gate = 0.99;
-  Ekf engine(system, options, StreamsOf(system));
+  Ekf engine(problem, options, StreamsOf(problem));
   DepthEkf filter = StaticDepthFilter();
   const StereoDisparity stereo(400.0, 0.065, 1.0);
   const Scale2d scale = Scale2d::FromPixels(300.0, 1.0);

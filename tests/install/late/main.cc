@@ -13,7 +13,7 @@
 #include <random>
 
 int main() {
-  alidade::System problem;
+  alidade::Problem problem;
   const auto target = problem.AddState("target", alidade::ConstantVelocity<1, false>(1.0),
                                        {{"position", 0.3, 0.1}, {"velocity", 0.0, 1.0}});
   const auto model = problem.AddState("template", alidade::Constant<1>(1), {{"value", 3.3, 0.1}});

@@ -35,22 +35,22 @@ struct Seen : alidade::Sensor<alidade::Vec<3>, alidade::Vec<3>> {
   }
 };
 
-alidade::System WalkSystem() {
-  alidade::System system;
+alidade::Problem WalkSystem() {
+  alidade::Problem problem;
   alidade::MotionBinding motion{"p", alidade::MakeMotion(Walk(), "walk"), {}};
   alidade::Prior prior;
-  prior.block = system.layout.Declare("p.position", "p", motion.model->blocks()[0]);
+  prior.block = problem.layout.Declare("p.position", "p", motion.model->blocks()[0]);
   prior.mean = {0.0, 0.0, 0.0};
   prior.covariance = Eigen::MatrixXd::Identity(3, 3);
   motion.blocks.push_back(prior.block);
-  system.priors.push_back(prior);
-  system.motions.push_back(motion);
+  problem.priors.push_back(prior);
+  problem.motions.push_back(motion);
   alidade::SensorBinding sensor{"seen", "seen", alidade::MakeSensor(Seen(), "seen"), {}};
   alidade::RoleBinding role;
   role.block = prior.block;
   sensor.roles.push_back(role);
-  system.sensors.push_back(sensor);
-  return system;
+  problem.sensors.push_back(sensor);
+  return problem;
 }
 
 /// Whether memory that the library allocates is grown and freed here, and the other way round.

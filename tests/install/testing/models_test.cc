@@ -39,7 +39,7 @@ TEST(ConstantVelocity, HasTheJacobiansOfDifferences) {
 }
 
 TEST(DepthFilter, FollowsTheDisparityAndReportsAStaleFrame) {
-  alidade::System problem;
+  alidade::Problem problem;
   const auto target = problem.AddState("target", alidade::ConstantVelocity<1, false>(1.0),
                                        {{"position", 0.3, 0.1}, {"velocity", 0.0, 0.1}});
   const auto stereo = problem.AddSensor("stereo", alidade::StereoDisparity(400.0, 0.065, 1.0),

@@ -45,26 +45,26 @@ void Add(Experiment& experiment, const std::string& name, EstimatorKind kind,
   named.name = name;
   named.type = name;
   named.kind = kind;
-  named.system = LinearSystem();
+  named.problem = LinearSystem();
   named.estimator = std::move(estimator);
   named.accepted_by = accepted_by;
 }
 
 /// A filter, and all that its error decomposition takes.
 Experiment MakeLinear(bool with_outlier) {
-  const System system = LinearSystem();
+  const Problem problem = LinearSystem();
   EkfOptions options;
   options.gate = 0.9999;
   Experiment experiment;
   experiment.source = std::make_unique<Swing>(with_outlier);
   const std::vector<StreamInfo>& streams = experiment.source->streams();
-  Add(experiment, "ekf", EstimatorKind::kFilter, std::make_unique<Ekf>(system, options, streams));
+  Add(experiment, "ekf", EstimatorKind::kFilter, std::make_unique<Ekf>(problem, options, streams));
   Add(experiment, "rts", EstimatorKind::kSmoother,
-      std::make_unique<RtsSmoother>(system, options, streams));
-  Add(experiment, "full_information", EstimatorKind::kBatch, MakeBatch(system, "mode: filtering\n"),
-      0);
-  Add(experiment, "accepted", EstimatorKind::kBatch, MakeBatch(system), 0);
-  Add(experiment, "batch", EstimatorKind::kBatch, MakeBatch(system));
+      std::make_unique<RtsSmoother>(problem, options, streams));
+  Add(experiment, "full_information", EstimatorKind::kBatch,
+      MakeBatch(problem, "mode: filtering\n"), 0);
+  Add(experiment, "accepted", EstimatorKind::kBatch, MakeBatch(problem), 0);
+  Add(experiment, "batch", EstimatorKind::kBatch, MakeBatch(problem));
   return experiment;
 }
 
@@ -148,12 +148,12 @@ struct ByHand {
 };
 
 ByHand RunByHand() {
-  const System system = LinearSystem();
+  const Problem problem = LinearSystem();
   Swing source;
   EkfOptions options;
   options.gate = 0.9999;
-  Ekf ekf(system, options, source.streams());
-  RtsSmoother rts(system, options, source.streams());
+  Ekf ekf(problem, options, source.streams());
+  RtsSmoother rts(problem, options, source.streams());
   ByHand run;
   for (SourceFrame frame; source.Next(frame);) {
     ekf.Process(frame);
@@ -241,7 +241,7 @@ TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
   EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
   for (const EstimatorSpec& named : compared.experiment.estimators) {
-    EXPECT_EQ(named.system.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
+    EXPECT_EQ(named.problem.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
     EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
   }
 }

@@ -58,7 +58,7 @@ void WriteOut(const std::vector<std::array<Vector3d, 2>>& seen, MatrixXd& a, Vec
   }
 }
 
-System EdgeSystem() { return testing::MapSystem(OffsetBeyond(), {}, kFirstSigma); }
+Problem EdgeSystem() { return testing::MapSystem(OffsetBeyond(), {}, kFirstSigma); }
 
 std::vector<Frame> FramesOf(const std::vector<std::array<Vector3d, 2>>& seen) {
   std::vector<Frame> frames;
@@ -125,9 +125,9 @@ TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
 TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   const auto seen = OffsetsOf(false);
   const Found batch = SolveSparse(seen);
-  const System system = EdgeSystem();
-  const auto window = testing::MakeFixedLag(system, "lag_s: 10\n");
-  const auto filter = testing::MakeBatch(system, "solver: sparse\nmode: filtering\n");
+  const Problem problem = EdgeSystem();
+  const auto window = testing::MakeFixedLag(problem, "lag_s: 10\n");
+  const auto filter = testing::MakeBatch(problem, "solver: sparse\nmode: filtering\n");
   for (Estimator* const estimator : {window.get(), filter.get()}) {
     std::vector<std::string> said;
     for (const Frame& frame : FramesOf(seen)) {
@@ -163,8 +163,8 @@ struct Exponential : Sensor<Vec<1>, Vec<3>> {
 // On the way the camera is so far back that the landmark, 4 m before it, wants to be behind where
 // the camera was first. At the optimum it is 1 m before that, and the dense solver finds the same.
 TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
-  System system = testing::MapSystem(OffsetBeyond(), {});
-  testing::AddSensor(system, "e", MakeSensor(Exponential(), "exponential"), {"cam.position"});
+  Problem problem = testing::MapSystem(OffsetBeyond(), {});
+  testing::AddSensor(problem, "e", MakeSensor(Exponential(), "exponential"), {"cam.position"});
   std::vector<Frame> frames;
   for (int k = 0; k < kViews; ++k) {
     const double z = k == 0 ? 1.0 : 4.0;
@@ -172,8 +172,8 @@ TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
     if (k == 0) continue;
     frames.back().measurements.push_back({frames.back().timestamp, 1, -1, {std::exp(3.0)}, {}});
   }
-  const Found found = testing::Solve(system, frames, "solver: sparse\n"),
-              expected = testing::Solve(system, frames, "solver: dense\n");
+  const Found found = testing::Solve(problem, frames, "solver: sparse\n"),
+              expected = testing::Solve(problem, frames, "solver: dense\n");
   const std::string& said = found.events.back().text;
   ASSERT_FALSE(found.failed) << said;
   ASSERT_FALSE(expected.failed) << expected.events.back().text;

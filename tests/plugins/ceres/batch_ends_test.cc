@@ -20,9 +20,9 @@ using testing::Shipped;
 
 // The velocity is not measured at the first frame: its variance is that of the step before it.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
-  const System system = LinearSystem();
-  const auto so_far = MakeBatch(system, "mode: filtering\n"), batch = MakeBatch(system);
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const Problem problem = LinearSystem();
+  const auto so_far = MakeBatch(problem, "mode: filtering\n"), batch = MakeBatch(problem);
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   const Frame frame = FrameAt(1.0, {{0, 1.0}});
   for (Estimator* one : {so_far.get(), batch.get(), static_cast<Estimator*>(&ekf)}) {
     one->Start(0);
@@ -40,12 +40,12 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
 // 4000 inputs fit in a dense system: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x
 // is one more.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
-  System system = LinearSystem();
-  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
-  system.priors.back().from = "y";
+  Problem problem = LinearSystem();
+  testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
+  problem.priors.back().from = "y";
   const auto process = [&](const std::vector<std::pair<int, double>>& values, bool fails) {
-    const auto batch = MakeBatch(system, "solver: dense\nmax_dt_s: 0.001\n");
+    const auto batch = MakeBatch(problem, "solver: dense\nmax_dt_s: 0.001\n");
     batch->Process(FrameAt(0.0, {}));
     const UpdateReport& report = batch->Process(FrameAt(3.998, values));
     EXPECT_EQ(batch->failed(), fails);
@@ -84,9 +84,9 @@ struct Failing : Motion<1, Vec<1>> {
 };
 
 /// Whether the batch says that it failed, the first `budget` steps of the model apart.
-void ExpectSaid(const System& system, int budget, bool so_far) {
+void ExpectSaid(const Problem& problem, int budget, bool so_far) {
   Failing::budget = budget;
-  const auto batch = MakeBatch(system, so_far ? "mode: filtering\n" : "");
+  const auto batch = MakeBatch(problem, so_far ? "mode: filtering\n" : "");
   std::string said;
   const auto note = [&](const UpdateReport& report) {
     for (const Event& event : report.events) said += event.text;
@@ -105,32 +105,32 @@ void ExpectSaid(const System& system, int budget, bool so_far) {
 
 TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   constexpr int kMany = 1'000'000;
-  System system;
-  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  Problem problem;
+  testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   for (const bool so_far : {false, true}) {
     Failing::budget = kMany;
-    const auto batch = MakeBatch(system, so_far ? "mode: filtering\n" : "");
+    const auto batch = MakeBatch(problem, so_far ? "mode: filtering\n" : "");
     for (int k = 0; k < 4; ++k) batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}}));
     if (!so_far) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
     ASSERT_FALSE(batch->failed());
     // The last three steps are those of the estimates, three before of their covariances, three of
     // the noise at the solution.
     const int steps = kMany - Failing::budget;
-    for (int missing = 1; missing <= 9; ++missing) ExpectSaid(system, steps - missing, so_far);
+    for (int missing = 1; missing <= 9; ++missing) ExpectSaid(problem, steps - missing, so_far);
   }
 }
 
 // The filter that goes along cannot step to the second frame; the batch can, later. The block that
 // waits for its first value never gets it, and the events say why, once.
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
-  System system;
-  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
-  system.priors.back().from = "y";
-  const auto batch = MakeBatch(system);
+  Problem problem;
+  testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  AddSensor(problem, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
+  problem.priors.back().from = "y";
+  const auto batch = MakeBatch(problem);
   Failing::budget = 0;
   std::vector<std::string> said;
   for (int k = 0; k < 4; ++k) {
@@ -157,8 +157,8 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
 TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
   LandmarkOptions options = testing::WithPrior();
   options.known = {{1, {0.0, 0.0, -1.0}, 0.1}, {2, {0.0, 0.0, 2.0}, 0.1}};
-  const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options, 0.1);
-  const auto batch = MakeBatch(system);
+  const Problem problem = testing::MapSystem(testing::InverseDepthPixels(0.01), options, 0.1);
+  const auto batch = MakeBatch(problem);
   for (int k = 0; k < 3; ++k) {
     batch->Process(testing::FrameOf(0.1 * k, {{1, {0.0, 0.0}}, {2, {0.01, 0.0}}}));
   }
@@ -190,10 +190,10 @@ TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
 
 // What it could have predicted of landmarks, too, is left out.
 TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
-  System system = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
-  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  Problem problem = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
+  testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
   for (const bool ends : {false, true}) {
-    const auto batch = MakeBatch(system);
+    const auto batch = MakeBatch(problem);
     Failing::budget = ends ? 0 : 1000;
     for (int k = 0; k < 3; ++k) {
       batch->Process(testing::FrameOf(0.1 * k, {{7, {1.0, 0.0, 2.0}}}));
@@ -210,10 +210,10 @@ TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
 
 // It ends at its last good state, and says so once.
 TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
-  System system;
-  testing::AddMotion(system, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  Problem problem;
+  testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   ekf.Process(FrameAt(0.0, {{0, 0.2}}));
   const std::vector<double> good = ekf.state().values();
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
@@ -230,10 +230,10 @@ TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
 }
 
 TEST(CeresBatchEnds, TooFewIterationsNameTheKeyThatAllowsMore) {
-  System system = testing::MovingPoint(0.7);
-  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  system.sensors[0].loss = {LossKind::kHuber, 0.1};
-  const auto batch = MakeBatch(system, "max_iterations: 2\n");
+  Problem problem = testing::MovingPoint(0.7);
+  AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  problem.sensors[0].loss = {LossKind::kHuber, 0.1};
+  const auto batch = MakeBatch(problem, "max_iterations: 2\n");
   for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + k % 3}}));
   std::string said;
   batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
@@ -266,9 +266,9 @@ struct WrongSign : Sensor<Vec<1>, Vec<1>> {
 
 TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
   for (const double sign : {1.0, -1.0}) {
-    System system = testing::MovingPoint(0.7);
-    AddSensor(system, "z", MakeSensor(WrongSign(sign), "square"), {"p.x"});
-    const auto batch = MakeBatch(system, "max_iterations: 500\n");
+    Problem problem = testing::MovingPoint(0.7);
+    AddSensor(problem, "z", MakeSensor(WrongSign(sign), "square"), {"p.x"});
+    const auto batch = MakeBatch(problem, "max_iterations: 500\n");
     for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
     std::string said;
     batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
@@ -286,10 +286,10 @@ TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
 // residual comes near to they leave the estimates where they are without a loss.
 TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   const auto last_of = [](const RobustLoss& loss) {
-    System system = testing::MovingPoint(0.7);
-    AddSensor(system, "z", MakeSensor(WrongSign(-1.0), "square"), {"p.x"});
-    system.sensors[0].loss = loss;
-    const auto batch = MakeBatch(system, "max_iterations: 500\n");
+    Problem problem = testing::MovingPoint(0.7);
+    AddSensor(problem, "z", MakeSensor(WrongSign(-1.0), "square"), {"p.x"});
+    problem.sensors[0].loss = loss;
+    const auto batch = MakeBatch(problem, "max_iterations: 500\n");
     for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
     std::pair<double, std::string> last;
     batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
@@ -337,16 +337,16 @@ struct Seen : Sensor<UnitVector, UnitVector> {
 // The basis of the tangent turns over at z = 0, which this walk crosses. The smoother linearises
 // about the filter: at z = 0.6 too the two differ by 5e-6 sigma, and by up to 8e-4 in P.
 TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
-  System system;
+  Problem problem;
   const SharedMotion wander = MakeMotion(Wander(), "wander");
-  const BlockId id = system.layout.Declare("d.n", "d", wander->blocks()[0]);
-  system.motions.push_back({"d", wander, {id}});
+  const BlockId id = problem.layout.Declare("d.n", "d", wander->blocks()[0]);
+  problem.motions.push_back({"d", wander, {id}});
   const std::vector<double> mean = {std::sqrt(1.0 - 0.0005), 0.02, 0.01};
   const Eigen::Matrix2d p = (Eigen::Matrix2d() << 1e-5, 2e-6, 2e-6, 4e-6).finished();
-  system.priors.push_back({id, mean, p, ""});
-  AddSensor(system, "z", MakeSensor(Seen(), "seen"), {"d.n"});
-  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "mode: filtering\n");
-  RtsSmoother rts(system, {}, testing::StreamsOf(system));
+  problem.priors.push_back({id, mean, p, ""});
+  AddSensor(problem, "z", MakeSensor(Seen(), "seen"), {"d.n"});
+  const auto batch = MakeBatch(problem), so_far = MakeBatch(problem, "mode: filtering\n");
+  RtsSmoother rts(problem, {}, testing::StreamsOf(problem));
   Random random(3);
   const auto drawn = [&](std::vector<double> x) {
     const double d[2] = {kSigma * random.Normal(), kSigma * random.Normal()};

@@ -18,22 +18,23 @@ inline const PluginHost& Shipped() {
 }
 
 /// A batch with these options, one a line.
-inline std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
+inline std::unique_ptr<Estimator> MakeBatch(const Problem& problem,
+                                            const std::string& options = "") {
   const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
-  return CreateEstimator(Shipped(), "ceres_batch", config.root())(system, StreamsOf(system));
+  return CreateEstimator(Shipped(), "ceres_batch", config.root())(problem, StreamsOf(problem));
 }
 
 /// A fixed-lag smoother likewise.
-inline std::unique_ptr<Estimator> MakeFixedLag(const System& system, const std::string& options) {
+inline std::unique_ptr<Estimator> MakeFixedLag(const Problem& problem, const std::string& options) {
   const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
-  return CreateEstimator(Shipped(), "fixed_lag", config.root())(system, StreamsOf(system));
+  return CreateEstimator(Shipped(), "fixed_lag", config.root())(problem, StreamsOf(problem));
 }
 
 /// A point with a linear sensor of 0.3 m; its second block is measured by none.
-inline System LinearSystem() {
-  System system = MovingPoint(0.7);
-  AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
-  return system;
+inline Problem LinearSystem() {
+  Problem problem = MovingPoint(0.7);
+  AddSensor(problem, "z", LinearSensor(2.0, 0.3), {"p.x"});
+  return problem;
 }
 
 }  // namespace alidade::testing

@@ -13,16 +13,16 @@ using testing::FrameAt;
 
 /// An acceleration of 0.7 m/s^2, held, and a sensor of 0.3 m: by the models themselves, or in place
 /// of others of theirs.
-System HeldNoise(bool given) {
-  System system = testing::HeldPoint(given ? 5.0 : 0.7);
+Problem HeldNoise(bool given) {
+  Problem problem = testing::HeldPoint(given ? 5.0 : 0.7);
   if (given) {
-    system.motions[0].model = testing::MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7});
+    problem.motions[0].model = testing::MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7});
   }
-  testing::AddSensor(system, "z",
+  testing::AddSensor(problem, "z",
                      given ? testing::SensorOfNoise(testing::Linear(2.0, 4.0), {0.3})
                            : testing::LinearSensor(2.0, 0.3),
                      {"p.x"});
-  return system;
+  return problem;
 }
 
 TEST(CeresBatchGivenNoise, IsTakenInPlaceOfTheModels) {

@@ -51,10 +51,10 @@ void ExpectNear(const std::vector<Estimate>& found, const std::vector<Estimate>&
   }
 }
 
-System HeldSystem() {
-  System system = testing::HeldPoint(0.7);
-  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  return system;
+Problem HeldSystem() {
+  Problem problem = testing::HeldPoint(0.7);
+  testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  return problem;
 }
 
 /// 10 frames a second with a measurement, `parts` - 1 without one before each.
@@ -71,10 +71,10 @@ std::vector<Frame> Frames(int count, int parts) {
 }
 
 std::unique_ptr<Estimator> Make(const char* type, const std::string& options) {
-  const System system = HeldSystem();
+  const Problem problem = HeldSystem();
   const Config config = Config::FromText(std::string("type: ") + type + "\n" + options, "e.yaml");
-  return CreateEstimator(testing::Shipped(), type, config.root())(system,
-                                                                  testing::StreamsOf(system));
+  return CreateEstimator(testing::Shipped(), type, config.root())(problem,
+                                                                  testing::StreamsOf(problem));
 }
 
 struct Case {
@@ -99,19 +99,19 @@ TEST(CeresBatchHeldNoise, AGapIsAGapHoweverItIsSplit) {
 
 // Also at the frames inside a gap, whose noise is still being held.
 TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
-  const System system = HeldSystem();
+  const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(12, 3);
-  RtsSmoother rts(system, {.max_dt_s = 0.02}, testing::StreamsOf(system));
+  RtsSmoother rts(problem, {.max_dt_s = 0.02}, testing::StreamsOf(problem));
   ExpectNear(EstimatesOf(*Make("ceres_batch", "max_dt_s: 0.02\n"), frames, All),
              EstimatesOf(rts, frames, All), 1e-9);
 }
 
 // The window is the filter; its edge lies inside a gap at most frames.
 TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
-  const System system = HeldSystem();
+  const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(20, 4);
   for (const char* window : {"0.01", "0.06", "0.13", "0.5"}) {
-    Ekf ekf(system, {}, testing::StreamsOf(system));
+    Ekf ekf(problem, {}, testing::StreamsOf(problem));
     const auto lag = Make("fixed_lag", std::string("lag_s: ") + window + "\n");
     ExpectNear(EstimatesOf(*lag, frames, All), EstimatesOf(ekf, frames, All), 1e-9);
   }

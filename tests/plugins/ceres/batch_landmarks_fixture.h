@@ -48,22 +48,23 @@ inline Found Solve(Estimator& batch, const std::vector<Frame>& frames) {
   found.failed = batch.failed();
   return found;
 }
-inline Found Solve(const System& system, const std::vector<Frame>& frames,
+inline Found Solve(const Problem& problem, const std::vector<Frame>& frames,
                    const std::string& options = "") {
-  return Solve(*MakeBatch(system, options), frames);
+  return Solve(*MakeBatch(problem, options), frames);
 }
 
 inline constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;
 
 /// A camera that walks before points, and what it sees of them: the problem of MapSystem in its
 /// positions r_1.. and the points p_0.., all of them 3 numbers, side by side in one vector x.
-struct Problem {
+struct MapProblem {
   int steps, points;
   std::vector<Frame> frames;
   VectorXd truth;
   RobustLoss loss;
 
-  Problem(int of_steps, int of_points, int outlier_every = 0) : steps(of_steps), points(of_points) {
+  MapProblem(int of_steps, int of_points, int outlier_every = 0)
+      : steps(of_steps), points(of_points) {
     Random random(11);
     truth.setZero(3 * (steps - 1 + points));
     for (int k = 1; k < steps; ++k) {
@@ -147,10 +148,10 @@ struct Problem {
     a = j.transpose() * w.asDiagonal() * j;
     b = j.transpose() * w.asDiagonal() * r;
   }
-  System Filter() const {
-    System system = MapSystem(InverseDepthPixels(kPixel), WithPrior(kRho, kRhoSigma));
-    system.sensors[0].loss = loss;
-    return system;
+  Problem Filter() const {
+    Problem problem = MapSystem(InverseDepthPixels(kPixel), WithPrior(kRho, kRhoSigma));
+    problem.sensors[0].loss = loss;
+    return problem;
   }
   VectorXd Solution(const Found& found) const {
     VectorXd x(truth.size());

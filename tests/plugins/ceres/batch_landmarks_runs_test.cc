@@ -14,18 +14,18 @@ namespace alidade {
 namespace {
 
 using testing::Found;
-using testing::Problem;
+using testing::MapProblem;
 using testing::Solve;
 
 TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
-  const Problem problem(25, 12);
-  std::vector<Frame> frames = problem.frames;
+  const MapProblem map(25, 12);
+  std::vector<Frame> frames = map.frames;
   for (std::size_t k = 10; k < 14; ++k) {  // landmark 4 is out of view
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.landmark == 4; });
   }
-  System system = problem.Filter();
-  system.landmarks->max_missed_frames = 3;
-  const Found found = Solve(system, frames);
+  Problem problem = map.Filter();
+  problem.landmarks->max_missed_frames = 3;
+  const Found found = Solve(problem, frames);
   ASSERT_FALSE(found.failed);
   EXPECT_EQ(found.Landmark(4).generation, 1);
   EXPECT_EQ(found.Landmark(3).generation, 0);
@@ -35,7 +35,7 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
       if (m.landmark == 4) m.landmark = 104;
     }
   }
-  const Found other = Solve(system, frames);
+  const Found other = Solve(problem, frames);
   EXPECT_EQ(other.Cost(), found.Cost());
   EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
 }
@@ -51,15 +51,15 @@ TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
   }
   const Experiment experiment = BuildExperiment(config, testing::Shipped());
   ASSERT_EQ(experiment.estimators.size(), 2u);
-  EXPECT_EQ(experiment.estimators[0].system.landmarks->min_observations, 3);
-  EXPECT_EQ(experiment.estimators[1].system.landmarks->min_observations, 1);
+  EXPECT_EQ(experiment.estimators[0].problem.landmarks->min_observations, 3);
+  EXPECT_EQ(experiment.estimators[1].problem.landmarks->min_observations, 1);
 }
 
 TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {
-  const Problem problem(15, 8);
-  const Found one = Solve(problem.Filter(), problem.frames);
-  const Found two = Solve(problem.Filter(), problem.frames);
-  EXPECT_EQ(problem.Solution(one), problem.Solution(two));
+  const MapProblem map(15, 8);
+  const Found one = Solve(map.Filter(), map.frames);
+  const Found two = Solve(map.Filter(), map.frames);
+  EXPECT_EQ(map.Solution(one), map.Solution(two));
   EXPECT_EQ(one.events.back().text, two.events.back().text);
 }
 
@@ -87,16 +87,16 @@ const std::string kDrawn =
 TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const testing::MadeScene made = testing::MakeScene(kDrawn);
   const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");
-  const System system = ReadProblem(config.root(), testing::Shipped(), {});
+  const Problem problem = ReadProblem(config.root(), testing::Shipped(), {});
   const Config entry = Config::FromText("type: ceres_batch", "batch.yaml");
   const auto batch = CreateEstimator(testing::Shipped(), "ceres_batch", entry.root())(
-      system, made.scene->streams());
+      problem, made.scene->streams());
   std::vector<Frame> frames;
   for (SourceFrame frame; made.scene->Next(frame);) frames.push_back(frame);
   const Found found = Solve(*batch, frames);
   ASSERT_FALSE(found.failed) << found.events.back().text;
   ASSERT_EQ(found.states.size(), 40u);
-  const StateLayout& layout = system.layout;
+  const StateLayout& layout = problem.layout;
   const auto value = [&](std::size_t k, const char* block) {
     return found.states[k].value(layout.Find(block));
   };

@@ -16,10 +16,10 @@ using testing::InverseDepthPixels;
 using testing::kPixel;
 using testing::kRho;
 using testing::kRhoSigma;
+using testing::MapProblem;
 using testing::MapSystem;
 using testing::Observation;
 using testing::Offset;
-using testing::Problem;
 using testing::Solve;
 
 /// The normal equations of positions x_0, x_1, .., 3 numbers each, of which differences are known.
@@ -97,11 +97,11 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
 
 // The problem without its landmarks, of which there are none here, against that of all residuals.
 TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
-  const auto expect_equal = [](const System& system, const std::vector<Frame>& frames,
+  const auto expect_equal = [](const Problem& problem, const std::vector<Frame>& frames,
                                double tolerance) {
-    System with = system;
+    Problem with = problem;
     with.landmarks = LandmarkOptions{};
-    const Found found = Solve(with, frames), expected = Solve(system, frames);
+    const Found found = Solve(with, frames), expected = Solve(problem, frames);
     ASSERT_FALSE(found.failed) << found.events.back().text;
     EXPECT_NEAR(found.Cost(), expected.Cost(), 1e-8 * expected.Cost());
     ASSERT_EQ(found.states.size(), expected.states.size());
@@ -123,7 +123,7 @@ TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
         t_s, {{0, 26.0 / z + std::cos(23.0 * k)}, {1, z / 0.3 + 0.006 * std::sin(37.0 * k)}}));
   }
   expect_equal(testing::LinearSystem(), point, 1e-9);
-  System robust = testing::DepthFilter();
+  Problem robust = testing::DepthFilter();
   expect_equal(robust, depth, 1e-6);  // the noise that depends on the state settles to 1e-9
   robust.sensors[0].loss = {LossKind::kHuber, 1.0};
   expect_equal(robust, depth, 1e-5);  // steps of 1e-6 sigma are small enough
@@ -132,24 +132,23 @@ TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
 // ---- inverse depth ------------------------------------------------------------------------------
 
 TEST(CeresBatchLandmarks, IsAtTheMinimumOfTheCostWrittenOutWithItsCovariance) {
-  const Problem problem(25, 12);
-  problem.ExpectSolved(Solve(problem.Filter(), problem.frames));
+  const MapProblem map(25, 12);
+  map.ExpectSolved(Solve(map.Filter(), map.frames));
 }
 
 TEST(CeresBatchLandmarks, ALossCountsEachObservationWithItsWeight) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.5}, {LossKind::kCauchy, 2.0}}) {
-    Problem problem(25, 12, 23);
-    problem.loss = loss;
-    problem.ExpectSolved(Solve(problem.Filter(), problem.frames, "max_iterations: 500\n"));
+    MapProblem map(25, 12, 23);
+    map.loss = loss;
+    map.ExpectSolved(Solve(map.Filter(), map.frames, "max_iterations: 500\n"));
   }
 }
 
 TEST(CeresBatchLandmarks, AnchorsGiveTheSameAsSixNumbers) {
-  const Problem problem(25, 12);
-  const Found six = Solve(problem.Filter(), problem.frames);
+  const MapProblem map(25, 12);
+  const Found six = Solve(map.Filter(), map.frames);
   const auto expect_equal = [&](const auto& model) {
-    const Found found =
-        Solve(MapSystem(model, testing::WithPrior(kRho, kRhoSigma)), problem.frames);
+    const Found found = Solve(MapSystem(model, testing::WithPrior(kRho, kRhoSigma)), map.frames);
     EXPECT_NEAR(found.Cost(), six.Cost(), 1e-7 * six.Cost());
     ASSERT_EQ(found.map.size(), six.map.size());
     for (std::size_t i = 0; i < six.map.size(); ++i) {
@@ -167,37 +166,37 @@ TEST(CeresBatchLandmarks, AnchorsGiveTheSameAsSixNumbers) {
 // The solve of all data starts at a filter's estimates, the last of the data so far at the solution
 // of the frame before.
 TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
-  const Problem problem(12, 8);
-  const Found all = Solve(problem.Filter(), problem.frames);
-  const auto so_far = testing::MakeBatch(problem.Filter(), "mode: filtering\n");
-  for (const Frame& frame : problem.frames) so_far->Process(frame);
+  const MapProblem map(12, 8);
+  const Found all = Solve(map.Filter(), map.frames);
+  const auto so_far = testing::MakeBatch(map.Filter(), "mode: filtering\n");
+  for (const Frame& frame : map.frames) so_far->Process(frame);
   ASSERT_FALSE(so_far->failed());
-  EXPECT_LT((testing::PositionOf(*so_far) - all.Camera(problem.frames.size() - 1)).norm(), 1e-7);
-  const std::vector<LandmarkEstimate> map = so_far->landmarks();
-  ASSERT_EQ(map.size(), all.map.size());
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    EXPECT_LT((map[i].position - all.map[i].position).norm(), 1e-6);
+  EXPECT_LT((testing::PositionOf(*so_far) - all.Camera(map.frames.size() - 1)).norm(), 1e-7);
+  const std::vector<LandmarkEstimate> estimates = so_far->landmarks();
+  ASSERT_EQ(estimates.size(), all.map.size());
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    EXPECT_LT((estimates[i].position - all.map[i].position).norm(), 1e-6);
   }
 }
 
 // Points known exactly give the scale; what is seen without noise then gives the truth.
 TEST(CeresBatchLandmarks, WhatIsSeenWithoutNoiseGivesTheTruth) {
   constexpr double kPixelSigma = 1e-7;
-  Problem problem(12, 12);
+  MapProblem map(12, 12);
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
   for (int i = 0; i < 3; ++i) {
-    const Vector3d p = problem.Point(problem.truth, i);
+    const Vector3d p = map.Point(map.truth, i);
     options.known.push_back({i, {p[0], p[1], p[2]}, 0.0});
   }
-  for (std::size_t k = 0; k < problem.frames.size(); ++k) {
-    for (Measurement& m : problem.frames[k].measurements) {
-      const Vector2d z = problem.Pixel(problem.truth, static_cast<int>(k), m.landmark);
+  for (std::size_t k = 0; k < map.frames.size(); ++k) {
+    for (Measurement& m : map.frames[k].measurements) {
+      const Vector2d z = map.Pixel(map.truth, static_cast<int>(k), m.landmark);
       m.values = {z[0], z[1]};
     }
   }
-  const Found found = Solve(MapSystem(InverseDepthPixels(kPixelSigma), options), problem.frames);
+  const Found found = Solve(MapSystem(InverseDepthPixels(kPixelSigma), options), map.frames);
   ASSERT_FALSE(found.failed) << found.events.back().text;
-  const VectorXd error = problem.Solution(found) - problem.truth;
+  const VectorXd error = map.Solution(found) - map.truth;
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_EQ(found.Landmark(0).covariance.norm(), 0.0);
 }

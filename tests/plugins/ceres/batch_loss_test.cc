@@ -20,8 +20,8 @@ struct Solution {
   double cost = 0.0;
 };
 
-Solution SmoothOver(const System& system, const std::vector<Frame>& frames) {
-  const auto batch = MakeBatch(system);
+Solution SmoothOver(const Problem& problem, const std::vector<Frame>& frames) {
+  const auto batch = MakeBatch(problem);
   for (const Frame& frame : frames) batch->Process(frame);
   Solution found;
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
@@ -40,11 +40,11 @@ Solution SmoothOver(const System& system, const std::vector<Frame>& frames) {
 constexpr double kGain = 2.0, kSigma = 0.3, kAcceleration = 0.7, kStep = 0.05;
 
 /// A moving point with a linear sensor: p.x ~ N(1, 2^2), p.v ~ N(-0.5, 3^2).
-System PointWith(const RobustLoss& loss) {
-  System system = testing::MovingPoint(kAcceleration);
-  AddSensor(system, "z", testing::LinearSensor(kGain, kSigma), {"p.x"});
-  system.sensors[0].loss = loss;
-  return system;
+Problem PointWith(const RobustLoss& loss) {
+  Problem problem = testing::MovingPoint(kAcceleration);
+  AddSensor(problem, "z", testing::LinearSensor(kGain, kSigma), {"p.x"});
+  problem.sensors[0].loss = loss;
+  return problem;
 }
 
 /// 2 cos t with a wobble of 0.3 m, and every ninth 4 m off.
@@ -123,11 +123,11 @@ TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
 
 // The estimate of the last frame is the same, be it smoothed or solved for at that frame.
 TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
-  const System system = PointWith({LossKind::kHuber, 1.345});
+  const Problem problem = PointWith({LossKind::kHuber, 1.345});
   const std::vector<Frame> frames = FramesWithOutliers(30);
-  const auto batch = MakeBatch(system, "mode: filtering\n");
+  const auto batch = MakeBatch(problem, "mode: filtering\n");
   for (const Frame& frame : frames) batch->Process(frame);
-  const Solution smoothed = SmoothOver(system, frames);
+  const Solution smoothed = SmoothOver(problem, frames);
   EXPECT_NEAR(testing::ValueOf(batch->state(), "p.x"), smoothed.x.back()(0), 1e-8);
   EXPECT_NEAR(testing::CovarianceOf(batch->state(), "p.x", "p.v"), smoothed.p.back()(0, 1), 1e-8);
 }
@@ -135,15 +135,15 @@ TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
 // Two values that contradict each other cost 1e11 wherever the point is, so that the solver's end,
 // at 1e-14 of the cost, comes early, and much is left to the weights.
 TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
-  System system = PointWith({LossKind::kHuber, 0.3});
-  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
-  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
+  Problem problem = PointWith({LossKind::kHuber, 0.3});
+  testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(problem, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
   std::vector<Frame> frames = FramesWithOutliers(60);
   frames[0].measurements.push_back({frames[0].timestamp, 1, -1, {1e5}, {}});
   frames[1].measurements.push_back({frames[1].timestamp, 1, -1, {-1e5}, {}});
   std::vector<std::string> said;
   const auto last_of = [&](const std::string& options) {
-    const auto batch = MakeBatch(system, options);
+    const auto batch = MakeBatch(problem, options);
     double x = 0.0;
     const auto note = [&](const State& state, const UpdateReport& report) {
       x = testing::ValueOf(state, "p.x");
@@ -181,10 +181,10 @@ TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
 
 // Its square is beyond any number: the cost is no cost.
 TEST(CeresBatchLoss, AResidualWithoutAFiniteSquareIsNoSolution) {
-  const System system = PointWith({LossKind::kCauchy, 2.0});
+  const Problem problem = PointWith({LossKind::kCauchy, 2.0});
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
-  const auto batch =
-      CreateEstimator(Shipped(), "ceres_batch", config.root())(system, testing::StreamsOf(system));
+  const auto batch = CreateEstimator(Shipped(), "ceres_batch", config.root())(
+      problem, testing::StreamsOf(problem));
   double t_s = 0.0;
   for (const double z : {1.0, 1e160, 1.2}) batch->Process(FrameAt(t_s += 0.1, {{0, z}}));
   std::string said;
@@ -230,13 +230,13 @@ struct DirectPair : Sensor<Vec<2>, Vec<2>> {
 // d^2 = r' R^-1 r of both elements together, R correlated and of each measurement itself.
 TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   const RobustLoss loss{LossKind::kHuber, 1.5};
-  System system;
+  Problem problem;
   const SharedMotion still = MakeMotion(StillPair(), "still");
-  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
-  system.motions.push_back({"p", still, {id}});
-  system.priors.push_back({id, {0.0, 0.0}, 4.0 * Eigen::Matrix2d::Identity(), ""});
-  AddSensor(system, "z", MakeSensor(DirectPair(), "pair"), {"p.x"});
-  system.sensors[0].loss = loss;
+  const BlockId id = problem.layout.Declare("p.x", "p", still->blocks()[0]);
+  problem.motions.push_back({"p", still, {id}});
+  problem.priors.push_back({id, {0.0, 0.0}, 4.0 * Eigen::Matrix2d::Identity(), ""});
+  AddSensor(problem, "z", MakeSensor(DirectPair(), "pair"), {"p.x"});
+  problem.sensors[0].loss = loss;
   const std::vector<Eigen::Vector2d> z = {{1.0, 2.0}, {1.4, 1.8}, {0.8, 2.3}, {4.0, 3.5}};
   std::vector<Frame> frames;
   Eigen::Matrix2d r;
@@ -259,7 +259,7 @@ TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
     }
     x = information.llt().solve(right);
   }
-  const Solution found = SmoothOver(system, frames);
+  const Solution found = SmoothOver(problem, frames);
   EXPECT_LT((found.x[0] - x).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LT((found.p[0] * information - Eigen::Matrix2d::Identity()).cwiseAbs().maxCoeff(), 1e-8);
 }

@@ -16,19 +16,19 @@ using testing::FrameAt;
 constexpr double kScale = 2.0, kNoise = 0.3;
 
 /// A constant p.x, seen by a linear sensor.
-System ConstantSystem(BlockStatus status) {
-  System system;
+Problem ConstantSystem(BlockStatus status) {
+  Problem problem;
   const SharedMotion still = MakeMotion(Constant<>(1), "constant");
-  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0], status);
-  system.motions.push_back({"p", still, {id}});
-  system.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
-  testing::AddSensor(system, "z", testing::LinearSensor(kScale, kNoise), {"p.x"});
-  return system;
+  const BlockId id = problem.layout.Declare("p.x", "p", still->blocks()[0], status);
+  problem.motions.push_back({"p", still, {id}});
+  problem.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
+  testing::AddSensor(problem, "z", testing::LinearSensor(kScale, kNoise), {"p.x"});
+  return problem;
 }
-System StartsFromItsSensor() {
-  System system = ConstantSystem(BlockStatus::kEstimated);
-  system.priors[0].from = "z";
-  return system;
+Problem StartsFromItsSensor() {
+  Problem problem = ConstantSystem(BlockStatus::kEstimated);
+  problem.priors[0].from = "z";
+  return problem;
 }
 
 /// The estimates, those of each frame or of a smoother, and what the events say.
@@ -37,12 +37,12 @@ struct Estimated {
   std::string said;
 };
 
-Estimated Estimate(const std::string& options, const System& system,
+Estimated Estimate(const std::string& options, const Problem& problem,
                    const std::vector<Frame>& frames) {
   const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
   const std::string type = config.root().At("type").Text();
-  const auto estimator =
-      CreateEstimator(testing::Shipped(), type, config.root())(system, testing::StreamsOf(system));
+  const auto estimator = CreateEstimator(testing::Shipped(), type, config.root())(
+      problem, testing::StreamsOf(problem));
   Estimated result;
   const auto note = [&](const State& state, const UpdateReport& report) {
     result.states.push_back(state);
@@ -88,14 +88,14 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
 
 // Their model has noise, of which nothing is seen.
 TEST(CeresBatchNoInputs, AllBlocksMayBeConstantThoughTheyMove) {
-  const System system = testing::WithStatus(testing::DepthFilter(), "", BlockStatus::kConstant);
+  const Problem problem = testing::WithStatus(testing::DepthFilter(), "", BlockStatus::kConstant);
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.1, {{0, 80.0}}),
                                      FrameAt(0.4, {{0, 80.0}}), FrameAt(0.5, {{0, 80.0}})};
   for (const std::string& options : kAll) {
     SCOPED_TRACE(options);
-    const std::vector<State> found = Estimate(options, system, frames).states;
+    const std::vector<State> found = Estimate(options, problem, frames).states;
     EXPECT_EQ(found.back().covariance().size(), 0);
-    EXPECT_NEAR(*found.back().value(0), system.priors[0].mean[0], 0.5);
+    EXPECT_NEAR(*found.back().value(0), problem.priors[0].mean[0], 0.5);
   }
 }
 
@@ -112,25 +112,25 @@ TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
 TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
                                      FrameAt(0.3, {{0, 4.2}})};
-  System system = ConstantSystem(BlockStatus::kConstant);
+  Problem problem = ConstantSystem(BlockStatus::kConstant);
   for (const std::string& options : kAll) {
-    const Estimated found = Estimate(options, system, frames);
+    const Estimated found = Estimate(options, problem, frames);
     for (const State& state : found.states) EXPECT_EQ(*state.value(0), 1.5) << options;
     const bool tells = options == "ceres_batch";
     EXPECT_EQ(found.said, tells ? "cost 10.5, 0 iterations in 1 solve: converged" : "") << options;
   }
-  system.sensors[0].loss = {LossKind::kHuber, 1.0};  // rho = 0.5, 1.5 and 3.5
-  EXPECT_EQ(Estimate("ceres_batch", system, frames).said,
+  problem.sensors[0].loss = {LossKind::kHuber, 1.0};  // rho = 0.5, 1.5 and 3.5
+  EXPECT_EQ(Estimate("ceres_batch", problem, frames).said,
             "cost 5.5, 0 iterations in 1 solve: converged");
 }
 
 // Offsets from a camera that stands still: each point is their mean.
 TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
-  System system = testing::MapSystem(testing::Offset(kNoise), {});
-  system.layout = {};
-  system.motions[0].model = MakeMotion(Constant<>(3), "constant");
-  const Space place = system.motions[0].model->blocks()[0];
-  system.layout.Declare("cam.position", "cam", place, BlockStatus::kConstant);
+  Problem problem = testing::MapSystem(testing::Offset(kNoise), {});
+  problem.layout = {};
+  problem.motions[0].model = MakeMotion(Constant<>(3), "constant");
+  const Space place = problem.motions[0].model->blocks()[0];
+  problem.layout.Declare("cam.position", "cam", place, BlockStatus::kConstant);
   std::vector<Frame> frames;
   for (int k = 0; k < 4; ++k) {
     frames.push_back(testing::FrameOf(0.1 * k, {{0, {1.0 + 0.1 * k, 2.0, 3.0}}}));
@@ -139,7 +139,7 @@ TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
     SCOPED_TRACE(options);
     const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
     const auto batch = CreateEstimator(testing::Shipped(), "ceres_batch", config.root())(
-        system, testing::StreamsOf(system));
+        problem, testing::StreamsOf(problem));
     for (const Frame& frame : frames) batch->Process(frame);
     if (batch->offline()) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
     ASSERT_FALSE(batch->failed());

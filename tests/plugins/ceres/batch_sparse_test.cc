@@ -82,18 +82,18 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
 }
 
 /// The dense solver goes on below Ceres' tolerances where there is a loss: one that is none.
-System WithLoss(System system) {
-  for (SensorBinding& sensor : system.sensors) {
+Problem WithLoss(Problem problem) {
+  for (SensorBinding& sensor : problem.sensors) {
     if (sensor.loss.kind == LossKind::kNone) sensor.loss = {LossKind::kHuber, 1e9};
   }
-  return system;
+  return problem;
 }
 
-void ExpectBothSolve(const System& system, const std::vector<Frame>& frames,
+void ExpectBothSolve(const Problem& problem, const std::vector<Frame>& frames,
                      const std::string& options = "", double states = kStates,
                      double covariances = kCovariances) {
-  ExpectSame(testing::Solve(system, frames, "solver: sparse\n" + options),
-             testing::Solve(WithLoss(system), frames, "solver: dense\n" + options), states,
+  ExpectSame(testing::Solve(problem, frames, "solver: sparse\n" + options),
+             testing::Solve(WithLoss(problem), frames, "solver: dense\n" + options), states,
              covariances);
 }
 
@@ -106,8 +106,8 @@ std::vector<Frame> Wobble(int count) {
   return frames;
 }
 
-void SetPrior(System& system, std::size_t prior, double sigma) {
-  system.priors[prior].covariance.setConstant(sigma * sigma);
+void SetPrior(Problem& problem, std::size_t prior, double sigma) {
+  problem.priors[prior].covariance.setConstant(sigma * sigma);
 }
 
 /// The two batches of a config, over its whole source.
@@ -144,11 +144,11 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
     for (const double sigma_x : {2.0, 0.0}) {
       for (const double sigma_v : {3.0, 0.0}) {
         SCOPED_TRACE(::testing::Message() << acceleration << ' ' << sigma_x << ' ' << sigma_v);
-        System system = testing::MovingPoint(acceleration);
-        testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-        SetPrior(system, 0, sigma_x);
-        SetPrior(system, 1, sigma_v);
-        ExpectBothSolve(system, Wobble(60));
+        Problem problem = testing::MovingPoint(acceleration);
+        testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+        SetPrior(problem, 0, sigma_x);
+        SetPrior(problem, 1, sigma_v);
+        ExpectBothSolve(problem, Wobble(60));
       }
     }
   }
@@ -157,35 +157,35 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
 // The covariance of the first rate is 1e10 times smaller than its prior's, which is not to be taken
 // as the difference of two such.
 TEST(SparseBatch, AVagueStartCostsNoDigits) {
-  System system = testing::LinearSystem();
-  for (std::size_t i = 0; i < system.priors.size(); ++i) SetPrior(system, i, 1e4);
-  ExpectBothSolve(system, Wobble(60));
+  Problem problem = testing::LinearSystem();
+  for (std::size_t i = 0; i < problem.priors.size(); ++i) SetPrior(problem, i, 1e4);
+  ExpectBothSolve(problem, Wobble(60));
 }
 
 TEST(SparseBatch, WhereAllIsKnownNothingIsSolved) {
-  System system;
-  testing::AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.0, 0.0}});
-  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  system = testing::WithStatus(system, "p.x", BlockStatus::kConstant);
-  const Found found = testing::Solve(system, Wobble(5), "solver: sparse\n");
+  Problem problem;
+  testing::AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.0, 0.0}});
+  testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  problem = testing::WithStatus(problem, "p.x", BlockStatus::kConstant);
+  const Found found = testing::Solve(problem, Wobble(5), "solver: sparse\n");
   ASSERT_FALSE(found.failed);
   EXPECT_EQ(testing::ValueOf(found.states.back(), "p.x"), 2.0);
 }
 
 // The noise is held over frames without a measurement: they lie inside a node.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
-  System system = testing::HeldPoint(0.7);
-  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  Problem problem = testing::HeldPoint(0.7);
+  testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   std::vector<Frame> frames = Wobble(50);
   for (std::size_t k = 0; k < frames.size(); ++k) {
     if (k % 5 != 2) frames[k].measurements.clear();
   }
-  ExpectBothSolve(system, frames);
-  ExpectBothSolve(system, frames, "max_dt_s: 0.02\n");
+  ExpectBothSolve(problem, frames);
+  ExpectBothSolve(problem, frames, "max_dt_s: 0.02\n");
 }
 
 TEST(SparseBatch, SolvesOnManifolds) {
-  const System system = testing::WalkingOrientation();
+  const Problem problem = testing::WalkingOrientation();
   std::vector<Frame> frames;
   for (int k = 0; k < 80; ++k) {
     Frame frame = FrameAt(0.05 * k, {});
@@ -198,7 +198,7 @@ TEST(SparseBatch, SolvesOnManifolds) {
                                   {}});
     frames.push_back(frame);
   }
-  ExpectBothSolve(system, frames);
+  ExpectBothSolve(problem, frames);
 }
 
 TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
@@ -213,7 +213,7 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
 /// A body with an inertial unit at 100 Hz and a position, +- 0.1 m, at 2 Hz: the readings of a
 /// path that the model makes from its own readings, with biases and noise.
 struct InertialRun {
-  System system;
+  Problem problem;
   std::vector<Frame> frames;
   Eigen::Vector3d position = Eigen::Vector3d::Zero(), bias{0.1, -0.05, 0.08};
 
@@ -223,16 +223,17 @@ struct InertialRun {
     const double sigmas[] = {0.1, 0.1, 0.02, 0.1, 0.01};
     for (std::size_t i = 0; i < 5; ++i) {
       binding.blocks.push_back(
-          system.layout.Declare("b." + model->blocks()[i].name, "b", model->blocks()[i]));
+          problem.layout.Declare("b." + model->blocks()[i].name, "b", model->blocks()[i]));
       Prior prior;
       prior.block = binding.blocks.back();
       prior.mean.assign(static_cast<std::size_t>(model->blocks()[i].geometry.ambient), 0.0);
       if (i == 2) prior.mean[0] = 1.0;
       prior.covariance = sigmas[i] * sigmas[i] * Eigen::Matrix3d::Identity();
-      system.priors.push_back(prior);
+      problem.priors.push_back(prior);
     }
-    system.motions.push_back(binding);
-    testing::AddSensor(system, "fix", MakeSensor(testing::Position3(), "position"), {"b.position"});
+    problem.motions.push_back(binding);
+    testing::AddSensor(problem, "fix", MakeSensor(testing::Position3(), "position"),
+                       {"b.position"});
     Random random(9);
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
     Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
@@ -267,7 +268,7 @@ struct InertialRun {
   Found Solve(const std::string& options) const {
     const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
     const auto batch = CreateEstimator(Shipped(), "ceres_batch", config.root())(
-        WithLoss(system), {{"fix", 3}, {"readings", 6}});
+        WithLoss(problem), {{"fix", 3}, {"readings", 6}});
     return testing::Solve(*batch, frames);
   }
 };
@@ -331,9 +332,9 @@ TEST(SparseBatch, ConvergesFarFromTheOrigin) {
 }
 
 TEST(SparseBatch, SolvesWithLandmarks) {
-  const testing::Problem problem(12, 15);
-  ExpectBothSolve(problem.Filter(), problem.frames);
-  problem.ExpectSolved(testing::Solve(problem.Filter(), problem.frames, "solver: sparse\n"));
+  const testing::MapProblem map(12, 15);
+  ExpectBothSolve(map.Filter(), map.frames);
+  map.ExpectSolved(testing::Solve(map.Filter(), map.frames, "solver: sparse\n"));
 }
 
 TEST(SparseBatch, SolvesTheSlamExamples) {
@@ -402,11 +403,11 @@ TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
 
 // Every frame's estimate of the data so far.
 TEST(SparseBatch, SolvesForTheDataSoFar) {
-  const testing::Problem problem(8, 10);
-  const System system = problem.Filter();
-  const auto sparse = MakeBatch(system, "mode: filtering\nsolver: sparse\n"),
-             dense = MakeBatch(WithLoss(system), "mode: filtering\nsolver: dense\n");
-  for (const Frame& frame : problem.frames) {
+  const testing::MapProblem map(8, 10);
+  const Problem problem = map.Filter();
+  const auto sparse = MakeBatch(problem, "mode: filtering\nsolver: sparse\n"),
+             dense = MakeBatch(WithLoss(problem), "mode: filtering\nsolver: dense\n");
+  for (const Frame& frame : map.frames) {
     sparse->Process(frame);
     dense->Process(frame);
     ASSERT_FALSE(sparse->failed());
@@ -422,25 +423,25 @@ TEST(SparseBatch, SolvesForTheDataSoFar) {
 TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {
     SCOPED_TRACE(ToString(loss.kind));
-    System system = testing::MovingPoint(0.7);
-    testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-    system.sensors[0].loss = loss;
+    Problem problem = testing::MovingPoint(0.7);
+    testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+    problem.sensors[0].loss = loss;
     std::vector<Frame> frames = Wobble(80);
     for (std::size_t k = 0; k < frames.size(); ++k) {
       if (k % 20 == 4) frames[k].measurements[0].values[0] += 5.0;
     }
-    ExpectBothSolve(system, frames);
-    testing::Problem problem(12, 15, 20);
-    problem.loss = loss;
-    ExpectBothSolve(problem.Filter(), problem.frames);
+    ExpectBothSolve(problem, frames);
+    testing::MapProblem map(12, 15, 20);
+    map.loss = loss;
+    ExpectBothSolve(map.Filter(), map.frames);
   }
 }
 
 // The states are rolled out by the models: x' = x + v dt + a dt^2 / 2, v' = v + a dt for some a.
 TEST(SparseBatch, TheMotionHoldsToRounding) {
-  System system = testing::HeldPoint(0.7);
-  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
-  const Found found = testing::Solve(system, Wobble(300), "solver: sparse\n");
+  Problem problem = testing::HeldPoint(0.7);
+  testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  const Found found = testing::Solve(problem, Wobble(300), "solver: sparse\n");
   ASSERT_EQ(found.states.size(), 300u);
   for (std::size_t k = 1; k < found.states.size(); ++k) {
     const std::vector<double>&a = found.states[k - 1].values(), &b = found.states[k].values();
@@ -451,12 +452,12 @@ TEST(SparseBatch, TheMotionHoldsToRounding) {
 
 // 5002 inputs, more than a dense system may have; a Kalman filter has the last estimate too.
 TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
-  const System system = testing::LinearSystem();
+  const Problem problem = testing::LinearSystem();
   const std::vector<Frame> frames = Wobble(5001);
-  const Found found = testing::Solve(system, frames);
+  const Found found = testing::Solve(problem, frames);
   ASSERT_FALSE(found.failed);
   EXPECT_NE(found.events.back().text.find("converged; sparse"), std::string::npos);
-  Ekf ekf(system, {.gate = 1.0}, testing::StreamsOf(system));
+  Ekf ekf(problem, {.gate = 1.0}, testing::StreamsOf(problem));
   for (const Frame& frame : frames) ekf.Process(frame);
   for (const char* block : {"p.x", "p.v"}) {
     EXPECT_NEAR(testing::ValueOf(found.states.back(), block), testing::ValueOf(ekf.state(), block),
@@ -464,7 +465,7 @@ TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
     EXPECT_NEAR(testing::CovarianceOf(found.states.back(), block, block),
                 testing::CovarianceOf(ekf.state(), block, block), 1e-9);
   }
-  EXPECT_EQ(testing::Solve(system, Wobble(20)).events.back().text.find("sparse"),
+  EXPECT_EQ(testing::Solve(problem, Wobble(20)).events.back().text.find("sparse"),
             std::string::npos);
 }
 

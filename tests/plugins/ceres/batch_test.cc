@@ -179,21 +179,21 @@ TEST(CeresBatch, GivesTheSameBytesTwice) {
 }
 
 TEST(CeresBatch, EndsWhereTheKalmanFilterDoes) {
-  const System system = LinearSystem();
+  const Problem problem = LinearSystem();
   const std::vector<Frame> frames = LinearFrames(60);
-  const Smoothed found = SmoothOver(*MakeBatch(system), frames);
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const Smoothed found = SmoothOver(*MakeBatch(problem), frames);
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   for (const Frame& frame : frames) ekf.Process(frame);
   EXPECT_LT((found.x.back() - ValuesOf(ekf.state())).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LT((found.p.back() - ekf.state().covariance().Dense()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
-// On a linear problem the full-information filter is the Kalman filter, at every frame.
+// On a linear system the full-information filter is the Kalman filter, at every frame.
 TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
-  const System system = LinearSystem();
-  const auto batch = MakeBatch(system, "mode: filtering\n");
+  const Problem problem = LinearSystem();
+  const auto batch = MakeBatch(problem, "mode: filtering\n");
   EXPECT_FALSE(batch->offline());
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   for (const Frame& frame : LinearFrames(40)) {
     const UpdateReport& report = batch->Process(frame);
     EXPECT_EQ(report.measurements().size(), frame.measurements.size());
@@ -208,13 +208,13 @@ TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
 }
 
 TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
-  const System system = LinearSystem();
+  const Problem problem = LinearSystem();
   const auto expect_equal = [&](const std::vector<Frame>& frames, double max_dt_s) {
-    const auto batch = MakeBatch(system, "max_dt_s: " + std::to_string(max_dt_s));
+    const auto batch = MakeBatch(problem, "max_dt_s: " + std::to_string(max_dt_s));
     const Smoothed found = SmoothOver(*batch, frames);
     EkfOptions options;
     options.max_dt_s = max_dt_s;
-    Ekf ekf(system, options, testing::StreamsOf(system));
+    Ekf ekf(problem, options, testing::StreamsOf(problem));
     for (const Frame& frame : frames) ekf.Process(frame);
     EXPECT_LT((found.x.back() - ValuesOf(ekf.state())).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_LT((found.p.back() - ekf.state().covariance().Dense()).cwiseAbs().maxCoeff(), 1e-9);
@@ -229,14 +229,14 @@ TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
 // The first value of p.x comes from the third frame; the Kalman filter has the same, and its
 // correlation.
 TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
-  System system = LinearSystem();
-  system.priors[0].from = "z";
+  Problem problem = LinearSystem();
+  problem.priors[0].from = "z";
   std::vector<Frame> frames = LinearFrames(30);
   frames[0].measurements.clear();
   frames[1].measurements.clear();
-  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "mode: filtering\n");
-  const BlockId x = system.layout.Find("p.x");
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const auto batch = MakeBatch(problem), so_far = MakeBatch(problem, "mode: filtering\n");
+  const BlockId x = problem.layout.Find("p.x");
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   const auto expect_equal = [&](const State& found, const State& expected, std::size_t k) {
     ASSERT_EQ(found.layout()[x].present, k >= 2);
     for (const char* block : {"p.v", "p.x"}) {
@@ -266,7 +266,7 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
 
 // A block that is known for certain stays: its sigma is zero and nothing moves it, or it is fixed.
 TEST(CeresBatch, WhatIsKnownStays) {
-  System zero = LinearSystem();
+  Problem zero = LinearSystem();
   zero.priors[1].covariance.setZero();
   zero.motions[0].model = MakeMotion(ConstantVelocity<1, false>(0.0), "constant_velocity");
   const std::vector<Frame> frames = LinearFrames(30);
@@ -274,9 +274,9 @@ TEST(CeresBatch, WhatIsKnownStays) {
   EXPECT_DOUBLE_EQ(known.x.back()(1), -0.5);
   EXPECT_DOUBLE_EQ(known.p.back()(1, 1), 0.0);
 
-  const System moving = LinearSystem();
+  const Problem moving = LinearSystem();
   const SharedMotion& model = moving.motions[0].model;
-  System fixed;
+  Problem fixed;
   MotionBinding binding{"p", model, {}};
   binding.blocks = {fixed.layout.Declare("p.x", "p", model->blocks()[0]),
                     fixed.layout.Declare("p.v", "p", model->blocks()[1], BlockStatus::kConstant)};
@@ -311,13 +311,13 @@ template <class G>
 void ExpectStationary(const Geometry& geometry) {
   std::vector<double> mean(G::kAmbient), x(G::kAmbient);
   geometry.Identity(mean.data());
-  System system;
+  Problem problem;
   const SharedMotion still = MakeMotion(Still<G>(), "still");
-  const BlockId id = system.layout.Declare("p.x", "p", still->blocks()[0]);
-  system.motions.push_back({"p", still, {id}});
+  const BlockId id = problem.layout.Declare("p.x", "p", still->blocks()[0]);
+  problem.motions.push_back({"p", still, {id}});
   const int t = geometry.tangent;
-  system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
+  problem.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
+  AddSensor(problem, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   std::vector<Frame> frames;
   for (int k = 0; k < 3; ++k) {  // far from the mean and from one another
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};
@@ -325,7 +325,7 @@ void ExpectStationary(const Geometry& geometry) {
     geometry.Plus(mean.data(), d, m.values.data());
     frames.push_back({m.timestamp, {m}});
   }
-  const Smoothed found = SmoothOver(*MakeBatch(system), frames);
+  const Smoothed found = SmoothOver(*MakeBatch(problem), frames);
   ASSERT_EQ(found.x.size(), 3u);
   std::copy_n(found.x[0].data(), G::kAmbient, x.data());
   EXPECT_NEAR(DistanceFrom(geometry, x.data()), 0.0, 1e-12);

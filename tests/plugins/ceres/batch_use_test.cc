@@ -36,7 +36,7 @@ class WithOutliers : public SwingingTarget {
 
 /// A batch that tells its estimates.
 struct Told : Estimator {
-  explicit Told(const System& system) : batch(testing::MakeBatch(system)) {}
+  explicit Told(const Problem& problem) : batch(testing::MakeBatch(problem)) {}
   void Start(Timestamp timestamp) override { batch->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override { return batch->Process(frame); }
   bool offline() const override { return true; }
@@ -61,14 +61,14 @@ struct Told : Estimator {
 Experiment MakeWithBatch(bool outliers, bool accepted) {
   Experiment experiment;
   experiment.source = std::make_unique<WithOutliers>(outliers);
-  const System system = testing::DepthFilter();
+  const Problem problem = testing::DepthFilter();
   EkfOptions options;
   options.gate = 0.9999;
-  auto ekf = std::make_unique<Ekf>(system, options, testing::StreamsOf(system));
-  experiment.estimators.push_back({"ekf", "ekf", EstimatorKind::kFilter, system, std::move(ekf),
+  auto ekf = std::make_unique<Ekf>(problem, options, testing::StreamsOf(problem));
+  experiment.estimators.push_back({"ekf", "ekf", EstimatorKind::kFilter, problem, std::move(ekf),
                                    OnDivergence::kReport, OnPluginFailure::kSkip, ""});
-  experiment.estimators.push_back({"batch", "ceres_batch", EstimatorKind::kBatch, system,
-                                   std::make_unique<Told>(system), OnDivergence::kReport,
+  experiment.estimators.push_back({"batch", "ceres_batch", EstimatorKind::kBatch, problem,
+                                   std::make_unique<Told>(problem), OnDivergence::kReport,
                                    OnPluginFailure::kSkip, ""});
   if (accepted) experiment.estimators[1].accepted_by = 0;
   return experiment;

@@ -16,9 +16,9 @@ using testing::kRho;
 using testing::kRhoSigma;
 using testing::MakeBatch;
 using testing::MakeFixedLag;
+using testing::MapProblem;
 using testing::MapSystem;
 using testing::Observation;
-using testing::Problem;
 using testing::Solve;
 
 /// Whether two covariances, and what they are of, agree to so many sigmas.
@@ -50,10 +50,10 @@ void ExpectNear(const Estimator& found, const Estimator& expected, double sigmas
 }
 
 TEST(FixedLagLandmarks, OverAllFramesIsTheBatchOfTheDataSoFar) {
-  const Problem problem(20, 12);
-  const auto lag = MakeFixedLag(problem.Filter(), "lag_s: 1e12\n");
-  const auto batch = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
-  for (const Frame& frame : problem.frames) {
+  const MapProblem map(20, 12);
+  const auto lag = MakeFixedLag(map.Filter(), "lag_s: 1e12\n");
+  const auto batch = MakeBatch(map.Filter(), "mode: filtering\nsolver: sparse\n");
+  for (const Frame& frame : map.frames) {
     lag->Process(frame);
     batch->Process(frame);
     ExpectNear(*lag, *batch, 1e-8, std::to_string(frame.timestamp));
@@ -63,7 +63,7 @@ TEST(FixedLagLandmarks, OverAllFramesIsTheBatchOfTheDataSoFar) {
 
 /// Offsets to points that come and go, two of them known to 0.2 m and one exactly.
 struct LinearMap {
-  System system;
+  Problem problem;
   std::vector<Frame> frames;
 
   explicit LinearMap(int steps) {
@@ -93,15 +93,15 @@ struct LinearMap {
       }
       frames.push_back(FrameOf(0.1 * k, observations));
     }
-    system = MapSystem(testing::Offset(kNoise), options, kStart);
+    problem = MapSystem(testing::Offset(kNoise), options, kStart);
   }
 };
 
 TEST(FixedLagLandmarks, OfALinearMapIsTheKalmanFilterWhateverTheWindow) {
   const LinearMap map(60);
   for (const char* const options : {"lag_s: 0.25\n", "lag_s: 0.04\n", "lag_s: 1.3\n"}) {
-    const auto lag = MakeFixedLag(map.system, options);
-    Ekf ekf = testing::EkfOf(map.system);
+    const auto lag = MakeFixedLag(map.problem, options);
+    Ekf ekf = testing::EkfOf(map.problem);
     int generations = 0;
     for (const Frame& frame : map.frames) {
       lag->Process(frame);
@@ -123,17 +123,17 @@ std::vector<Frame> WithLateFrame(std::vector<Frame> frames) {
 }
 
 /// What leaves is linearised at the solution of all data: it loses nothing.
-void ExpectNothingIsLost(const System& system, const std::vector<Frame>& frames) {
+void ExpectNothingIsLost(const Problem& problem, const std::vector<Frame>& frames) {
   const std::vector<Frame> all = WithLateFrame(frames);
-  const auto batch = MakeBatch(system, "solver: sparse\n");
+  const auto batch = MakeBatch(problem, "solver: sparse\n");
   const Found smoothed = Solve(*batch, all);
   ASSERT_FALSE(smoothed.failed);
-  const auto lag = MakeFixedLag(system, "lag_s: 50\n");
+  const auto lag = MakeFixedLag(problem, "lag_s: 50\n");
   for (const Frame& frame : all) lag->Process(frame);
   ASSERT_FALSE(lag->failed());
   ExpectNear(*lag, *batch, 1e-7, "current");
 
-  const auto lagged = MakeFixedLag(system, "lag_s: 50\noutput: lagged\n");
+  const auto lagged = MakeFixedLag(problem, "lag_s: 50\noutput: lagged\n");
   const Found later = Solve(*lagged, all);
   ASSERT_FALSE(later.failed);
   ASSERT_EQ(later.states.size(), all.size());
@@ -145,54 +145,54 @@ void ExpectNothingIsLost(const System& system, const std::vector<Frame>& frames)
 }
 
 TEST(FixedLagLandmarks, WhatLeavesAtTheSolutionOfAllDataLosesNothing) {
-  const Problem problem(25, 12);
-  ExpectNothingIsLost(problem.Filter(), problem.frames);
+  const MapProblem map(25, 12);
+  ExpectNothingIsLost(map.Filter(), map.frames);
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
   ExpectNothingIsLost(MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(kPixel), options, 0.1),
-                      problem.frames);
-  ExpectNothingIsLost(MapSystem(testing::AnchoredPixels<0>(kPixel), options), problem.frames);
+                      map.frames);
+  ExpectNothingIsLost(MapSystem(testing::AnchoredPixels<0>(kPixel), options), map.frames);
   for (int i = 0; i < 4; ++i) {
-    const Vector3d p = problem.Point(problem.truth, i);
+    const Vector3d p = map.Point(map.truth, i);
     options.known.push_back({i, {p[0], p[1], p[2]}, i < 2 ? 0.0 : 0.05});
   }
-  ExpectNothingIsLost(MapSystem(testing::InverseDepthPixels(kPixel), options), problem.frames);
+  ExpectNothingIsLost(MapSystem(testing::InverseDepthPixels(kPixel), options), map.frames);
 }
 
 TEST(FixedLagLandmarks, WhatLeavesHasTheWeightOfTheSolution) {
-  Problem problem(25, 12, 23);
-  problem.loss = {LossKind::kHuber, 1.5};
-  ExpectNothingIsLost(problem.Filter(), problem.frames);
+  MapProblem map(25, 12, 23);
+  map.loss = {LossKind::kHuber, 1.5};
+  ExpectNothingIsLost(map.Filter(), map.frames);
 }
 
 /// How far the estimates of the newest frames are from those of the batch of the data so far, in
 /// the mean, in its sigmas.
-double MeanDistance(Estimator& filter, const Problem& problem, const std::vector<State>& batch) {
+double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<State>& batch) {
   double sum = 0.0;
-  for (std::size_t k = 0; k < problem.frames.size(); ++k) {
-    filter.Process(problem.frames[k]);
+  for (std::size_t k = 0; k < map.frames.size(); ++k) {
+    filter.Process(map.frames[k]);
     if (k == 0) continue;  // known exactly
     const Eigen::Map<const Vector3d> expected(batch[k].values().data());
     const Vector3d apart = testing::PositionOf(filter) - expected;
     sum += std::sqrt(apart.dot(batch[k].covariance().Dense().ldlt().solve(apart)));
   }
   EXPECT_FALSE(filter.failed());
-  return sum / static_cast<double>(problem.frames.size() - 1);
+  return sum / static_cast<double>(map.frames.size() - 1);
 }
 
 // What has left is linearised where it was known less well: the later it leaves, the better.
 TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
-  const Problem problem(40, 20);
+  const MapProblem map(40, 20);
   std::vector<State> states;
-  const auto batch = MakeBatch(problem.Filter(), "mode: filtering\nsolver: sparse\n");
-  for (const Frame& frame : problem.frames) {
+  const auto batch = MakeBatch(map.Filter(), "mode: filtering\nsolver: sparse\n");
+  for (const Frame& frame : map.frames) {
     batch->Process(frame);
     states.push_back(batch->state());
   }
-  Ekf ekf = testing::EkfOf(problem.Filter());
+  Ekf ekf = testing::EkfOf(map.Filter());
   const auto of_window = [&](const std::string& lag_s) {
-    return MeanDistance(*MakeFixedLag(problem.Filter(), "lag_s: " + lag_s + "\n"), problem, states);
+    return MeanDistance(*MakeFixedLag(map.Filter(), "lag_s: " + lag_s + "\n"), map, states);
   };
-  const double filter = MeanDistance(ekf, problem, states);
+  const double filter = MeanDistance(ekf, map, states);
   const double middle = of_window("0.75"), longest = of_window("2.05");
   EXPECT_LT(middle, 0.2 * filter);
   EXPECT_LT(longest, 0.05 * filter);
@@ -206,14 +206,14 @@ TEST(FixedLagLandmarks, OnAWayAlongPointsItKnowsNoMoreThanTheFilter) {
   constexpr int kSteps = 120, kPoints = 240;
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
   options.max_missed_frames = 1;
-  const System system = MapSystem(testing::InverseDepthPixels(kPixel), options);
+  const Problem problem = MapSystem(testing::InverseDepthPixels(kPixel), options);
   Random random(3);
   std::vector<Vector3d> points;
   for (int i = 0; i < kPoints; ++i) {
     points.emplace_back(-1.0 + 0.06 * i, 0.5 * random.Normal(), 1.6 + 0.1 * (i % 9));
   }
-  const auto window = testing::MakeFixedLag(system, "lag_s: 0.45\n");
-  Ekf ekf = testing::EkfOf(system);
+  const auto window = testing::MakeFixedLag(problem, "lag_s: 0.45\n");
+  Ekf ekf = testing::EkfOf(problem);
   Vector3d r = Vector3d::Zero();
   for (int k = 0; k < kSteps; ++k) {
     std::vector<Observation> observations;

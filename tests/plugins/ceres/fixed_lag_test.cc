@@ -61,10 +61,10 @@ std::vector<Estimate> SmoothOver(Estimator& estimator, const std::vector<Frame>&
 // ---- linear -------------------------------------------------------------------------------------
 
 /// A point (process noise of rank 1), of which one sensor sees the place and one the rate.
-System LinearSystem() {
-  System system = testing::LinearSystem();
-  AddSensor(system, "rate", testing::LinearSensor(1.5, 0.8), {"p.v"});
-  return system;
+Problem LinearSystem() {
+  Problem problem = testing::LinearSystem();
+  AddSensor(problem, "rate", testing::LinearSensor(1.5, 0.8), {"p.v"});
+  return problem;
 }
 
 /// 20 frames a second; the two sensors miss some of them.
@@ -97,10 +97,10 @@ TEST(FixedLag, OverAllFramesIsTheBatchOfTheDataSoFar) {
 }
 
 /// Expects the newest estimates of a window of three frames to be those of the Kalman filter.
-void ExpectTheKalmanFilter(const System& system, const std::vector<Frame>& frames,
+void ExpectTheKalmanFilter(const Problem& problem, const std::vector<Frame>& frames,
                            const std::string& options = kThreeFrames) {
-  const auto lag = MakeFixedLag(system, options);
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const auto lag = MakeFixedLag(problem, options);
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   for (std::size_t k = 0; k < frames.size(); ++k) {
     lag->Process(frames[k]);
     ekf.Process(frames[k]);
@@ -138,27 +138,27 @@ TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
 
 // P_0 has a zero, Q none at all: what is known stays known, exactly.
 TEST(FixedLag, WhatIsKnownStays) {
-  System system = LinearSystem();
-  system.priors[1].covariance.setZero();
-  system.motions[0].model = MakeMotion(ConstantVelocity<1, false>(0.0), "still");
-  const auto lag = MakeFixedLag(system, kThreeFrames);
+  Problem problem = LinearSystem();
+  problem.priors[1].covariance.setZero();
+  problem.motions[0].model = MakeMotion(ConstantVelocity<1, false>(0.0), "still");
+  const auto lag = MakeFixedLag(problem, kThreeFrames);
   for (const Frame& frame : LinearFrames(40)) lag->Process(frame);
   EXPECT_DOUBLE_EQ(testing::ValueOf(lag->state(), "p.v"), -0.5);
   EXPECT_DOUBLE_EQ(testing::CovarianceOf(lag->state(), "p.v", "p.v"), 0.0);
-  ExpectTheKalmanFilter(system, LinearFrames(40));
+  ExpectTheKalmanFilter(problem, LinearFrames(40));
 }
 
 // The first value of p.x comes from the third frame, after two have left no trace of it.
 TEST(FixedLag, ABlockMayStartFromAMeasurement) {
-  System system = LinearSystem();
-  system.priors[0].from = "z";
+  Problem problem = LinearSystem();
+  problem.priors[0].from = "z";
   std::vector<Frame> frames = LinearFrames(30);
   for (std::size_t k = 0; k < 4; ++k)
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.stream == 0; });
-  const BlockId x = system.layout.Find("p.x");
-  const auto lag = MakeFixedLag(system, kThreeFrames);
-  const auto late = MakeFixedLag(system, std::string(kThreeFrames) + "output: lagged\n");
-  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const BlockId x = problem.layout.Find("p.x");
+  const auto lag = MakeFixedLag(problem, kThreeFrames);
+  const auto late = MakeFixedLag(problem, std::string(kThreeFrames) + "output: lagged\n");
+  Ekf ekf(problem, {}, testing::StreamsOf(problem));
   for (std::size_t k = 0; k < frames.size(); ++k) {
     lag->Process(frames[k]);
     late->Process(frames[k]);
@@ -192,11 +192,11 @@ std::vector<Frame> DepthFrames(int count) {
 
 /// Whole windows leave at the last solution, and a frame that tells nothing comes: what was
 /// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
-void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames) {
+void ExpectLeavingChangesNothing(const Problem& problem, std::vector<Frame> frames) {
   const double lag_s = Seconds(frames.back().timestamp - frames.front().timestamp);
   frames.push_back({frames.back().timestamp + TimestampFromSeconds(lag_s + 0.1), {}});
-  const auto lag = MakeFixedLag(system, "lag_s: " + std::to_string(lag_s + 0.01) + "\n");
-  const auto batch = MakeBatch(system, "mode: filtering\n");
+  const auto lag = MakeFixedLag(problem, "lag_s: " + std::to_string(lag_s + 0.01) + "\n");
+  const auto batch = MakeBatch(problem, "mode: filtering\n");
   for (const Frame& frame : frames) {
     lag->Process(frame);
     batch->Process(frame);
@@ -206,26 +206,26 @@ void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames
 }
 
 TEST(FixedLag, FramesThatLeaveTakeNothingWithThem) {
-  System system = testing::DepthFilter();  // R depends on the state
-  ExpectLeavingChangesNothing(system, DepthFrames(30));
-  for (SensorBinding& sensor : system.sensors) sensor.loss = {LossKind::kHuber, 1.0};
-  ExpectLeavingChangesNothing(system, DepthFrames(30));
-  for (SensorBinding& sensor : system.sensors) sensor.loss = {LossKind::kCauchy, 2.0};
-  ExpectLeavingChangesNothing(system, DepthFrames(30));
+  Problem problem = testing::DepthFilter();  // R depends on the state
+  ExpectLeavingChangesNothing(problem, DepthFrames(30));
+  for (SensorBinding& sensor : problem.sensors) sensor.loss = {LossKind::kHuber, 1.0};
+  ExpectLeavingChangesNothing(problem, DepthFrames(30));
+  for (SensorBinding& sensor : problem.sensors) sensor.loss = {LossKind::kCauchy, 2.0};
+  ExpectLeavingChangesNothing(problem, DepthFrames(30));
 }
 
 template <class G>
-System OnManifold(const Geometry& geometry) {
-  System system;
+Problem OnManifold(const Geometry& geometry) {
+  Problem problem;
   const SharedMotion model = MakeMotion(testing::ManifoldWalk<G, 0.1>(), "wander");
-  const BlockId id = system.layout.Declare("p.x", "p", model->blocks()[0]);
-  system.motions.push_back({"p", model, {id}});
+  const BlockId id = problem.layout.Declare("p.x", "p", model->blocks()[0]);
+  problem.motions.push_back({"p", model, {id}});
   const int t = geometry.tangent;
   std::vector<double> mean(G::kAmbient);
   geometry.Identity(mean.data());
-  system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
-  return system;
+  problem.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
+  AddSensor(problem, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
+  return problem;
 }
 
 /// Measurements far from the mean and from one another.
@@ -246,10 +246,10 @@ std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
 /// its sigmas.
 template <class G>
 void ExpectNearTheBatch(const Geometry& geometry, double tolerance) {
-  const System system = OnManifold<G>(geometry);
-  ExpectLeavingChangesNothing(system, FramesOnManifold(geometry, 4));
-  const auto lag = MakeFixedLag(system, "lag_s: 0.3\n");
-  const auto batch = MakeBatch(system, "mode: filtering\n");
+  const Problem problem = OnManifold<G>(geometry);
+  ExpectLeavingChangesNothing(problem, FramesOnManifold(geometry, 4));
+  const auto lag = MakeFixedLag(problem, "lag_s: 0.3\n");
+  const auto batch = MakeBatch(problem, "mode: filtering\n");
   double worst = 0.0;
   for (const Frame& frame : FramesOnManifold(geometry, 20)) {
     lag->Process(frame);

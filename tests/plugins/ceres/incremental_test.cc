@@ -7,7 +7,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using testing::MakeBatch;
-using testing::Problem;
+using testing::MapProblem;
 
 /// How many sigmas two estimates are apart, and by how much of theirs the covariances are.
 struct Apart {
@@ -23,10 +23,11 @@ Apart Compare(const Estimator& found, const Estimator& expected) {
 }
 
 /// The largest over the frames, and of the map at their end.
-Apart LargestOf(const System& system, const std::vector<Frame>& frames, const std::string& above) {
+Apart LargestOf(const Problem& problem, const std::vector<Frame>& frames,
+                const std::string& above) {
   const auto incremental =
-      MakeBatch(system, "mode: incremental\nrelinearise_above: " + above + "\n");
-  const auto whole = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
+      MakeBatch(problem, "mode: incremental\nrelinearise_above: " + above + "\n");
+  const auto whole = MakeBatch(problem, "mode: filtering\nsolver: sparse\n");
   Apart largest;
   for (const Frame& frame : frames) {
     const UpdateReport& report = incremental->Process(frame);
@@ -55,13 +56,13 @@ Apart LargestOf(const System& system, const std::vector<Frame>& frames, const st
   return largest;
 }
 
-Apart LargestOf(const Problem& problem, const std::string& above) {
-  return LargestOf(problem.Filter(), problem.frames, above);
+Apart LargestOf(const MapProblem& map, const std::string& above) {
+  return LargestOf(map.Filter(), map.frames, above);
 }
 
 // All is linearised where it is: the whole batch of the data so far.
 TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
-  const Apart apart = LargestOf(Problem(20, 12), "1e-10");
+  const Apart apart = LargestOf(MapProblem(20, 12), "1e-10");
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
@@ -69,9 +70,9 @@ TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
 
 // Weights settle slowly in the first frames, which are solved as a whole then.
 TEST(IncrementalBatch, OfARobustLossToo) {
-  Problem problem(16, 12, 20);
-  problem.loss = {LossKind::kHuber, 1.345};
-  const Apart apart = LargestOf(problem, "1e-10");
+  MapProblem map(16, 12, 20);
+  map.loss = {LossKind::kHuber, 1.345};
+  const Apart apart = LargestOf(map, "1e-10");
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_LE(apart.whole, 2);
@@ -79,7 +80,7 @@ TEST(IncrementalBatch, OfARobustLossToo) {
 
 // What has moved by less than a share of its sigma stays: near, and not the same.
 TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
-  const Apart apart = LargestOf(Problem(20, 12), "0.03");
+  const Apart apart = LargestOf(MapProblem(20, 12), "0.03");
   EXPECT_LT(apart.state, 0.1);
   EXPECT_LT(apart.covariance, 0.05);
   EXPECT_GT(apart.state, 1e-7);
@@ -99,8 +100,8 @@ TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
     }
     frames.push_back(testing::FrameOf(0.1 * k, seen));
   }
-  const System system = testing::MapSystem(testing::Offset(0.2), LandmarkOptions(), 0.5);
-  const Apart apart = LargestOf(system, frames, "3");
+  const Problem problem = testing::MapSystem(testing::Offset(0.2), LandmarkOptions(), 0.5);
+  const Apart apart = LargestOf(problem, frames, "3");
   EXPECT_LT(apart.state, 0.01);
   EXPECT_LT(apart.covariance, 1e-8);
   EXPECT_EQ(apart.whole, 0);
@@ -108,27 +109,27 @@ TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
 
 // Landmarks that nothing has seen for a while leave the last matrix, and come back to it.
 TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
-  Problem problem(45, 9);
-  for (std::size_t k = 12; k < problem.frames.size(); ++k) {
+  MapProblem map(45, 9);
+  for (std::size_t k = 12; k < map.frames.size(); ++k) {
     const bool gone = k < 32;
-    std::erase_if(problem.frames[k].measurements, [&](const Measurement& m) {
+    std::erase_if(map.frames[k].measurements, [&](const Measurement& m) {
       return gone == (m.landmark < 5) && (gone || m.landmark > 6);
     });
   }
-  const Apart apart = LargestOf(problem, "1e-10");
+  const Apart apart = LargestOf(map, "1e-10");
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
-  EXPECT_LT(LargestOf(problem, "0.3").state, 0.5);  // what they come back to is eliminated again
+  EXPECT_LT(LargestOf(map, "0.3").state, 0.5);  // what they come back to is eliminated again
 }
 
 // The full-information filter of a linear system is the Kalman filter, at every frame.
 TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
-  const System system = testing::LinearSystem();
+  const Problem problem = testing::LinearSystem();
   for (const char* mode : {"filtering", "incremental"}) {
     SCOPED_TRACE(mode);
-    const auto batch = MakeBatch(system, std::string("mode: ") + mode + '\n');
-    Ekf filter(system, {}, testing::StreamsOf(system));
+    const auto batch = MakeBatch(problem, std::string("mode: ") + mode + '\n');
+    Ekf filter(problem, {}, testing::StreamsOf(problem));
     for (int k = 0; k < 300; ++k) {
       const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
       const UpdateReport& report = batch->Process(frame);
@@ -148,9 +149,9 @@ TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
 TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   LandmarkOptions options;
   options.known = {{0, {0.5, -0.2, 2.0}, 0.0}, {1, {-0.4, 0.1, 1.5}, 0.1}};
-  const System system = testing::MapSystem(testing::Offset(0.2), options, 0.5);
-  const auto batch = MakeBatch(system, "mode: incremental\n");
-  const auto whole = MakeBatch(system, "mode: filtering\nsolver: sparse\n");
+  const Problem problem = testing::MapSystem(testing::Offset(0.2), options, 0.5);
+  const auto batch = MakeBatch(problem, "mode: incremental\n");
+  const auto whole = MakeBatch(problem, "mode: filtering\nsolver: sparse\n");
   for (int k = 0; k < 5; ++k) {
     const double n = 0.1 * std::sin(37.0 * k);
     const Frame frame =
@@ -169,11 +170,11 @@ TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
 
 // What is known exactly has no variance, not that of rounding.
 TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
-  System system = testing::DepthFilter();
-  for (Prior& prior : system.priors) {
-    if (system.layout[prior.block].name == "template.inverse_distance") prior.covariance.setZero();
+  Problem problem = testing::DepthFilter();
+  for (Prior& prior : problem.priors) {
+    if (problem.layout[prior.block].name == "template.inverse_distance") prior.covariance.setZero();
   }
-  const auto batch = MakeBatch(system, "mode: filtering\n");
+  const auto batch = MakeBatch(problem, "mode: filtering\n");
   for (int k = 0; k < 5; ++k) {
     batch->Process(testing::FrameAt(0.1 * k, {{0, 26.0 / 0.3 + 0.1 * k}, {1, 1.0}}));
     ASSERT_FALSE(batch->failed());
@@ -185,10 +186,10 @@ TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
 
 // Steps forward in time would lose digits: all frames are solved as a whole.
 TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
-  System system = testing::LinearSystem();
-  for (Prior& prior : system.priors) prior.covariance *= 1e10;
-  const auto batch = MakeBatch(system, "mode: incremental\nrelinearise_above: 1e-9\n");
-  const auto dense = MakeBatch(system, "mode: filtering\nsolver: dense\n");
+  Problem problem = testing::LinearSystem();
+  for (Prior& prior : problem.priors) prior.covariance *= 1e10;
+  const auto batch = MakeBatch(problem, "mode: incremental\nrelinearise_above: 1e-9\n");
+  const auto dense = MakeBatch(problem, "mode: filtering\nsolver: dense\n");
   std::string said;
   for (int k = 0; k < 20; ++k) {
     const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
@@ -210,11 +211,11 @@ TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
 
 // A batch that is stopped has no map, not that of the filter that it starts from.
 TEST(CeresBatchEnds, AStoppedBatchHasNoMap) {
-  const Problem problem(6, 8);
+  const MapProblem map(6, 8);
   for (const char* solver : {"sparse", "dense"}) {
-    const auto batch = MakeBatch(problem.Filter(), std::string("solver: ") + solver + '\n');
+    const auto batch = MakeBatch(map.Filter(), std::string("solver: ") + solver + '\n');
     batch->StopWhen([] { return true; });
-    for (const Frame& frame : problem.frames) batch->Process(frame);
+    for (const Frame& frame : map.frames) batch->Process(frame);
     EXPECT_THROW(batch->Smooth([](std::size_t, const State&, const UpdateReport&) {}), Error);
     EXPECT_TRUE(batch->landmarks().empty()) << solver;
   }

@@ -66,7 +66,7 @@ struct Walked {
   }
 };
 
-System KeyframeSystem() { return MapSystem(testing::Offset(kNoise), LandmarkOptions{}, kStart); }
+Problem KeyframeSystem() { return MapSystem(testing::Offset(kNoise), LandmarkOptions{}, kStart); }
 
 TEST(RelativePoses, TheBatchIsLeastSquaresOfThePositionsAlone) {
   const int steps = 30;
@@ -86,9 +86,9 @@ TEST(RelativePoses, TheBatchIsLeastSquaresOfThePositionsAlone) {
 TEST(RelativePoses, TheFilterWithClonesKnowsTheSameAtTheEnd) {
   const int steps = 30;
   const Walked walked(steps, 15);
-  const System system = KeyframeSystem();
-  Ekf ekf = testing::EkfOf(system);
-  const auto window = testing::MakeFixedLag(system, "lag_s: 0.35\n");
+  const Problem problem = KeyframeSystem();
+  Ekf ekf = testing::EkfOf(problem);
+  const auto window = testing::MakeFixedLag(problem, "lag_s: 0.35\n");
   for (const Frame& frame : walked.frames) {
     ekf.Process(frame);
     window->Process(frame);
@@ -138,9 +138,9 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   LandmarkOptions forgetful;
   forgetful.max_missed_frames = 3;
   forgetful.known.push_back({0, {0.0, 0.0, 0.0}, 0.1});  // never dropped by the filter
-  const System system = MapSystem(testing::Offset(kNoise), forgetful, kStart);
-  const Found open = Solve(system, frames(false), "solver: sparse\n");
-  const Found closed = Solve(system, frames(true), "solver: sparse\n");
+  const Problem problem = MapSystem(testing::Offset(kNoise), forgetful, kStart);
+  const Found open = Solve(problem, frames(false), "solver: sparse\n");
+  const Found closed = Solve(problem, frames(true), "solver: sparse\n");
   ASSERT_FALSE(open.failed || closed.failed);
   RecordProperty("flops", std::to_string(FlopsOf(open)) + ' ' + std::to_string(FlopsOf(closed)));
   EXPECT_LT(FlopsOf(closed), 2.0 * FlopsOf(open));

@@ -28,38 +28,38 @@ using Means = std::vector<std::vector<double>>;
 
 /// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05. A
 /// control input comes on the stream `NAME.input`.
-inline void AddMotion(System& system, const std::string& name, const SharedMotion& model,
+inline void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                       const Means& means) {
   MotionBinding binding{name, model, {}};
   if (model->has_input()) binding.input = {name + ".input"};
   for (std::size_t i = 0; i < means.size(); ++i) {
     const Space& space = model->blocks()[i];
     Prior prior;
-    prior.block = system.layout.Declare(name + "." + space.name, name, space);
+    prior.block = problem.layout.Declare(name + "." + space.name, name, space);
     prior.mean = means[i];
     const int n = space.geometry.tangent;
     prior.covariance = 0.0025 * Eigen::MatrixXd::Identity(n, n);
     binding.blocks.push_back(prior.block);
-    system.priors.push_back(prior);
+    problem.priors.push_back(prior);
   }
-  system.motions.push_back(binding);
+  problem.motions.push_back(binding);
 }
 
 template <class G>
-void AddSeen(System& system) {
-  const std::string number = std::to_string(system.sensors.size());
-  AddSensor(system, "seen" + number, MakeSensor(Seen<G>(), "seen"),
-            {system.layout.blocks()[system.sensors.size()].name});
+void AddSeen(Problem& problem) {
+  const std::string number = std::to_string(problem.sensors.size());
+  AddSensor(problem, "seen" + number, MakeSensor(Seen<G>(), "seen"),
+            {problem.layout.blocks()[problem.sensors.size()].name});
 }
 template <class... G>
-void AddAllSeen(System& system, std::tuple<G...>*) {
-  (AddSeen<G>(system), ...);
+void AddAllSeen(Problem& problem, std::tuple<G...>*) {
+  (AddSeen<G>(problem), ...);
 }
 
 /// The streams of the sensors, then those of the control inputs.
-inline std::vector<StreamInfo> AllStreams(const System& system) {
-  std::vector<StreamInfo> streams = StreamsOf(system);
-  for (const MotionBinding& motion : system.motions) {
+inline std::vector<StreamInfo> AllStreams(const Problem& problem) {
+  std::vector<StreamInfo> streams = StreamsOf(problem);
+  for (const MotionBinding& motion : problem.motions) {
     if (!motion.model->has_input()) continue;
     streams.push_back({motion.input.stream, motion.model->input().geometry.ambient});
   }
@@ -75,16 +75,16 @@ inline std::vector<double> InputOf(int size) {
 
 /// Frames in which every sensor sees the means of the priors, with noise of about its own size, and
 /// the control inputs come.
-inline std::vector<Frame> FramesOf(const System& system, int count) {
+inline std::vector<Frame> FramesOf(const Problem& problem, int count) {
   std::vector<Frame> frames(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) {
     Frame& frame = frames[static_cast<std::size_t>(k)];
     frame.timestamp = TimestampFromSeconds(0.1 * k);
-    for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-      const SensorBinding& sensor = system.sensors[s];
+    for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+      const SensorBinding& sensor = problem.sensors[s];
       std::vector<const double*> roles;
       for (const RoleBinding& role : sensor.roles) {
-        roles.push_back(system.priors[static_cast<std::size_t>(role.block)].mean.data());
+        roles.push_back(problem.priors[static_cast<std::size_t>(role.block)].mean.data());
       }
       const Geometry& geometry = sensor.model->measurement().geometry;
       const int m = geometry.tangent;
@@ -103,8 +103,8 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
       geometry.Plus(z.data(), d.data(), z.data());
       frame.measurements.push_back({frame.timestamp, static_cast<int>(s), -1, z, {}, known});
     }
-    const std::vector<StreamInfo> streams = AllStreams(system);
-    for (std::size_t s = system.sensors.size(); s < streams.size(); ++s) {
+    const std::vector<StreamInfo> streams = AllStreams(problem);
+    for (std::size_t s = problem.sensors.size(); s < streams.size(); ++s) {
       frame.measurements.push_back(
           {frame.timestamp, static_cast<int>(s), -1, InputOf(streams[s].size), {}});
     }
@@ -115,18 +115,18 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
 /// The engine and `filter`, whose blocks are seen one by one, then by `last`, over the same frames;
 /// `inputs` are the control inputs that `filter` takes.
 template <class Filter, class Last, class... Inputs>
-void ExpectSame(const System& system, Filter filter, const Last& last, Inputs... inputs) {
+void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs... inputs) {
   EkfOptions options;
   options.fuse = Fuse::kPerMeasurement;
-  Ekf engine(system, options, AllStreams(system));
+  Ekf engine(problem, options, AllStreams(problem));
   constexpr std::make_index_sequence<static_cast<std::size_t>(Filter::kBlocks)> blocks{};
   const auto set = [&](auto b) {
-    const Prior& prior = system.priors[b];
+    const Prior& prior = problem.priors[b];
     filter.template Set<b>(prior.mean.data(), prior.covariance);
   };
   detail::ForEach(set, blocks);
   Timestamp before = 0;
-  for (const Frame& frame : FramesOf(system, 100)) {
+  for (const Frame& frame : FramesOf(problem, 100)) {
     for (const MeasurementReport& m : engine.Process(frame).measurements()) {
       ASSERT_EQ(m.outcome, Outcome::kAccepted);
     }
@@ -156,8 +156,8 @@ void ExpectSame(const System& system, Filter filter, const Last& last, Inputs...
 struct Row {
   std::string model, parameters;
   /// Around the plugin.
-  std::function<System(const PluginHost&, const Node&)> system;
-  std::function<void(const System&)> expect_static_is_engine;
+  std::function<Problem(const PluginHost&, const Node&)> problem;
+  std::function<void(const Problem&)> expect_static_is_engine;
   double nonlinearity;  ///< by which batch and filter may differ at the end, in sigmas
 };
 inline void PrintTo(const Row& row, std::ostream* out) { *out << row.model << row.parameters; }
@@ -165,13 +165,13 @@ inline void PrintTo(const Row& row, std::ostream* out) { *out << row.model << ro
 template <class Model>
 Row MotionRow(const std::string& name, const std::string& parameters, const Model& model,
               const Means& means, double nonlinearity = 1e-9) {
-  const auto system = [=](const PluginHost& host, const Node& entry) {
-    System result;
+  const auto problem = [=](const PluginHost& host, const Node& entry) {
+    Problem result;
     AddMotion(result, "m", host.CreateMotion(name, entry), means);
     AddAllSeen(result, static_cast<typename Model::Spaces*>(nullptr));
     return result;
   };
-  const auto expect = [=](const System& around) {
+  const auto expect = [=](const Problem& around) {
     const auto nothing = [](auto&, const Frame&) {};
     if constexpr (Model::Input::kAmbient > 0) {
       const std::vector<double> u = InputOf(Model::Input::kAmbient);
@@ -180,7 +180,7 @@ Row MotionRow(const std::string& name, const std::string& parameters, const Mode
       ExpectSame(around, StaticEkf<Model>(model), nothing);
     }
   };
-  return {name, parameters, system, expect, nonlinearity};
+  return {name, parameters, problem, expect, nonlinearity};
 }
 
 template <class... G>
@@ -188,10 +188,10 @@ StaticEkf<Wander<G>...> FilterOf(std::tuple<G...>*) {
   return StaticEkf<Wander<G>...>(Wander<G>()...);
 }
 template <class... G>
-void AddWanders(System& system, const Means& means, std::tuple<G...>*) {
+void AddWanders(Problem& problem, const Means& means, std::tuple<G...>*) {
   std::size_t i = 0;
   const auto add = [&](const SharedMotion& model) {
-    AddMotion(system, "w" + std::to_string(i), model, {means[i]});
+    AddMotion(problem, "w" + std::to_string(i), model, {means[i]});
     ++i;
   };
   (add(MakeMotion(Wander<G>(), "wander")), ...);
@@ -206,8 +206,8 @@ template <class Model>
 Row SensorRow(const std::string& name, const std::string& parameters, const Model& model,
               const Means& means) {
   const auto spaces = static_cast<typename Model::Spaces*>(nullptr);
-  const auto system = [=](const PluginHost& host, const Node& entry) {
-    System result;
+  const auto problem = [=](const PluginHost& host, const Node& entry) {
+    Problem result;
     AddWanders(result, means, spaces);
     AddAllSeen(result, spaces);
     std::vector<std::string> roles;
@@ -215,7 +215,7 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
     AddSensor(result, "s", host.CreateSensor(name, entry), roles);
     return result;
   };
-  const auto expect = [=](const System& around) {
+  const auto expect = [=](const Problem& around) {
     ExpectSame(around, FilterOf(spaces), [&](auto& filter, const Frame& frame) {
       std::vector<double> z = frame.measurements.back().values;
       const std::vector<double>& known = frame.measurements.back().known;
@@ -224,7 +224,7 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
                 StaticOutcome::kAccepted);
     });
   };
-  return {name, parameters, system, expect, 0.05};
+  return {name, parameters, problem, expect, 0.05};
 }
 
 /// A landmark 2 m before a camera on whose image the uncertainties here, of 0.05, are a pixel.
@@ -249,8 +249,8 @@ class EveryModel : public ::testing::TestWithParam<Row> {
  protected:
   const Row& row_ = GetParam();
   Config parameters_ = Config::FromText(row_.parameters, row_.model);
-  void SetUp() override { system_ = row_.system(Shipped(), parameters_.root()); }
-  System system_;
+  void SetUp() override { system_ = row_.problem(Shipped(), parameters_.root()); }
+  Problem system_;
 };
 
 /// `stereo_disparity_0`: the model, and which of the rows of its source.

@@ -54,7 +54,7 @@ const std::string kPixels =
     "    stream: tracks\n"
     "    roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}\n";
 
-System PixelsWith(const std::string& keys) {
+Problem PixelsWith(const std::string& keys) {
   const Config config = Config::FromText(kPixels + "    " + keys + "\n", "test.yaml");
   return ReadProblem(config.root(), ShippedModels(), {});
 }
@@ -62,14 +62,14 @@ System PixelsWith(const std::string& keys) {
 // [1 0.6; 0.6 4] = L L', L = [1 0; 0.6 sqrt(4 - 0.36)], px
 TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
   const Numbers expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
-  const System system = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
-  EXPECT_EQ(RootOfR(system.sensors[0].model), expected);
-  ASSERT_TRUE(system.sensors[0].xyz != nullptr);
-  EXPECT_EQ(RootOfR(system.sensors[0].xyz), expected);
+  const Problem problem = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
+  EXPECT_EQ(RootOfR(problem.sensors[0].model), expected);
+  ASSERT_TRUE(problem.sensors[0].xyz != nullptr);
+  EXPECT_EQ(RootOfR(problem.sensors[0].xyz), expected);
   // At another time, too: the sensor is then one of more roles.
-  const System late =
+  const Problem late =
       PixelsWith("covariance: [[1, 0.6], [0.6, 4]]\n    time_offset_s: {mean: 0, sigma: 0.01}");
-  EXPECT_GT(late.sensors[0].roles.size(), system.sensors[0].roles.size());
+  EXPECT_GT(late.sensors[0].roles.size(), problem.sensors[0].roles.size());
   EXPECT_EQ(RootOfR(late.sensors[0].model), expected);
   EXPECT_EQ(RootOfR(late.sensors[0].xyz), expected);
 }

@@ -91,7 +91,7 @@ class Tally : public RunObserver {
       if (m.outcome == Outcome::kInitialised) continue;
       const auto sensor = static_cast<std::size_t>(m.sensor);
       EXPECT_EQ(m.outcome, Outcome::kAccepted) << named.name;
-      sums["NIS of " + named.system.sensors[sensor].name].Add(m.nis, m.dof);
+      sums["NIS of " + named.problem.sensors[sensor].name].Add(m.nis, m.dof);
     }
     if (frames_ < experiment_->source->size()) return;
     AddState(frame, state, sums["NEES"]);

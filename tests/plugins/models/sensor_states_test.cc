@@ -67,7 +67,7 @@ RunResult RunOf(const std::string& text, int seed = 1) {
   return run;
 }
 
-/// Metrics of the receiver, which both systems name alike.
+/// Metrics of the receiver, which both problems name alike.
 void ExpectSameReceiver(const RunResult& a, const RunResult& b, double relative) {
   ASSERT_EQ(a.estimators.size(), b.estimators.size());
   int compared = 0;
@@ -281,7 +281,7 @@ TEST(SensorStates, AreMovedByAModelThatIsNamedAfterItsDynamics) {
   const auto name = [](const std::string& dynamics) {
     const Experiment experiment = BuildExperiment(
         testing::Read(Filled("", "", ", dynamics: {clock_bias: " + dynamics + '}')), TheHost());
-    return experiment.estimators[0].system.motions.back().model->name();
+    return experiment.estimators[0].problem.motions.back().model->name();
   };
   EXPECT_EQ(name("constant"), "constant");
   EXPECT_EQ(name("{random_walk: 1}"), "random_walk");

@@ -77,7 +77,7 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
 }
 
-// Only where no batch of the same system served does one with other overrides, a robust loss, say.
+// Only where no batch of the same problem served does one with other overrides, a robust loss, say.
 TEST(CompareRuns, OverridesMakeAnotherSystem) {
   Candidate other = Entry("other", "ceres_batch", true, 8.0);
   other.result.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";

@@ -48,7 +48,7 @@ class ErrorsOfACamera : public ::testing::Test {
              state_);
   }
 
-  System system_;
+  Problem system_;
   BlockId position_, orientation_, heading_;
   State state_;
 };

@@ -36,9 +36,9 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   for (int i = 0; i < GetParam(); ++i) {
     EstimatorSpec named;
     named.name = "an_estimator_" + std::to_string(i);
-    named.system = DepthFilter();
+    named.problem = DepthFilter();
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(named));
   }
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
@@ -72,11 +72,11 @@ TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
     named.name = "an_estimator_" + std::to_string(i);
     const SharedMotion constant = testing::ConstantMotion(1);
     for (const char* entry : {"first", "second"}) {
-      AddMotion(named.system, entry, constant, {{"x", 0.3, 0.1}});
+      AddMotion(named.problem, entry, constant, {{"x", 0.3, 0.1}});
     }
-    AddMotion(named.system, "target", constant, {{"depth", 0.3, 0.1}});
+    AddMotion(named.problem, "target", constant, {{"depth", 0.3, 0.1}});
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(named));
   }
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());

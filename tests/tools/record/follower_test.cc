@@ -46,10 +46,10 @@ TEST(Follower, WritesEachEstimateAsSoonAsItIsMade) {
 
 TEST(Follower, LeavesOutWhatHasNoValueYetAndSigmasOfConstants) {
   Experiment experiment = MakeExperiment(1);
-  System& system = experiment.estimators[0].system;
+  Problem& problem = experiment.estimators[0].problem;
   const BlockId aside =
-      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);
-  State state(system.layout);
+      problem.layout.Declare("aside.x", "aside", problem.layout[0].space, BlockStatus::kConstant);
+  State state(problem.layout);
   std::vector<std::string> lines;
   Follower follower([&](std::string_view line) { lines.emplace_back(line); });
   follower.Begin(experiment);

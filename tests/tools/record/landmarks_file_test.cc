@@ -58,10 +58,10 @@ Experiment OnTheStreet(bool outlier = false) {
   EstimatorSpec named;
   named.name = "ekf";
   named.type = "ekf";
-  named.system = MapSystem(Offset(0.05), {}, 0.1);
+  named.problem = MapSystem(Offset(0.05), {}, 0.1);
   EkfOptions options;
   if (outlier) options.gate = 0.9999;
-  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  named.estimator = std::make_unique<Ekf>(named.problem, options, experiment.source->streams());
   experiment.estimators.push_back(std::move(named));
   return experiment;
 }
@@ -136,8 +136,9 @@ Experiment OfOneThatPasses() {
   Experiment experiment = OnTheStreet();
   EstimatorSpec& named = experiment.estimators[0];
   experiment.source = std::make_unique<Passing>();
-  named.system.landmarks->max_missed_frames = 3;
-  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  named.problem.landmarks->max_missed_frames = 3;
+  named.estimator =
+      std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   return experiment;
 }
 

@@ -47,9 +47,10 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec other;
   other.name = "other";
-  testing::AddMotion(other.system, "thing", testing::ConstantMotion(1), {{"depth", 0.3, 0.1}});
-  testing::AddMotion(other.system, "own", testing::ConstantMotion(1), {{"bias", 0.1, 0.1}});
-  other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
+  testing::AddMotion(other.problem, "thing", testing::ConstantMotion(1), {{"depth", 0.3, 0.1}});
+  testing::AddMotion(other.problem, "own", testing::ConstantMotion(1), {{"bias", 0.1, 0.1}});
+  other.estimator =
+      std::make_unique<Ekf>(other.problem, EkfOptions{}, experiment.source->streams());
   experiment.estimators.push_back(std::move(other));
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
@@ -77,10 +78,10 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
   for (EstimatorSpec& named : experiment.estimators) {
-    testing::AddMotion(named.system, "top", MakeMotion(Spinning(), "spinning"),
+    testing::AddMotion(named.problem, "top", MakeMotion(Spinning(), "spinning"),
                        {{"heading", 0.0, 0.1}});
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   }
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
@@ -152,9 +153,9 @@ TEST(DrawFigures, DrawsTheVarianceOfARotationAndNoTwoCurvesAlike) {
 TEST(Recorder, AConstantBlockHasNoPanel) {
   Experiment experiment = MakeExperiment();
   for (EstimatorSpec& named : experiment.estimators) {
-    named.system = WithStatus(named.system, "template.inverse_distance", BlockStatus::kConstant);
+    named.problem = WithStatus(named.problem, "template.inverse_distance", BlockStatus::kConstant);
     named.estimator =
-        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+        std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   }
   const ScriptsOf scripts(experiment);
   for (const char* name : {"comparison", "ekf.state"}) {
@@ -221,7 +222,7 @@ TEST(Recorder, WhatSmoothsHasNoTimeOfAFrame) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
   experiment.estimators[0].estimator = std::make_unique<Offline>(
-      experiment.estimators[0].system, EkfOptions{}, experiment.source->streams());
+      experiment.estimators[0].problem, EkfOptions{}, experiment.source->streams());
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   EXPECT_EQ(Lines(folder / "out/timing.csv").at(0), "t_s,alone");
@@ -233,8 +234,9 @@ TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
   while (experiment.estimators.size() < 9) {
     EstimatorSpec more;
     more.name = "more_" + std::to_string(experiment.estimators.size());
-    more.system = DepthFilter();
-    more.estimator = std::make_unique<Ekf>(more.system, EkfOptions{}, experiment.source->streams());
+    more.problem = DepthFilter();
+    more.estimator =
+        std::make_unique<Ekf>(more.problem, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(more));
   }
   const int code = InChild([&] {

@@ -118,7 +118,7 @@ class NoEstimator : public Estimator {
   UpdateReport report_;
 };
 
-/// A report of one update, made by hand, on a system with a block that waits and one that is fixed.
+/// A report of one update by hand, on a problem with a block that waits and one that is fixed.
 struct HandMade {
   Experiment experiment;
   State state;
@@ -131,13 +131,13 @@ struct HandMade {
     named.name = "hand";
     named.type = "fake";
     named.estimator = std::make_unique<NoEstimator>();
-    StateLayout& layout = named.system.layout;
+    StateLayout& layout = named.problem.layout;
     const Space scalar{"x", "m", "", {""}, Geometry::Vector(1)};
     layout.Declare("a.waits", "a", scalar);
     layout.Declare("a.fixed", "a", scalar, BlockStatus::kConstant);
     layout.Declare("a.attitude", "a",
                    {"q", "rad", "", {"w", "x", "y", "z"}, Geometry::UnitQuaternion()});
-    testing::AddSensor(named.system, "disparity",
+    testing::AddSensor(named.problem, "disparity",
                        MakeSensor(StereoDisparity(400.0, 0.065, 1.0, 0.3), "stereo_disparity"),
                        {"a.waits"});
     state = State(layout);
@@ -199,8 +199,8 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment(6);  // one frame each 33 ms
   EstimatorSpec& ekf = experiment.estimators[0];
-  ekf.system.initial_time_s = 0.066;
-  ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
+  ekf.problem.initial_time_s = 0.066;
+  ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   std::vector<std::string> timestamps;

@@ -8,7 +8,7 @@
 #include <optional>
 #include <set>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/plugin/load.h"
 
 namespace alidade {

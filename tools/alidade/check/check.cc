@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/check/check_context.h"
 #include "alidade/check/plugin_listing.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 #include "alidade/io/text_table.h"
 
 namespace alidade {

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/check/explain_parts.h"
 #include "alidade/estimation/observability.h"
 #include "alidade/experiment/calibration.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/truth_match.h"
 #include "alidade/io/text_table.h"
 
@@ -69,12 +69,12 @@ std::string PriorText(const Prior& prior, const Block& block) {
 }
 
 /// A line for each block; what constant ones are; for each truth that is of no block, why.
-std::string States(const System& system, const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+std::string States(const Problem& problem, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
   std::vector<TextRow> rows = {
       {"block", "geometry", "size", "unit", "owner", "status", "truth", "starts from"}};
-  for (const Prior& prior : system.priors) {
-    const Block& block = system.layout[prior.block];
+  for (const Prior& prior : problem.priors) {
+    const Block& block = problem.layout[prior.block];
     const Geometry& geometry = block.geometry();
     std::string size = std::to_string(geometry.ambient);
     if (geometry.tangent != geometry.ambient) {
@@ -90,11 +90,11 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
   }
   std::string text = TextTable(rows, kIndent);
   const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kConstant; };
-  if (std::ranges::any_of(system.layout.blocks(), is_fixed)) {
+  if (std::ranges::any_of(problem.layout.blocks(), is_fixed)) {
     text += "    constant: known exactly, without covariance; nothing moves or corrects it\n";
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
-    const std::string why = internal::WhyNoBlock(system.layout, truths, t);
+    const std::string why = internal::WhyNoBlock(problem.layout, truths, t);
     if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
   }
   return text;
@@ -117,17 +117,17 @@ std::string GivenNoise(const std::string& name, const std::vector<double>& root,
          SigmasText(l * l.transpose()) + '\n';
 }
 
-std::string Motions(const System& system) {
+std::string Motions(const Problem& problem) {
   const bool driven = std::ranges::any_of(
-      system.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
+      problem.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
   if (driven) rows[0].emplace_back("control input");
   std::string given;
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
-      if (system.layout[id].status == BlockStatus::kConstant) continue;
-      blocks.push_back(system.layout[id].name);
+      if (problem.layout[id].status == BlockStatus::kConstant) continue;
+      blocks.push_back(problem.layout[id].name);
     }
     const int noise = motion.model->noise_size();
     const char* const kind = motion.model->discrete_noise() ? " discrete" : " continuous";
@@ -151,11 +151,11 @@ const char* ModeText(RoleMode mode) {
   return "known";
 }
 
-std::string Sensors(const System& system) {
+std::string Sensors(const Problem& problem) {
   std::vector<TextRow> rows = {
       {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
   std::string given;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     TextRow front = {sensor.name, sensor.stream, sensor.model->name()};
     given += GivenNoise(sensor.name, sensor.model->description().sqrt_noise,
                         sensor.model->measurement().geometry.tangent);
@@ -169,7 +169,7 @@ std::string Sensors(const System& system) {
         row.insert(row.end(), {"(unbound)", "", ""});
       } else {
         const bool prediction = role.jacobian_at == JacobianAt::kPrediction;
-        row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
+        row.insert(row.end(), {problem.layout[role.block].name, ModeText(role.mode),
                                prediction ? "prediction" : "measurement"});
       }
       rows.push_back(std::move(row));
@@ -186,29 +186,29 @@ const char* EffectText(const Block& block, RoleMode mode) {
 }
 
 /// A line for each block, a column for each motion entry and sensor.
-std::string Touches(const System& system) {
-  std::vector<TextRow> rows(1 + system.layout.blocks().size());
+std::string Touches(const Problem& problem) {
+  std::vector<TextRow> rows(1 + problem.layout.blocks().size());
   rows[0].push_back("block");
   for (std::size_t b = 0; b + 1 < rows.size(); ++b) {
-    rows[b + 1].push_back(system.layout.blocks()[b].name);
+    rows[b + 1].push_back(problem.layout.blocks()[b].name);
   }
   const auto add_column = [&](const std::string& name) {
     for (TextRow& row : rows) row.emplace_back("-");
     rows[0].back() = name;
   };
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     add_column(motion.name);
     for (const BlockId id : motion.blocks) {
-      const bool constant = system.layout[id].status == BlockStatus::kConstant;
+      const bool constant = problem.layout[id].status == BlockStatus::kConstant;
       rows[static_cast<std::size_t>(id) + 1].back() = constant ? "knows" : "moves";
     }
   }
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     add_column(sensor.name);
     for (const RoleBinding& role : sensor.roles) {
       if (role.block < 0) continue;
       rows[static_cast<std::size_t>(role.block) + 1].back() =
-          EffectText(system.layout[role.block], role.mode);
+          EffectText(problem.layout[role.block], role.mode);
     }
   }
   return TextTable(rows, kIndent);
@@ -221,9 +221,9 @@ std::string DirectionText(const std::vector<std::string>& names) {
 }
 
 /// A line for each direction that is observable, but not while the control inputs are constant.
-std::string NeedExcitation(const System& system,
+std::string NeedExcitation(const Problem& problem,
                            const std::vector<std::vector<std::string>>& unobservable) {
-  const auto constant = internal::UnobservableDirections(system, internal::Excitation::kConstant);
+  const auto constant = internal::UnobservableDirections(problem, internal::Excitation::kConstant);
   std::string text;
   for (const auto& names : std::set(constant.begin(), constant.end())) {
     if (std::ranges::count(unobservable, names) > 0) continue;
@@ -232,15 +232,15 @@ std::string NeedExcitation(const System& system,
   return text;
 }
 
-std::string Unobservable(const System& system) {
-  if (system.landmarks && !internal::PlaceLandmarks(system)) {
+std::string Unobservable(const Problem& problem) {
+  if (problem.landmarks && !internal::PlaceLandmarks(problem)) {
     return "  what can be observed depends on the landmarks\n";
   }
-  if (!internal::ObservabilityIsTold(system)) {
+  if (!internal::ObservabilityIsTold(problem)) {
     return "  what can be observed is not looked into: the state has more than " +
            std::to_string(internal::kMostObserved) + " elements\n";
   }
-  const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(system);
+  const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(problem);
   std::map<std::vector<std::string>, int> directions;
   for (const auto& names : unobservable) ++directions[names];
   std::string text;
@@ -255,13 +255,13 @@ std::string Unobservable(const System& system) {
           "odometry\n    or known landmarks determine it\n";
     }
   }
-  return text + NeedExcitation(system, unobservable);
+  return text + NeedExcitation(problem, unobservable);
 }
 
 std::string SupportText(const std::string& type) {
   const internal::EstimatorType* known = internal::FindEstimatorType(type);
   if (known == nullptr) return {};
-  const Support& can = known->support;
+  const EstimatorCapabilities& can = known->support;
   const auto either = [](bool can_do, const char* with, const char* without) {
     return std::string(can_do ? with : without);
   };
@@ -362,16 +362,16 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
 std::string Explain(const Config& config, const Experiment& experiment) {
   std::string text = SourceText(config, experiment);
   for (const EstimatorSpec& spec : experiment.estimators) {
-    const System& system = spec.system;
+    const Problem& problem = spec.problem;
     const Node entry = config.root().At("estimators").At(spec.name);
     text += "\nestimator " + spec.name + " (" + spec.type + ")\n";
-    text += "  state\n" + States(system, experiment.source->truths());
-    text += "  motion\n" + Motions(system);
-    text += "  sensors\n" + Sensors(system);
-    if (system.landmarks)
-      text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
-    text += "  who touches which block\n" + Touches(system);
-    text += Unobservable(system);
+    text += "  state\n" + States(problem, experiment.source->truths());
+    text += "  motion\n" + Motions(problem);
+    text += "  sensors\n" + Sensors(problem);
+    if (problem.landmarks)
+      text += "  landmarks\n" + TextTable(internal::LandmarkRows(problem), kIndent);
+    text += "  who touches which block\n" + Touches(problem);
+    text += Unobservable(problem);
     text += "  options\n" + TextTable(internal::OptionRows(entry, spec), kIndent);
     if (const std::string support = SupportText(spec.type); !support.empty()) {
       text += "  type " + spec.type + " supports\n" + support;

@@ -2,15 +2,15 @@
 #include <algorithm>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/check/explain_parts.h"
 
 namespace alidade::internal {
 
-std::vector<TextRow> LandmarkRows(const System& system) {
-  const LandmarkOptions& options = *system.landmarks;
+std::vector<TextRow> LandmarkRows(const Problem& problem) {
+  const LandmarkOptions& options = *problem.landmarks;
   const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  const auto sensor = std::ranges::find_if(system.sensors, sees);
+  const auto sensor = std::ranges::find_if(problem.sensors, sees);
   const auto representation = RepresentationOf(sensor->model->roles());
   std::vector<TextRow> rows = {
       {"representation", representation ? ToString(*representation) : "the sensor's own"}};

@@ -5,17 +5,17 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/check/explain_parts.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 
 namespace alidade::internal {
 namespace {
 
-std::string GateText(const EkfOptions& options, const System& system) {
+std::string GateText(const EkfOptions& options, const Problem& problem) {
   if (options.gate >= 1.0) return "none: every measurement is used";
   std::map<int, std::string> thresholds;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     const int dof = sensor.model->measurement().geometry.tangent;
     thresholds[dof] = FixedText(ChiSquareQuantile(options.gate, dof), 2);
   }
@@ -26,8 +26,8 @@ std::string GateText(const EkfOptions& options, const System& system) {
   return NumberText(options.gate) + ": accepts r' S^-1 r up to " + Join(parts);
 }
 
-std::string FuseText(Fuse fuse, const System& system) {
-  const std::vector<std::string> names = NamesOf(system.sensors);
+std::string FuseText(Fuse fuse, const Problem& problem) {
+  const std::vector<std::string> names = NamesOf(problem.sensors);
   switch (fuse) {
     case Fuse::kJoint:
       return "joint: one stacked update for each timestamp";
@@ -39,13 +39,13 @@ std::string FuseText(Fuse fuse, const System& system) {
   return "per_measurement: one update for each measurement, in the order " + Join(names);
 }
 
-std::string RejectionRecoveryText(const EkfOptions& options, const System& system) {
+std::string RejectionRecoveryText(const EkfOptions& options, const Problem& problem) {
   const auto corrects = [&](const RoleBinding& role) {
     return role.block >= 0 && role.mode == RoleMode::kEstimate &&
-           system.layout[role.block].status == BlockStatus::kEstimated;
+           problem.layout[role.block].status == BlockStatus::kEstimated;
   };
   std::vector<std::string> without;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
   }
   std::string after = " after " + std::to_string(options.rejection_recovery_after) +
@@ -62,9 +62,9 @@ std::string RejectionRecoveryText(const EkfOptions& options, const System& syste
   return "none";
 }
 
-std::string LossText(const System& system) {
+std::string LossText(const Problem& problem) {
   std::vector<std::string> losses;
-  for (const SensorBinding& sensor : system.sensors) {
+  for (const SensorBinding& sensor : problem.sensors) {
     if (sensor.loss.kind == LossKind::kNone) continue;
     losses.push_back(sensor.name + ": " + ToString(sensor.loss.kind) + ' ' +
                      NumberText(sensor.loss.scale));
@@ -75,13 +75,13 @@ std::string LossText(const System& system) {
 }  // namespace
 
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
-  const System& system = spec.system;
+  const Problem& problem = spec.problem;
   std::vector<TextRow> rows;
   if (const EstimatorType* const type = FindEstimatorType(spec.type)) {
     const auto [options, own] = type->describe(entry);
-    rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
+    rows = {{"gate", GateText(options, problem)}, {"fuse", FuseText(options.fuse, problem)}};
     if (type->support.recovery)
-      rows.push_back({"rejection_recovery", RejectionRecoveryText(options, system)});
+      rows.push_back({"rejection_recovery", RejectionRecoveryText(options, problem)});
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                                 : "none: a gap is one step"});
     rows.insert(rows.end(), own.begin(), own.end());
@@ -97,10 +97,11 @@ std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
                                              ? "abort: the run ends with exit code 69"
                                              : "disable: a sensor that fails is no longer used"});
   }
-  if (const std::string losses = LossText(system); !losses.empty()) {
+  if (const std::string losses = LossText(problem); !losses.empty()) {
     rows.push_back({"loss", losses});
   }
-  if (system.initial_time_s) rows.push_back({"initial_time_s", NumberText(*system.initial_time_s)});
+  if (problem.initial_time_s)
+    rows.push_back({"initial_time_s", NumberText(*problem.initial_time_s)});
   return rows;
 }
 

@@ -8,9 +8,9 @@
 
 namespace alidade::internal {
 
-/// How the landmarks of a system that has some are initialised, converted and pruned: what, and
+/// How the landmarks of a problem that has some are initialised, converted and pruned: what, and
 /// how.
-std::vector<TextRow> LandmarkRows(const System& system);
+std::vector<TextRow> LandmarkRows(const Problem& problem);
 
 /// What the entry of an estimator sets, a key and its value in words each.
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec);

@@ -8,8 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "alidade/base/words.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/base/text.h"
+#include "alidade/experiment/estimator_registry.h"
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"

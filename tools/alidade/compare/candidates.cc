@@ -6,7 +6,7 @@
 #include <functional>
 #include <set>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/compare/distance.h"
 #include "alidade/io/text_table.h"
 
@@ -71,8 +71,8 @@ const Candidate* FirstOf(const std::vector<Candidate>& candidates,
   return first;
 }
 
-/// The batch of the same system as `of`, of the data up to each frame or of all data; one that sees
-/// all measurements comes before one of those that a filter accepted. Where none of these is
+/// The batch of the same problem as `of`, of the data up to each frame or of all data; one that
+/// sees all measurements comes before one of those that a filter accepted. Where none of these is
 /// usable, one that is, of the same sensors with other overrides: a robust loss, say.
 const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
                           bool smoothed) {

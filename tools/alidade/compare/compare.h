@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/compare/over_runs.h"
+#include "alidade/compare/over_seeds.h"
 #include "alidade/experiment/run.h"
 #include "alidade/sweep/sweep.h"
 
@@ -109,7 +109,7 @@ struct ComparedExperiment {
 
 /// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
 /// the data up to each frame, of what the filter accepted, and the smoother, each with the filter's
-/// sensors, overrides and steps. What does not support the system is left out, and of one run what
+/// sensors, overrides and steps. What does not support the problem is left out, and of one run what
 /// the budget does not allow for. Errors: those of BuildExperiment; kUsage where `options` names an
 /// estimator that is not there, or one that is no filter as that whose error is decomposed.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,

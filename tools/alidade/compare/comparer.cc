@@ -29,7 +29,7 @@ RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
     impl_->clocks.push_back(std::make_shared<internal::CpuTime>());
     spec.estimator = internal::WithCpuClock(std::move(spec.estimator), impl_->clocks.back());
     if (over_seeds) impl_->errors.emplace_back(spec, experiment);
-    one.series.blocks = internal::SeriesBlocksOf(spec.system);
+    one.series.blocks = internal::SeriesBlocksOf(spec.problem);
     one.series.joint = one.series.tangent() <= internal::Series::kMostJoint;
   }
 }

@@ -28,7 +28,7 @@ void KeepEvenRows(std::size_t columns, std::vector<double>& cells) {
 ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment) {
   if (experiment.reference >= 0) return;
   const std::vector<StreamInfo> truths = experiment.source->truths();
-  const StateLayout& layout = spec.system.layout;
+  const StateLayout& layout = spec.problem.layout;
   const std::vector<int> match = MatchTruths(layout, truths);
   for (BlockId id = 0; id < std::ssize(match); ++id) {
     const int of = match[static_cast<std::size_t>(id)];
@@ -49,10 +49,10 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
   const bool online = spec.kind == EstimatorKind::kFilter ||
                       (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
   if (!online || tracked_.empty()) return;
-  series_.no_bound = CramerRaoBound::WhyNone(spec.system, truths);
+  series_.no_bound = CramerRaoBound::WhyNone(spec.problem, truths);
   if (!series_.no_bound.empty()) return;
   const Source* source = experiment.source.get();
-  bound_.emplace(spec.system, experiment.source->streams(), truths,
+  bound_.emplace(spec.problem, experiment.source->streams(), truths,
                  [source](std::int64_t id) { return source->TrueLandmark(id); });
 }
 

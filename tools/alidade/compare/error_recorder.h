@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/compare/over_runs.h"
+#include "alidade/compare/over_seeds.h"
 #include "alidade/experiment/cramer_rao.h"
 #include "alidade/experiment/run.h"
 

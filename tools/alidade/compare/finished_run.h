@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/compare/cpu_clock.h"
-#include "alidade/compare/over_runs.h"
+#include "alidade/compare/over_seeds.h"
 #include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/base/error.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade::internal {
 

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/compare/compare.h"
 #include "alidade/compare/section.h"
 #include "alidade/experiment/metric_rows.h"

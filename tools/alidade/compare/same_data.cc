@@ -3,7 +3,7 @@
 #include <fstream>
 #include <map>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/compare/finished_run.h"
 
 namespace alidade::internal {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/compare/compare.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/json.h"
 #include "alidade/io/text_table.h"

@@ -19,17 +19,17 @@ std::vector<bool> AreAngles(const Geometry& geometry) {
 }
 
 ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
-                       const System& system, const std::vector<int>& truth_of) {
+                       const Problem& problem, const std::vector<int>& truth_of) {
   std::vector<std::string> header = {"t_s"};
-  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
+  for (BlockId id = 0; id < static_cast<int>(problem.layout.blocks().size()); ++id) {
     const int truth = truth_of[static_cast<std::size_t>(id)];
     if (truth < 0) continue;
-    const Block& block = system.layout[id];
+    const Block& block = problem.layout[id];
     const std::vector<std::string> names = TangentNames(block.name, block.space);
     const std::vector<bool> angles = AreAngles(block.geometry());
     blocks_.push_back({id, static_cast<std::size_t>(truth), elements_.size()});
     for (std::size_t i = 0; i < names.size(); ++i) {
-      elements_.push_back({names[i], UnitOf(system, id), truth, static_cast<int>(i), angles[i]});
+      elements_.push_back({names[i], UnitOf(problem, id), truth, static_cast<int>(i), angles[i]});
       header.push_back(names[i]);
     }
     for (const std::string& name : names) header.push_back("sigma:" + name);

@@ -23,8 +23,8 @@ std::vector<bool> AreAngles(const Geometry& geometry);
 /// has its error in the body, rad.
 class ErrorsFile {
  public:
-  /// `truth_of` is MatchTruths of the system's blocks.
-  ErrorsFile(const OutputFolder& folder, const std::string& estimator, const System& system,
+  /// `truth_of` is MatchTruths of the problem's blocks.
+  ErrorsFile(const OutputFolder& folder, const std::string& estimator, const Problem& problem,
              const std::vector<int>& truth_of);
 
   /// A row for each estimate; empty cells where value, truth or P is not known. Error: kIo.

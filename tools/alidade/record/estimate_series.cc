@@ -13,12 +13,12 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-std::vector<SeriesBlock> SeriesBlocksOf(const System& system) {
+std::vector<SeriesBlock> SeriesBlocksOf(const Problem& problem) {
   std::vector<SeriesBlock> blocks;
-  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
-    const Block& block = system.layout[id];
-    blocks.push_back(
-        {block.name, UnitOf(system, id), block.geometry(), block.status == BlockStatus::kConstant});
+  for (BlockId id = 0; id < static_cast<int>(problem.layout.blocks().size()); ++id) {
+    const Block& block = problem.layout[id];
+    blocks.push_back({block.name, UnitOf(problem, id), block.geometry(),
+                      block.status == BlockStatus::kConstant});
   }
   return blocks;
 }

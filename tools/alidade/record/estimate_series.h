@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/state/state.h"
 
 /// The estimates of a whole run, to be compared with those of another estimator.
@@ -20,8 +20,8 @@ struct SeriesBlock {
   std::string owner() const { return name.substr(0, name.find('.')); }
 };
 
-/// The blocks that a system has from the start.
-std::vector<SeriesBlock> SeriesBlocksOf(const System& system);
+/// The blocks that a problem has from the start.
+std::vector<SeriesBlock> SeriesBlocksOf(const Problem& problem);
 
 /// P of the first `blocks` blocks as its lower triangle, row by row, appended to `cells`; NaN where
 /// a block has none.

@@ -31,8 +31,8 @@ std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
 RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
   RecordedEstimator recorded;
   recorded.name = spec.name;
-  recorded.blocks = SeriesBlocksOf(spec.system);
-  for (const SensorBinding& binding : spec.system.sensors) {
+  recorded.blocks = SeriesBlocksOf(spec.problem);
+  for (const SensorBinding& binding : spec.problem.sensors) {
     const Space& space = binding.model->measurement();
     RecordedSensor& sensor = recorded.sensors.emplace_back();
     sensor.name = binding.name;
@@ -52,48 +52,48 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& 
     : recorded_(Describe(spec)),
       estimates_(
           folder, spec.name + "/estimates.csv",
-          EstimatesHeader(spec.system, MatchTruths(spec.system.layout, truths), truth_columns)),
+          EstimatesHeader(spec.problem, MatchTruths(spec.problem.layout, truths), truth_columns)),
       innovations_(folder, spec.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, spec.name + "/gains.csv", GainsHeader(spec.system)),
-      errors_(folder, spec.name, spec.system, MatchTruths(spec.system.layout, truths)) {
-  measured_.assign(spec.system.sensors.size(), kNoTimestamp);
-  FindPath(spec.system);
-  OpenTrajectory(folder, spec.system);
+      gains_(folder, spec.name + "/gains.csv", GainsHeader(spec.problem)),
+      errors_(folder, spec.name, spec.problem, MatchTruths(spec.problem.layout, truths)) {
+  measured_.assign(spec.problem.sensors.size(), kNoTimestamp);
+  FindPath(spec.problem);
+  OpenTrajectory(folder, spec.problem);
   if (covariances) covariances_ = folder.Create(spec.name + "/covariance.bin");
-  if (std::ranges::any_of(spec.system.sensors, HasReprojection)) {
+  if (std::ranges::any_of(spec.problem.sensors, HasReprojection)) {
     reprojection_.emplace(folder, spec.name + "/reprojection.csv",
                           std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
   }
 }
 
-void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const System& system) {
-  pose_ = FindPose(BlocksOf(system));
+void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& problem) {
+  pose_ = FindPose(BlocksOf(problem));
   if (!pose_) return;
   trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
   const auto constant = [&](std::size_t id) {
-    return system.layout.blocks()[id].status == BlockStatus::kConstant;
+    return problem.layout.blocks()[id].status == BlockStatus::kConstant;
   };
   if (constant(pose_->position) || constant(pose_->orientation)) return;
   trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", *pose_,
                                  true);
 }
 
-void EstimatorFiles::FindPath(const System& system) {
-  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    recorded_.sensors[s].has_reprojection = HasReprojection(system.sensors[s]);
+void EstimatorFiles::FindPath(const Problem& problem) {
+  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+    recorded_.sensors[s].has_reprojection = HasReprojection(problem.sensors[s]);
   }
-  const BlockId path = PositionBlockOf(system);
+  const BlockId path = PositionBlockOf(problem);
   for (const BlockColumns& columns : blocks_) {
     if (columns.id == path) recorded_.path = static_cast<int>(columns.element);
   }
 }
 
 std::vector<std::string> EstimatorFiles::EstimatesHeader(
-    const System& system, const std::vector<int>& truth_of,
+    const Problem& problem, const std::vector<int>& truth_of,
     const std::vector<std::vector<std::string>>& truth_columns) {
   std::vector<std::string> header = {"t_s"};
-  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
-    const Block& block = system.layout[id];
+  for (BlockId id = 0; id < static_cast<int>(problem.layout.blocks().size()); ++id) {
+    const Block& block = problem.layout[id];
     const std::vector<std::string> names = AmbientNames(block.name, block.space);
     const std::vector<std::string> tangents = TangentNames(block.name, block.space);
     const int truth = truth_of[static_cast<std::size_t>(id)];
@@ -101,10 +101,10 @@ std::vector<std::string> EstimatorFiles::EstimatesHeader(
                        recorded_.sigmas.size(), truth});
     const std::vector<bool> angles = AreAngles(block.geometry());
     for (std::size_t i = 0; i < tangents.size(); ++i) {
-      recorded_.sigmas.push_back({tangents[i], angles[i] ? "rad" : UnitOf(system, id)});
+      recorded_.sigmas.push_back({tangents[i], angles[i] ? "rad" : UnitOf(problem, id)});
     }
     for (std::size_t i = 0; i < names.size(); ++i) {
-      recorded_.elements.push_back({names[i], UnitOf(system, id), names == tangents,
+      recorded_.elements.push_back({names[i], UnitOf(problem, id), names == tangents,
                                     truth >= 0 ? truth_columns[truth][i] : ""});
     }
     header.insert(header.end(), names.begin(), names.end());
@@ -122,14 +122,14 @@ std::vector<std::string> EstimatorFiles::InnovationsHeader() const {
   return header;
 }
 
-std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
+std::vector<std::string> EstimatorFiles::GainsHeader(const Problem& problem) {
   std::vector<std::string> header = {"t_s", "sensor"};
   std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
-  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const Space& space = system.sensors[s].model->measurement();
-    if (system.sensors[s].model->has_landmark()) continue;
+  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+    const Space& space = problem.sensors[s].model->measurement();
+    if (problem.sensors[s].model->has_landmark()) continue;
     for (const BlockColumns& columns : blocks_) {
-      const Block& block = system.layout[columns.id];
+      const Block& block = problem.layout[columns.id];
       if (block.status == BlockStatus::kConstant) continue;
       for (std::size_t i = 0; i < columns.tangent; ++i) {
         const RecordedSigma& element = recorded_.sigmas[columns.sigma + i];

@@ -15,7 +15,7 @@ namespace alidade::internal {
 /// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
 /// `gains.csv`, of blocks with truth `errors.csv`, of sensors of landmarks `reprojection.csv`, and
 /// of blocks X.position and X.orientation `trajectory.tum`, with a covariance
-/// `trajectory_covariance.tum`. They hold the blocks and sensors that the system has from the
+/// `trajectory_covariance.tum`. They hold the blocks and sensors that the problem has from the
 /// start.
 class EstimatorFiles {
  public:
@@ -42,13 +42,13 @@ class EstimatorFiles {
 
   static RecordedEstimator Describe(const EstimatorSpec& spec);
   std::vector<std::string> EstimatesHeader(
-      const System& system, const std::vector<int>& truth_of,
+      const Problem& problem, const std::vector<int>& truth_of,
       const std::vector<std::vector<std::string>>& truth_columns);
   std::vector<std::string> InnovationsHeader() const;
-  std::vector<std::string> GainsHeader(const System& system);
+  std::vector<std::string> GainsHeader(const Problem& problem);
   /// The position that landmarks are seen from, among the elements.
-  void FindPath(const System& system);
-  void OpenTrajectory(const OutputFolder& folder, const System& system);
+  void FindPath(const Problem& problem);
+  void OpenTrajectory(const OutputFolder& folder, const Problem& problem);
   void AddEstimate(const SourceFrame& frame, const State& state);
   void AddPose(Timestamp timestamp, const State& state);
   void AddInnovation(Timestamp timestamp, const MeasurementReport& report);

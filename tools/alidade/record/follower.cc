@@ -11,7 +11,7 @@ namespace alidade {
 
 void Follower::Begin(const Experiment& experiment) {
   for (const EstimatorSpec& spec : experiment.estimators) {
-    estimators_.push_back({spec.name, spec.system.layout});
+    estimators_.push_back({spec.name, spec.problem.layout});
   }
 }
 

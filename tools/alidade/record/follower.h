@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/experiment/run.h"
 
 namespace alidade {
@@ -26,7 +26,7 @@ class Follower : public RunObserver {
  private:
   struct Followed {
     std::string name;
-    StateLayout layout;  ///< of its system
+    StateLayout layout;  ///< of its problem
   };
   std::function<void(std::string_view line)> write_;
   std::vector<Followed> estimators_;

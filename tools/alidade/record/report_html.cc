@@ -2,7 +2,7 @@
 #include "alidade/record/report_html.h"
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/text_table.h"
 #include "alidade/io/utf8.h"

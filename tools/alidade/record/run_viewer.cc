@@ -43,7 +43,7 @@ struct RunViewer::Impl {
   const EstimatorSpec* spec;
   int estimator;
   Source* source;
-  std::vector<int> truth_of;  ///< of each block of the system, or -1
+  std::vector<int> truth_of;  ///< of each block of the problem, or -1
   std::optional<internal::PosePlace> pose;
   std::vector<std::unique_ptr<internal::PartialFile>> videos;  ///< go after their writers
   std::vector<std::unique_ptr<ImageWriter>> writers;
@@ -84,7 +84,7 @@ RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
   impl_->estimator = FirstOnline(experiment);
   impl_->spec = &experiment.estimators[static_cast<std::size_t>(impl_->estimator)];
   impl_->source = experiment.source.get();
-  const StateLayout& layout = impl_->spec->system.layout;
+  const StateLayout& layout = impl_->spec->problem.layout;
   impl_->truth_of = internal::MatchTruths(layout, experiment.source->truths());
   std::vector<StreamInfo> blocks;
   for (const Block& block : layout.blocks()) {
@@ -164,7 +164,7 @@ void RunViewer::Impl::TakeInnovations(const Frame& frame, const UpdateReport* re
   const std::vector<StreamInfo>& streams = source->streams();
   for (const MeasurementReport& one : report->measurements()) {
     if (one.landmark >= 0 || view.innovations.size() == kMostInnovations) continue;
-    const SensorBinding& sensor = spec->system.sensors[static_cast<std::size_t>(one.sensor)];
+    const SensorBinding& sensor = spec->problem.sensors[static_cast<std::size_t>(one.sensor)];
     const auto of_it = [&](const Measurement& m) {
       return streams[static_cast<std::size_t>(m.stream)].name == sensor.stream;
     };
@@ -183,7 +183,7 @@ void RunViewer::Impl::TakeInnovations(const Frame& frame, const UpdateReport* re
 
 void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
   view.elements.clear();
-  const std::size_t system_blocks = spec->system.layout.blocks().size();
+  const std::size_t system_blocks = spec->problem.layout.blocks().size();
   for (std::size_t b = 0; b < system_blocks; ++b) {
     const auto id = static_cast<BlockId>(b);
     const Block& block = state.layout()[id];
@@ -191,7 +191,7 @@ void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
     const std::vector<std::string> names = internal::TangentNames(block.name, block.space);
     const double* const true_value = TruthOf(b, truth);
     for (std::size_t i = 0; i < names.size() && view.elements.size() < kMostElements; ++i) {
-      view.elements.push_back({names[i], internal::UnitOf(spec->system, id), state.value(id)[i],
+      view.elements.push_back({names[i], internal::UnitOf(spec->problem, id), state.value(id)[i],
                                state.sigma(id, static_cast<int>(i)),
                                true_value == nullptr ? kUnknown : true_value[i]});
     }
@@ -222,7 +222,7 @@ void RunViewer::Impl::TakeMap(const State& state, const Truth& truth) {
             Eigen::Quaterniond(w[0], w[1], w[2], w[3]).matrix(), TruthOf(pose->position, truth),
             landmarks);
   view.map = above.map();
-  if (spec->system.landmarks) view.landmarks = static_cast<int>(landmarks.size());
+  if (spec->problem.landmarks) view.landmarks = static_cast<int>(landmarks.size());
 }
 
 }  // namespace alidade

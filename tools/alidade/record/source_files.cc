@@ -19,7 +19,7 @@ std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment)
     std::vector<std::string> names = NumberedNames(truths[t].name, truths[t].size);
     // Elements are named as in the first state that has this block.
     for (const EstimatorSpec& spec : experiment.estimators) {
-      const StateLayout& layout = spec.system.layout;
+      const StateLayout& layout = spec.problem.layout;
       const std::vector<int> match = MatchTruths(layout, truths);
       const auto block = std::find(match.begin(), match.end(), static_cast<int>(t));
       if (block == match.end()) continue;
@@ -73,22 +73,22 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
   std::set<std::string> sensors;
   std::map<std::string, std::size_t> cells;
   for (const EstimatorSpec& spec : experiment.estimators) {
-    const System& system = spec.system;
-    for (const SensorBinding& binding : system.sensors) {
+    const Problem& problem = spec.problem;
+    for (const SensorBinding& binding : problem.sensors) {
       const auto stream = std::find_if(streams_.begin(), streams_.end(), [&](const StreamInfo& s) {
         return s.name == binding.stream;
       });
       if (stream == streams_.end() || !sensors.insert(binding.name).second) continue;
       const int s = static_cast<int>(stream - streams_.begin());
-      std::vector<int> truths = TruthsOfRoles(system, binding, truths_);
+      std::vector<int> truths = TruthsOfRoles(problem, binding, truths_);
       if (!truths.empty()) {
         expectations_.try_emplace(s, Expectation{binding.model, std::move(truths)});
       }
-      std::optional<ImpliedState> state = ImpliedState::Of(system, binding, truths_);
+      std::optional<ImpliedState> state = ImpliedState::Of(problem, binding, truths_);
       if (!state) continue;
-      const Block& block = system.layout[state->block()];
+      const Block& block = problem.layout[state->block()];
       const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
-      RecordedImplied recorded{binding.name, block.name, UnitOf(system, state->block()),
+      RecordedImplied recorded{binding.name, block.name, UnitOf(problem, state->block()),
                                state->rest_at_truth(), cell};
       inverses_.push_back({s, *std::move(state), std::move(recorded)});
     }

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "alidade/base/error.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/io/json.h"
 #include "alidade/io/read_file.h"
 #include "alidade/replay/compare_rows.h"

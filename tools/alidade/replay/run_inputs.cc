@@ -9,7 +9,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_file.h"
 #include "alidade/io/read_file.h"

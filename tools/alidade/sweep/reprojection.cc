@@ -121,8 +121,8 @@ FigureScript ReprojectionFigure(const VariedSweep& sweep) {
 void ReprojectionOfRun::Begin(const Experiment& experiment) {
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
     const EstimatorSpec& spec = experiment.estimators[e];
-    for (std::size_t s = 0; s < spec.system.sensors.size(); ++s) {
-      const SensorBinding& sensor = spec.system.sensors[s];
+    for (std::size_t s = 0; s < spec.problem.sensors.size(); ++s) {
+      const SensorBinding& sensor = spec.problem.sensors[s];
       if (!HasReprojection(sensor)) continue;
       places_.push_back({static_cast<int>(e), static_cast<int>(s)});
       errors_.push_back({spec.name, sensor.name, sensor.model->measurement().unit, {}});

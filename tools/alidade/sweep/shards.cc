@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/io/read_file.h"

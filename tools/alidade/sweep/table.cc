@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/experiment/metric_rows.h"
 #include "alidade/io/text_table.h"
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/config/tree.h"
 #include "alidade/io/text_table.h"
 #include "alidade/sweep/sweep.h"

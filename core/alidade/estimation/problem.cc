@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/estimation/owned_state.h"
 
 namespace alidade {
@@ -59,12 +59,12 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   return prior;
 }
 
-/// The index of the stream, a new one if the system reads none of that name.
-int AddStream(System& system, const StreamInfo& stream, const std::string& who) {
-  const auto found = std::ranges::find(system.streams, stream.name, &StreamInfo::name);
-  if (found == system.streams.end()) {
-    system.streams.push_back(stream);
-    return static_cast<int>(system.streams.size()) - 1;
+/// The index of the stream, a new one if the problem reads none of that name.
+int AddStream(Problem& problem, const StreamInfo& stream, const std::string& who) {
+  const auto found = std::ranges::find(problem.streams, stream.name, &StreamInfo::name);
+  if (found == problem.streams.end()) {
+    problem.streams.push_back(stream);
+    return static_cast<int>(problem.streams.size()) - 1;
   }
   if (found->size != stream.size || found->known != stream.known) {
     const auto numbers = [](const StreamInfo& one) {
@@ -74,11 +74,11 @@ int AddStream(System& system, const StreamInfo& stream, const std::string& who) 
     Refuse(who, "reads " + numbers(stream) + " from stream '" + stream.name + "', and another " +
                     numbers(*found));
   }
-  return static_cast<int>(found - system.streams.begin());
+  return static_cast<int>(found - problem.streams.begin());
 }
 
 /// Refuses a block that cannot fill a role.
-void CheckRole(const System& system, const Space& role, const RoleBinding& binding,
+void CheckRole(const Problem& problem, const Space& role, const RoleBinding& binding,
                const std::string& who) {
   const std::string its_role =
       "role '" + role.name + "', " + internal::WithArticle(ToString(role.geometry));
@@ -86,8 +86,8 @@ void CheckRole(const System& system, const Space& role, const RoleBinding& bindi
     if (!role.optional()) Refuse(who, "needs a block that fills its " + its_role);
     return;
   }
-  ALIDADE_EXPECTS(binding.block < std::ssize(system.layout.blocks()));
-  const Block& block = system.layout[binding.block];
+  ALIDADE_EXPECTS(binding.block < std::ssize(problem.layout.blocks()));
+  const Block& block = problem.layout[binding.block];
   if (block.geometry() == role.geometry) return;
   Refuse(who, "has a " + its_role + "; block '" + block.name + "' is " +
                   internal::WithArticle(ToString(block.geometry())));
@@ -95,16 +95,16 @@ void CheckRole(const System& system, const Space& role, const RoleBinding& bindi
 
 }  // namespace
 
-InitialValue::InitialValue(std::string name, std::vector<double> at, std::vector<double> deviations,
-                           BlockStatus use)
-    : block(std::move(name)), mean(std::move(at)), sigma(std::move(deviations)), status(use) {}
+InitialValue::InitialValue(std::string of_block, std::vector<double> at,
+                           std::vector<double> deviations, BlockStatus use)
+    : block(std::move(of_block)), mean(std::move(at)), sigma(std::move(deviations)), status(use) {}
 
-InitialValue::InitialValue(std::string name, std::vector<double> at, double deviation,
+InitialValue::InitialValue(std::string of_block, std::vector<double> at, double deviation,
                            BlockStatus use)
-    : InitialValue(std::move(name), std::move(at), std::vector{deviation}, use) {}
+    : InitialValue(std::move(of_block), std::move(at), std::vector{deviation}, use) {}
 
-InitialValue::InitialValue(std::string name, double at, double deviation, BlockStatus use)
-    : InitialValue(std::move(name), std::vector{at}, std::vector{deviation}, use) {}
+InitialValue::InitialValue(std::string of_block, double at, double deviation, BlockStatus use)
+    : InitialValue(std::move(of_block), std::vector{at}, std::vector{deviation}, use) {}
 
 InitialValue InitialValue::WithCovariance(std::string block, std::vector<double> mean,
                                           Eigen::MatrixXd covariance, BlockStatus status) {
@@ -139,8 +139,8 @@ BlockId StateHandle::operator[](std::string_view block) const {
          "has no block '" + std::string(block) + "'; its blocks are " + internal::Join(names));
 }
 
-StateHandle System::AddState(const std::string& name, SharedMotion model,
-                             const std::vector<InitialValue>& initial, const InputBinding& input) {
+StateHandle Problem::AddState(const std::string& name, SharedMotion model,
+                              const std::vector<InitialValue>& initial, const InputBinding& input) {
   const std::string who = "state '" + name + "'";
   const auto taken = [&](const Block& block) { return block.owner == name; };
   if (std::ranges::any_of(layout.blocks(), taken)) Refuse(who, "is there already");
@@ -187,8 +187,8 @@ StateHandle System::AddState(const std::string& name, SharedMotion model,
   return handle;
 }
 
-SensorHandle System::AddSensor(const std::string& name, SharedSensor model,
-                               std::vector<RoleBinding> roles, const SensorOptions& options) {
+SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
+                                std::vector<RoleBinding> roles, const SensorOptions& options) {
   const std::string who = "sensor '" + name + "'";
   if (FindSensor(name) >= 0) Refuse(who, "is there already");
   const std::vector<Space>& spaces = model->roles();
@@ -227,19 +227,19 @@ SensorHandle System::AddSensor(const std::string& name, SharedSensor model,
   return handle;
 }
 
-BlockId internal::AddOwnedState(System& system, const std::string& sensor, const Space& role,
+BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                                 OwnedState state) {
   Prior prior = PriorOf(state.initial, role, -1, "sensor '" + sensor + "'");
   const BlockStatus status = state.initial.status;
-  prior.block = system.layout.Declare(sensor + '.' + role.name, sensor, role, status);
+  prior.block = problem.layout.Declare(sensor + '.' + role.name, sensor, role, status);
   if (status == BlockStatus::kConstant) state.process.dynamics = OwnedDynamics::kConstant;
   state.process.mean = prior.mean;
-  system.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});
-  system.priors.push_back(std::move(prior));
-  return system.priors.back().block;
+  problem.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});
+  problem.priors.push_back(std::move(prior));
+  return problem.priors.back().block;
 }
 
-State System::InitialState(bool reserved) const {
+State Problem::InitialState(bool reserved) const {
   State state(layout);
   std::vector<const Prior*> in_order;
   for (const Prior& prior : priors) in_order.push_back(&prior);
@@ -254,28 +254,28 @@ State System::InitialState(bool reserved) const {
   return state;
 }
 
-int System::FindSensor(std::string_view name) const {
+int Problem::FindSensor(std::string_view name) const {
   const auto found = std::find_if(sensors.begin(), sensors.end(),
                                   [name](const SensorBinding& s) { return s.name == name; });
   return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
 }
 
-BlockId internal::PositionBlockOf(const System& system) {
+BlockId internal::PositionBlockOf(const Problem& problem) {
   BlockId path = -1;
-  for (const SensorBinding& binding : system.sensors) {
+  for (const SensorBinding& binding : problem.sensors) {
     if (!binding.model->has_landmark()) continue;
     for (std::size_t r = 0; r < binding.roles.size(); ++r) {
       const BlockId id = binding.roles[r].block;
       const bool position = binding.model->roles()[r].name == "position" && id >= 0;
-      if (position && system.layout[id].geometry().ambient == 3) path = id;
+      if (position && problem.layout[id].geometry().ambient == 3) path = id;
     }
   }
   return path;
 }
 
-std::string internal::UnitOf(const System& system, BlockId id) {
-  if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
-  for (const SensorBinding& sensor : system.sensors) {
+std::string internal::UnitOf(const Problem& problem, BlockId id) {
+  if (!problem.layout[id].space.unit.empty()) return problem.layout[id].space.unit;
+  for (const SensorBinding& sensor : problem.sensors) {
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
       if (sensor.roles[r].block == id) return sensor.model->roles()[r].unit;
     }

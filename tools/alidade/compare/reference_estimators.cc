@@ -3,13 +3,13 @@
 #include <map>
 
 #include "alidade/base/number_text.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 #include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
 #include "alidade/experiment/build_estimator.h"
 #include "alidade/experiment/calibration.h"
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 #include "alidade/io/text_table.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -65,7 +65,7 @@ bool IsThere(const Variant& variant, const EstimatorSpec& spec, const EstimatorS
   const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
   if (spec.kind != variant.kind || full_information != variant.full_information) return false;
   const bool same_sensors = std::ranges::is_permutation(
-      spec.system.sensors, filter.system.sensors, {}, &SensorBinding::name, &SensorBinding::name);
+      spec.problem.sensors, filter.problem.sensors, {}, &SensorBinding::name, &SensorBinding::name);
   if (spec.overrides != filter.overrides || !same_sensors) return false;
   if (spec.accepted_by >= 0) return variant.accepted && spec.accepted_by == filter_index;
   return variant.full_information || !variant.accepted;
@@ -191,7 +191,7 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
       continue;
     }
     const bool may_be_long = !options.budget_s || options.over_seeds;
-    if (variant.full_information && of.system.landmarks && may_be_long) {
+    if (variant.full_information && of.problem.landmarks && may_be_long) {
       left_out
           ["with landmarks a solve at every frame takes long; of one run --budget SECONDS adds "
            "it where it can be done in time, and the config may have it"]

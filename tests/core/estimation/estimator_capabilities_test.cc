@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/support.h"
+#include "alidade/estimation/estimator_capabilities.h"
 
 #include <gtest/gtest.h>
 
@@ -14,47 +14,47 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-System WithAConsideredBlock() {
+Problem WithAConsideredBlock() {
   return WithStatus(DepthFilter(), "template.inverse_distance", BlockStatus::kConsider);
 }
 
-System WithABlockFromAMeasurement() {
-  System system = DepthFilter();
-  system.priors[0].from = "stereo";
-  return system;
+Problem WithABlockFromAMeasurement() {
+  Problem problem = DepthFilter();
+  problem.priors[0].from = "disparity";
+  return problem;
 }
 
-System WithARole(RoleMode mode, JacobianAt at) {
-  System system = DepthFilter();
-  system.sensors[1].roles[1].mode = mode;
-  system.sensors[1].roles[1].jacobian_at = at;
-  return system;
+Problem WithARole(RoleMode mode, JacobianAt at) {
+  Problem problem = DepthFilter();
+  problem.sensors[1].roles[1].mode = mode;
+  problem.sensors[1].roles[1].jacobian_at = at;
+  return problem;
 }
 
-System WithALoss() {
-  System system = DepthFilter();
-  system.sensors[1].loss = {LossKind::kHuber, 1.345};
-  return system;
+Problem WithALoss() {
+  Problem problem = DepthFilter();
+  problem.sensors[1].loss = {LossKind::kHuber, 1.345};
+  return problem;
 }
 
-System WithLandmarks() {
-  System system = DepthFilter();
-  system.landmarks.emplace();
-  return system;
+Problem WithLandmarks() {
+  Problem problem = DepthFilter();
+  problem.landmarks.emplace();
+  return problem;
 }
 
-TEST(Support, NamesTheFirstThingThatIsLacking) {
-  const Support nothing = {.known = false};
+TEST(EstimatorCapabilities, NamesTheFirstThingThatIsLacking) {
+  const EstimatorCapabilities nothing = {.known = false};
   EXPECT_FALSE(FindUnsupported(DepthFilter(), nothing));
-  const auto expect = [&](const System& system, const Support& enough, const char* what, int block,
-                          int sensor, int role) {
-    const auto found = FindUnsupported(system, nothing);
+  const auto expect = [&](const Problem& problem, const EstimatorCapabilities& enough,
+                          const char* what, int block, int sensor, int role) {
+    const auto found = FindUnsupported(problem, nothing);
     ASSERT_TRUE(found) << what;
     EXPECT_EQ(found->what, what);
     EXPECT_EQ(found->block, block) << what;
     EXPECT_EQ(found->sensor, sensor) << what;
     EXPECT_EQ(found->role, role) << what;
-    EXPECT_FALSE(FindUnsupported(system, enough)) << what;
+    EXPECT_FALSE(FindUnsupported(problem, enough)) << what;
   };
   expect(WithAConsideredBlock(), {.consider = true, .known = false}, "consider blocks", 2, -1, -1);
   expect(WithABlockFromAMeasurement(), {.from_measurement = true},
@@ -68,9 +68,9 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
 }
 
 template <class Filter>
-bool Makes(const System& system) {
+bool Makes(const Problem& problem) {
   try {
-    Filter(system, {}, StreamsOf(system));
+    Filter(problem, {}, StreamsOf(problem));
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find(" does not support "), std::string::npos);
     return false;
@@ -78,10 +78,10 @@ bool Makes(const System& system) {
   return true;
 }
 
-/// Whether the filter is made from exactly the systems that its kSupport allows.
+/// Whether the filter is made from exactly the problems that its kCapabilities allows.
 template <class Filter>
 void ExpectAsSupported() {
-  const Support& can = Filter::kSupport;
+  const EstimatorCapabilities& can = Filter::kCapabilities;
   EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.consider);
   EXPECT_EQ(Makes<Filter>(WithABlockFromAMeasurement()), can.from_measurement);
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, JacobianAt::kPrediction)), can.consider);
@@ -92,7 +92,7 @@ void ExpectAsSupported() {
   EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);
 }
 
-TEST(Support, IsWhatTheConstructorsTake) {
+TEST(EstimatorCapabilities, IsWhatTheConstructorsTake) {
   ExpectAsSupported<Ekf>();
   ExpectAsSupported<Iekf>();
   ExpectAsSupported<SquareRootEkf>();

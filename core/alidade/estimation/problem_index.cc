@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/binding.h"
+#include "alidade/estimation/problem_index.h"
 
 #include "alidade/base/error.h"
 
@@ -82,24 +82,24 @@ void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
   strides.assign(values.size(), width);
 }
 
-Binding::Binding(System of, const std::vector<StreamInfo>& from)
-    : system(std::move(of)),
+ProblemIndex::ProblemIndex(Problem of, const std::vector<StreamInfo>& from)
+    : problem(std::move(of)),
       streams(from),
-      initial(system.InitialState(true)),
-      stream_of_sensor(system.sensors.size(), -1) {
-  for (const SensorBinding& sensor : system.sensors) {
+      initial(problem.InitialState(true)),
+      stream_of_sensor(problem.sensors.size(), -1) {
+  for (const SensorBinding& sensor : problem.sensors) {
     sensor_places.push_back(PlaceOf(sensor, initial));
     sensor_places.back().sensor = static_cast<int>(sensor_places.size()) - 1;
     considers |= sensor_places.back().considers;
   }
-  for (const MotionBinding& motion : system.motions) {
+  for (const MotionBinding& motion : problem.motions) {
     motion_places.push_back(PlaceOf(motion, initial.layout()));
   }
-  for (std::size_t i = 0; i < system.sensors.size(); ++i) {
+  for (std::size_t i = 0; i < problem.sensors.size(); ++i) {
     for (std::size_t s = 0; s < streams.size(); ++s) {
-      if (streams[s].name != system.sensors[i].stream) continue;
-      ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model->measurement().geometry.ambient);
-      ALIDADE_EXPECTS(streams[s].known == system.sensors[i].model->known_size());
+      if (streams[s].name != problem.sensors[i].stream) continue;
+      ALIDADE_EXPECTS(streams[s].size == problem.sensors[i].model->measurement().geometry.ambient);
+      ALIDADE_EXPECTS(streams[s].known == problem.sensors[i].model->known_size());
       stream_of_sensor[i] = static_cast<int>(s);
     }
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/experiment/estimator_types.h"
+#include "alidade/experiment/estimator_registry.h"
 
 #include <algorithm>
 #include <memory>
@@ -105,9 +105,9 @@ EstimatorType TypeOf(const char* name, const char* doc, Options (*read)(Params&)
     return options;
   };
   const auto maker_of = [=](const Node& entry) {
-    return [options = options_of(entry)](const System& system,
+    return [options = options_of(entry)](const Problem& problem,
                                          const std::vector<StreamInfo>& streams) {
-      return std::make_unique<Filter>(system, options, streams);
+      return std::make_unique<Filter>(problem, options, streams);
     };
   };
   const auto schema = [=] {
@@ -119,7 +119,7 @@ EstimatorType TypeOf(const char* name, const char* doc, Options (*read)(Params&)
     return recorder.Result();
   };
   const auto description_of = [=](const Node& entry) { return describe(options_of(entry)); };
-  return {name, doc, Filter::kSupport, kind, maker_of, schema, description_of};
+  return {name, doc, Filter::kCapabilities, kind, maker_of, schema, description_of};
 }
 
 }  // namespace

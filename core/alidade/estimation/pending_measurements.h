@@ -17,7 +17,7 @@
 namespace alidade::internal {
 
 /// One measurement on its way into an update: m = dof, n = size of P.
-struct Row {
+struct PendingMeasurement {
   const Measurement* measurement = nullptr;
   MeasurementReport* report = nullptr;
   int sensor = -1;
@@ -45,27 +45,29 @@ struct Row {
 
 /// The rows of a frame, in memory that is kept from one to the next: there lie the numbers of their
 /// reports.
-class Rows {
+class PendingMeasurements {
  public:
   /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
   /// its entry in the report: kAccepted as long as nothing speaks against it. Unless `refused` is
   /// kAccepted all have that outcome, and no model is asked.
-  void Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
+  void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
                Outcome refused = Outcome::kAccepted);
   /// The same of one measurement and one sensor, whatever their streams. kAccepted.
-  Row& CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
-                  UpdateReport& report);
-  std::span<Row> all() { return std::span(rows_).first(static_cast<std::size_t>(count_)); }
+  PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
+                                 const ProblemIndex& index, UpdateReport& report);
+  std::span<PendingMeasurement> all() {
+    return std::span(rows_).first(static_cast<std::size_t>(count_));
+  }
 
  private:
-  Row& Add(const Measurement& measurement, const SensorPlace& place);
-  void Report(const Row& row, Outcome outcome, UpdateReport& report);
+  PendingMeasurement& Add(const Measurement& measurement, const SensorPlace& place);
+  void Report(const PendingMeasurement& pending, Outcome outcome, UpdateReport& report);
   void PointToReports(UpdateReport& report);
-  Outcome Check(const Row& row);
-  Outcome CheckRest(const Row& row);
+  Outcome Check(const PendingMeasurement& pending);
+  Outcome CheckRest(const PendingMeasurement& pending);
   bool IsCovariance(const std::vector<double>& covariance, int size);
 
-  std::vector<Row> rows_;  ///< the first count_ are in use
+  std::vector<PendingMeasurement> rows_;  ///< the first count_ are in use
   std::ptrdiff_t count_ = 0;
   // Memory.
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
@@ -76,47 +78,52 @@ class Rows {
 
 /// What fills its roles at x; roles that the sensor knows have their value in f. Until the next
 /// call.
-inline const double* const* RolesAt(const FilterState& f, Row& row, const std::vector<double>& x) {
+inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pending,
+                                    const std::vector<double>& x) {
   const double* const values = f.state.values().data();
-  if (x.data() == values && row.roles_of == values) return row.roles.data();
-  RolesAt(*row.place, x.data(), values, row.roles);
-  row.roles_of = x.data() == values ? values : nullptr;
-  return row.roles.data();
+  if (x.data() == values && pending.roles_of == values) return pending.roles.data();
+  RolesAt(*pending.place, x.data(), values, pending.roles);
+  pending.roles_of = x.data() == values ? values : nullptr;
+  return pending.roles.data();
 }
 /// h at x, ambient, in `h`.
-Outcome PredictAt(const FilterState& f, Row& row, const std::vector<double>& x, double* h);
+Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::vector<double>& x,
+                  double* h);
 /// h at the roles, in the report; H and R, in the row.
-[[gnu::always_inline]] inline Outcome LineariseAt(Row& row, const double* const* roles) {
-  const SensorPlace& place = *row.place;
-  const Measurement& measurement = *row.measurement;
+[[gnu::always_inline]] inline Outcome LineariseAt(PendingMeasurement& pending,
+                                                  const double* const* roles) {
+  const SensorPlace& place = *pending.place;
+  const Measurement& measurement = *pending.measurement;
   const bool has_noise = !measurement.covariance.empty();
-  row.report->h = {row.h, static_cast<std::size_t>(place.ambient)};
-  const Status status = row.model->Evaluate(
-      {measurement.values.data(), measurement.known.data()}, roles,
-      {row.h, row.jacobians.data(), place.strides.data(), has_noise ? nullptr : row.root});
+  pending.report->h = {pending.h, static_cast<std::size_t>(place.ambient)};
+  const Status status =
+      pending.model->Evaluate({measurement.values.data(), measurement.known.data()}, roles,
+                              {pending.h, pending.jacobians.data(), place.strides.data(),
+                               has_noise ? nullptr : pending.root});
   if (has_noise) {
-    std::ranges::copy(measurement.covariance, row.R.begin());
+    std::ranges::copy(measurement.covariance, pending.R.begin());
   } else {
-    Square(row.root, place.dof, row.R.data());
+    Square(pending.root, place.dof, pending.R.data());
   }
   return OutcomeOf(status);
 }
 /// R at the roles, or as the measurement itself says, in the row.
-Outcome NoiseAt(Row& row, const double* const* roles);
+Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles);
 /// z (-) h of the h in the report, in the report.
-inline void ComputeInnovation(Row& row) {
-  row.report->innovation = {row.innovation, static_cast<std::size_t>(row.place->dof)};
-  row.model->measurement().geometry.Minus(row.z, row.h, row.innovation);
+inline void ComputeInnovation(PendingMeasurement& pending) {
+  pending.report->innovation = {pending.innovation, static_cast<std::size_t>(pending.place->dof)};
+  pending.model->measurement().geometry.Minus(pending.z, pending.h, pending.innovation);
 }
 /// H <- H J in the columns of one role, J size x size, row-major.
-void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work);
+void ChainJacobian(PendingMeasurement& pending, int column, int size, const double* j,
+                   Workspace& work);
 
 /// r' S^-1 r by S = L D L', m x m, row-major; not a number unless S is positive definite.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
 /// Tells why h of a row could not be had; outside its domain, by which the filter counts as
 /// diverged, once until the sensor is accepted again.
-void NoteRefusal(FilterState& f, const Row& row, Outcome outcome);
-void NotePluginFailure(FilterState& f, const Row& row);
+void NoteRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
+void NotePluginFailure(FilterState& f, const PendingMeasurement& pending);
 
 }  // namespace alidade::internal

@@ -1,47 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/linear.h"
+#include "alidade/estimation/ekf_equations.h"
 
 #include <algorithm>
 #include <array>
 #include <optional>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/estimation/stacked_rows.h"
+#include "alidade/estimation/stacked_measurements.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 
-// Flattened functions here: see FrameLoop::Run.
+// Flattened functions here: see FilterEngine::Run.
 
-[[gnu::flatten]] Trouble Linear::Step(FilterState& f, double dt_s) {
-  if (Trouble trouble = f.motions.Evaluate(f.state, dt_s)) return trouble;
+[[gnu::flatten]] StepError EkfEquations::Step(FilterState& f, double dt_s) {
+  if (StepError error = f.motions.Evaluate(f.state, dt_s)) return error;
   return f.motions.Apply(f.state);
 }
 
-void Linear::BeginUpdate(FilterState& f, int capacity) {
+void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
   f.update.Begin(f.state.covariance(), capacity);
 }
 
-[[gnu::flatten]] Outcome Linear::Predict(FilterState& f, Row& row) {
-  const double* const* const roles = RolesAt(f, row, f.state.values());
+[[gnu::flatten]] Outcome EkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
+  const double* const* const roles = RolesAt(f, pending, f.state.values());
   const bool elsewhere =
-      (row.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, row);
-  const Outcome outcome = elsewhere ? LineariseElsewhere(f, row) : LineariseAt(row, roles);
+      (pending.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, pending);
+  const Outcome outcome = elsewhere ? LineariseElsewhere(f, pending) : LineariseAt(pending, roles);
   if (outcome != Outcome::kAccepted) {
-    if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) row.report->h = {};
-    NoteRefusal(f, row, outcome);
+    if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) pending.report->h = {};
+    NoteRefusal(f, pending, outcome);
     return outcome;
   }
-  WrapAngles(row.model->measurement().geometry, row.h);
-  ComputeInnovation(row);
+  WrapAngles(pending.model->measurement().geometry, pending.h);
+  ComputeInnovation(pending);
   return outcome;
 }
 
 /// Puts where H is taken into at_: the roles in row.roles, but first estimates, and what the
 /// measurement implies for the role that asks for it. Whether that is elsewhere than h.
-[[gnu::noinline]] bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
-  const std::vector<RoleBinding>& bound = row.binding->roles;
-  at_ = row.roles;
+[[gnu::noinline]] bool EkfEquations::FindLinearisation(const FilterState& f,
+                                                       const PendingMeasurement& pending) {
+  const std::vector<RoleBinding>& bound = pending.binding->roles;
+  at_ = pending.roles;
   implied_.clear();
   bool elsewhere = false;
   for (std::size_t i = 0; i < bound.size(); ++i) {
@@ -49,57 +50,60 @@ void Linear::BeginUpdate(FilterState& f, int capacity) {
     if (block < 0 || at_[i] == nullptr) continue;
     const auto index = static_cast<std::size_t>(block);
     if (bound[i].jacobian_at == JacobianAt::kMeasurement) {
-      implied_.resize(static_cast<std::size_t>(row.model->roles()[i].geometry.ambient));
+      implied_.resize(static_cast<std::size_t>(pending.model->roles()[i].geometry.ambient));
       at_[i] = implied_.data();
     } else if (!f.first_estimates[index].empty()) {
       at_[i] = f.first_estimates[index].data();
     }
-    elsewhere = elsewhere || at_[i] != row.roles[i];
+    elsewhere = elsewhere || at_[i] != pending.roles[i];
   }
   return elsewhere;
 }
 
 /// h at row.roles, H at at_.
-[[gnu::noinline]] Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
-  const SensorModel& model = *row.model;
-  row.report->h = {row.h, static_cast<std::size_t>(row.place->ambient)};
-  Outcome outcome = PredictAt(f, row, f.state.values(), row.h);
+[[gnu::noinline]] Outcome EkfEquations::LineariseElsewhere(FilterState& f,
+                                                           PendingMeasurement& pending) {
+  const SensorModel& model = *pending.model;
+  pending.report->h = {pending.h, static_cast<std::size_t>(pending.place->ambient)};
+  Outcome outcome = PredictAt(f, pending, f.state.values(), pending.h);
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
-    const Status status = model.Initialise(row.roles.data(), {row.z, row.measurement->known.data()},
-                                           nullptr, {.y = implied_.data()});
+    const Status status =
+        model.Initialise(pending.roles.data(), {pending.z, pending.measurement->known.data()},
+                         nullptr, {.y = implied_.data()});
     // What z cannot have come from tells nothing of where to linearise.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  const SensorPlace& place = *row.place;
+  const SensorPlace& place = *pending.place;
   h_there_.resize(static_cast<std::size_t>(place.ambient));
-  outcome = EvaluateAt(model, place, *row.measurement, at_.data(), {h_there_.data(), row.H.data()});
-  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
+  outcome = EvaluateAt(model, place, *pending.measurement, at_.data(),
+                       {h_there_.data(), pending.H.data()});
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(pending, pending.roles.data());
   if (outcome != Outcome::kAccepted) return outcome;
   for (std::size_t i = 0; i < place.values.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (place.columns[i] < 0 || at_[i] == row.roles[i] ||
+    if (place.columns[i] < 0 || at_[i] == pending.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
     std::array<double, 4> j;  // a unit vector's tangent has two elements
-    geometry.Transport(row.roles[i], at_[i], j.data());
-    ChainJacobian(row, place.columns[i], geometry.tangent, j.data(), f.work);
+    geometry.Transport(pending.roles[i], at_[i], j.data());
+    ChainJacobian(pending, place.columns[i], geometry.tangent, j.data(), f.work);
   }
   return outcome;
 }
 
-double Linear::ComputeNis(FilterState& f, Row& row) {
-  row.report->s = {row.s, row.R.size()};
-  return f.update.ComputeNis(row.linearised);
+double EkfEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
+  pending.report->s = {pending.s, pending.R.size()};
+  return f.update.ComputeNis(pending.linearised);
 }
 
-void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
+void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* const> rows) {
   stacked_.clear();
   int column = 0;
-  for (Row* const row : rows) {
-    MeasurementRows& one = row->linearised;
+  for (PendingMeasurement* const pending : rows) {
+    MeasurementRows& one = pending->linearised;
     if (one.column != column) f.update.MoveColumns(one.column, column, one.h.rows);
     one.column = column;
     stacked_.push_back(&one);
@@ -108,7 +112,8 @@ void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
 }
 
 /// The rows of P that are considered, in considered_.
-[[gnu::noinline]] void Linear::FindConsidered(const FilterState& f, std::span<Row* const> rows) {
+[[gnu::noinline]] void EkfEquations::FindConsidered(const FilterState& f,
+                                                    std::span<PendingMeasurement* const> rows) {
   ForEachConsidered(f, rows, [&](int offset, int size, int, int) {
     for (int i = 0; i < size; ++i) considered_.push_back(offset + i);
   });
@@ -117,9 +122,8 @@ void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
 }
 
 /// K is K* with zeros for what is considered: takes it, and its dx, into the update.
-[[gnu::noinline]] Linear::Considered Linear::ConsiderCorrection(FilterState& f,
-                                                                std::span<Row* const> rows,
-                                                                bool recorded) {
+[[gnu::noinline]] EkfEquations::Considered EkfEquations::ConsiderCorrection(
+    FilterState& f, std::span<PendingMeasurement* const> rows, bool recorded) {
   const Eigen::Index count = std::ssize(considered_), m = f.update.rows();
   Considered found{f.work.Take(count, m), f.work.Take(count, m)};
   Workspace::Matrix &gain = found.gain, &e = found.e, l = f.work.Take(m, m);
@@ -152,8 +156,9 @@ void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
 
 /// P by any gain, that of considered rows as given, without a difference that would cancel. False
 /// where a variance would be negative.
-[[gnu::noinline]] bool Linear::Joseph(FilterState& f, std::span<Row* const> rows,
-                                      const Workspace::Matrix* considered) {
+[[gnu::noinline]] bool EkfEquations::Joseph(FilterState& f,
+                                            std::span<PendingMeasurement* const> rows,
+                                            const Workspace::Matrix* considered) {
   const Eigen::Index n = f.size(), m = f.update.rows();
   Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);
   f.update.CopyFactor(l);
@@ -167,19 +172,20 @@ void Linear::AssignColumns(FilterState& f, std::span<Row* const> rows) {
                           f.work);
 }
 
-[[gnu::flatten]] Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows,
-                                           const double* correction) {
+[[gnu::flatten]] Outcome EkfEquations::CorrectBy(FilterState& f,
+                                                 std::span<PendingMeasurement* const> rows,
+                                                 const double* correction) {
   const Workspace::Use use(f.work);
   KalmanUpdate& update = f.update;
   AssignColumns(f, rows);
-  const bool recorded =
-      std::ranges::any_of(rows, [](const Row* row) { return GainIsRecorded(*row); });
+  const bool recorded = std::ranges::any_of(
+      rows, [](const PendingMeasurement* pending) { return GainIsRecorded(*pending); });
   const Solution solution = update.Solve(stacked_, recorded);
   if (solution == Solution::kNotPositiveDefinite) return Outcome::kNotPd;
   if (solution == Solution::kNotFinite) return Outcome::kNotFinite;
   std::optional<Considered> considered;
   considered_.clear();
-  if (f.blocks.considering || f.binding->considers) FindConsidered(f, rows);
+  if (f.blocks.considering || f.index->considers) FindConsidered(f, rows);
   if (!considered_.empty()) considered = ConsiderCorrection(f, rows, recorded);
   if (!f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved)) {
     return Outcome::kNotFinite;

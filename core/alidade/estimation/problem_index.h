@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/estimation/frame.h"
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {
@@ -16,7 +16,7 @@ using Roles = std::array<const double*, kMaxRoles>;
 /// A sensor and how it touches the state, by places in x and P. The roles of a landmark, which come
 /// last, have theirs where a measurement names it.
 struct SensorPlace {
-  int sensor = -1;  ///< index into System::sensors
+  int sensor = -1;  ///< index into Problem::sensors
   const SensorBinding* binding = nullptr;
   std::vector<int> values;          ///< by role: of its value in x; -1: it has none
   std::vector<char> known;          ///< by role: at its value in the filter, wherever h is taken
@@ -53,15 +53,15 @@ struct MotionPlace {
   bool holds = false;         ///< its noise is discrete
 };
 
-/// A system on its layout: which stream each sensor reads, and where its blocks and those of the
-/// motion models lie. Blocks of the system have their places from the start, also before they have
+/// A problem on its layout: which stream each sensor reads, and where its blocks and those of the
+/// motion models lie. Blocks of the problem have their places from the start, also before they have
 /// a value, and never move; landmarks lie behind them.
-struct Binding {
+struct ProblemIndex {
   /// `streams` are the source's, in the order of Measurement::stream. ContractViolation where a
   /// sensor's stream has another size than it measures.
-  Binding(System system, const std::vector<StreamInfo>& streams);
+  ProblemIndex(Problem problem, const std::vector<StreamInfo>& streams);
 
-  const System system;
+  const Problem problem;
   const std::vector<StreamInfo> streams;
   const State initial;  ///< with a place for every block that has a prior
   std::vector<SensorPlace> sensor_places;

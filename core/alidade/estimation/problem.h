@@ -131,8 +131,8 @@ struct StateHandle {
 
 /// A sensor of a problem.
 struct SensorHandle {
-  int index = -1;   ///< into System::sensors
-  int stream = -1;  ///< into System::streams
+  int index = -1;   ///< into Problem::sensors
+  int stream = -1;  ///< into Problem::streams
 };
 
 /// What a sensor has besides its model and roles.
@@ -147,7 +147,7 @@ struct SensorOptions {
 
 /// The problem that every estimator is given: blocks, how they move, what measures them, how they
 /// start. Add* check what they add at once. Errors: kBadConfig, which says what does not fit.
-struct System {
+struct Problem {
   /// A state whose blocks are those of the model, each with its initial value. A block with the
   /// flag ALIDADE_ROLE_OWNED that has none is constant at the neutral element. `input`: of a model
   /// that takes a control input; without a stream it reads NAME.INPUT.
@@ -186,15 +186,15 @@ struct System {
 namespace internal {
 
 /// The block of a position that landmarks are seen from; -1: there is none.
-BlockId PositionBlockOf(const System& system);
+BlockId PositionBlockOf(const Problem& problem);
 
 /// Adds the state SENSOR.ROLE of a sensor, with its process. Error kBadConfig for an initial value
 /// that does not fit.
-BlockId AddOwnedState(System& system, const std::string& sensor, const Space& role,
+BlockId AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                       OwnedState state);
 
 /// The unit of a block, or else of a sensor's role that it fills.
-std::string UnitOf(const System& system, BlockId id);
+std::string UnitOf(const Problem& problem, BlockId id);
 
 }  // namespace internal
 
@@ -202,6 +202,6 @@ std::string UnitOf(const System& system, BlockId id);
 /// from the rank of [H0; H1 F0; H2 F1 F0; ...] under changing ones [Hermann1977]: the block
 /// elements each moves. With landmarks, `scale` is that of trajectory and map; exact priors are
 /// seen.
-std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
+std::vector<std::vector<std::string>> UnobservableDirections(const Problem& problem);
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/compare/over_runs.h"
+#include "alidade/compare/over_seeds.h"
 
 #include <algorithm>
 #include <cmath>

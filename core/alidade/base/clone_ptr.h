@@ -9,9 +9,9 @@ namespace alidade {
 /// A T somewhere else in memory that is copied with its holder, by T::Clone where it has one. What
 /// was moved from may be assigned to or destroyed. T may be incomplete but where one is made.
 template <class T>
-class Indirect {
+class ClonePtr {
  public:
-  explicit Indirect(std::unique_ptr<T> value)
+  explicit ClonePtr(std::unique_ptr<T> value)
       : value_(std::move(value)), copy_([](const T& of) -> std::shared_ptr<T> {
           if constexpr (requires { of.Clone(); }) {
             return of.Clone();
@@ -19,11 +19,11 @@ class Indirect {
             return std::make_shared<T>(of);
           }
         }) {}
-  Indirect(const Indirect& other) : value_(other.copy_(*other.value_)), copy_(other.copy_) {}
-  Indirect& operator=(const Indirect& other) { return *this = Indirect(other); }
-  Indirect(Indirect&& other) noexcept = default;
-  Indirect& operator=(Indirect&& other) noexcept = default;
-  ~Indirect() = default;
+  ClonePtr(const ClonePtr& other) : value_(other.copy_(*other.value_)), copy_(other.copy_) {}
+  ClonePtr& operator=(const ClonePtr& other) { return *this = ClonePtr(other); }
+  ClonePtr(ClonePtr&& other) noexcept = default;
+  ClonePtr& operator=(ClonePtr&& other) noexcept = default;
+  ~ClonePtr() = default;
 
   T& operator*() { return *value_; }
   const T& operator*() const { return *value_; }

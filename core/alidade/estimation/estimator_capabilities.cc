@@ -1,34 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/support.h"
+#include "alidade/estimation/estimator_capabilities.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade {
 namespace {
 
-std::optional<ProblemDefect> OfBlocks(const System& system, const Support& support) {
-  const std::vector<Block>& blocks = system.layout.blocks();
+std::optional<ProblemDefect> OfBlocks(const Problem& problem,
+                                      const EstimatorCapabilities& support) {
+  const std::vector<Block>& blocks = problem.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (blocks[b].status != BlockStatus::kConsider || support.consider) continue;
     return ProblemDefect{"consider blocks", "the block estimated or constant",
                          static_cast<BlockId>(b)};
   }
-  for (const Prior& prior : system.priors) {
+  for (const Prior& prior : problem.priors) {
     if (prior.from.empty() || support.from_measurement) continue;
     return ProblemDefect{"blocks that start from a measurement", "mean and sigma", prior.block};
   }
-  if (system.landmarks && !support.landmarks) {
+  if (problem.landmarks && !support.landmarks) {
     return ProblemDefect{"landmarks", "`sensors` that measure none"};
   }
   return std::nullopt;
 }
 
-std::optional<ProblemDefect> OfRole(const RoleBinding& role, const Support& support) {
+std::optional<ProblemDefect> OfRole(const RoleBinding& role, const EstimatorCapabilities& support) {
   if (role.mode == RoleMode::kConsider && !support.consider) {
     return ProblemDefect{"consider roles", support.known ? "estimate or known" : "estimate"};
   }
@@ -41,18 +42,18 @@ std::optional<ProblemDefect> OfRole(const RoleBinding& role, const Support& supp
 }
 
 /// The sensor that a block starts from; null if there is none of that name.
-const SensorBinding* SensorOf(const System& system, const Prior& prior) {
-  const int index = system.FindSensor(prior.from);
-  return index < 0 ? nullptr : &system.sensors[static_cast<std::size_t>(index)];
+const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
+  const int index = problem.FindSensor(prior.from);
+  return index < 0 ? nullptr : &problem.sensors[static_cast<std::size_t>(index)];
 }
 
 /// Why a block cannot start from the sensor that its prior names.
-std::optional<ProblemDefect> OfStart(const System& system, const Prior& prior) {
-  const SensorBinding* const sensor = SensorOf(system, prior);
+std::optional<ProblemDefect> OfStart(const Problem& problem, const Prior& prior) {
+  const SensorBinding* const sensor = SensorOf(problem, prior);
   if (sensor == nullptr) {
     ProblemDefect defect{"no sensor '" + prior.from + "' here", "a sensor of this estimator",
                          prior.block};
-    defect.nearest = Nearest(prior.from, internal::NamesOf(system.sensors));
+    defect.nearest = Nearest(prior.from, internal::NamesOf(problem.sensors));
     return defect;
   }
   const int role = sensor->model->inverse().role;
@@ -63,31 +64,31 @@ std::optional<ProblemDefect> OfStart(const System& system, const Prior& prior) {
 
 /// The first cycle among the blocks that `chain` leads to; each needs the next one to start. All
 /// sensors that blocks start from are there.
-std::optional<ProblemDefect> FindCycle(const System& system, std::vector<BlockId>& chain) {
+std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<BlockId>& chain) {
   const BlockId last = chain.back();
   if (std::ranges::find(chain, last) != chain.end() - 1) {
     std::vector<std::string> names;
-    for (const BlockId block : chain) names.push_back(system.layout[block].name);
+    for (const BlockId block : chain) names.push_back(problem.layout[block].name);
     return ProblemDefect{"cyclic: " + internal::Join(names, " <- "),
                          "one block of the cycle with a mean of its own", last};
   }
-  const auto prior = std::ranges::find(system.priors, last, &Prior::block);
-  if (prior == system.priors.end() || prior->from.empty()) return {};
-  for (const RoleBinding& role : SensorOf(system, *prior)->roles) {
+  const auto prior = std::ranges::find(problem.priors, last, &Prior::block);
+  if (prior == problem.priors.end() || prior->from.empty()) return {};
+  for (const RoleBinding& role : SensorOf(problem, *prior)->roles) {
     if (role.block < 0 || role.block == last) continue;
     chain.push_back(role.block);
-    if (auto cycle = FindCycle(system, chain)) return cycle;
+    if (auto cycle = FindCycle(problem, chain)) return cycle;
     chain.pop_back();
   }
   return {};
 }
 
 /// `consider blocks (block 'target.depth')`
-std::string Describe(const ProblemDefect& defect, const System& system) {
+std::string Describe(const ProblemDefect& defect, const Problem& problem) {
   std::string text = defect.what;
-  if (defect.block >= 0) text += " (block '" + system.layout[defect.block].name + "')";
+  if (defect.block >= 0) text += " (block '" + problem.layout[defect.block].name + "')";
   if (defect.sensor >= 0) {
-    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(defect.sensor)];
+    const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
     text += " (sensor '" + sensor.name + "', role '" +
             sensor.model->roles()[static_cast<std::size_t>(defect.role)].name + "')";
   }
@@ -102,17 +103,17 @@ const char* ToString(EstimatorKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-std::optional<ProblemDefect> FindDefect(const System& system) {
-  for (const Prior& prior : system.priors) {
+std::optional<ProblemDefect> FindDefect(const Problem& problem) {
+  for (const Prior& prior : problem.priors) {
     if (prior.from.empty()) continue;
-    if (auto defect = OfStart(system, prior)) return defect;
+    if (auto defect = OfStart(problem, prior)) return defect;
   }
-  for (const Prior& prior : system.priors) {
+  for (const Prior& prior : problem.priors) {
     std::vector<BlockId> chain{prior.block};
-    if (auto cycle = FindCycle(system, chain)) return cycle;
+    if (auto cycle = FindCycle(problem, chain)) return cycle;
   }
-  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const SensorBinding& sensor = system.sensors[s];
+  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+    const SensorBinding& sensor = problem.sensors[s];
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
       const bool inverted = sensor.model->inverse().role == static_cast<int>(r);
       if (sensor.roles[r].jacobian_at != JacobianAt::kMeasurement || inverted) continue;
@@ -125,10 +126,11 @@ std::optional<ProblemDefect> FindDefect(const System& system) {
   return {};
 }
 
-std::optional<ProblemDefect> FindUnsupported(const System& system, const Support& support) {
-  if (auto found = OfBlocks(system, support)) return found;
-  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const SensorBinding& sensor = system.sensors[s];
+std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
+                                             const EstimatorCapabilities& support) {
+  if (auto found = OfBlocks(problem, support)) return found;
+  for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
+    const SensorBinding& sensor = problem.sensors[s];
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
       auto found = OfRole(sensor.roles[r], support);
       if (!found) continue;
@@ -140,16 +142,17 @@ std::optional<ProblemDefect> FindUnsupported(const System& system, const Support
   return std::nullopt;
 }
 
-System CheckedProblem(System system, const char* estimator, const Support& support) {
+Problem CheckedProblem(Problem problem, const char* estimator,
+                       const EstimatorCapabilities& support) {
   const std::string name = estimator;
-  if (const auto defect = FindUnsupported(system, support)) {
+  if (const auto defect = FindUnsupported(problem, support)) {
     throw Error(ExitCode::kBadConfig,
-                name + " does not support " + Describe(*defect, system) + ", or an Ekf");
+                name + " does not support " + Describe(*defect, problem) + ", or an Ekf");
   }
-  if (const auto defect = FindDefect(system)) {
-    throw Error(ExitCode::kBadConfig, name + ": " + Describe(*defect, system));
+  if (const auto defect = FindDefect(problem)) {
+    throw Error(ExitCode::kBadConfig, name + ": " + Describe(*defect, problem));
   }
-  return system;
+  return problem;
 }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/first_values.h"
+#include "alidade/estimation/delayed_initialisation.h"
 
 #include <algorithm>
 
@@ -13,24 +13,24 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
 }
 
 /// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
-bool IsAwaited(const FilterState& f, const Row& row) {
-  const SensorBinding& sensor = *row.binding;
+bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
+  const SensorBinding& sensor = *pending.binding;
   const int index = sensor.model->inverse().role;
-  if (row.report->outcome != Outcome::kAccepted || index < 0) return false;
+  if (pending.report->outcome != Outcome::kAccepted || index < 0) return false;
   const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
   const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
   const auto waits = [&](const Prior& prior) {
     return prior.block == target.block && prior.from == sensor.name;
   };
   return missing(target) && std::ranges::count_if(sensor.roles, missing) == 1 &&
-         std::ranges::any_of(f.binding->system.priors, waits);
+         std::ranges::any_of(f.index->problem.priors, waits);
 }
 
 }  // namespace
 
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
                  const Measurement& measurement, const double* prior, Roles& roles,
-                 Inverse& inverse) {
+                 InverseMeasurement& inverse) {
   const SensorModel& model = *sensor.model;
   const auto first = static_cast<std::size_t>(model.inverse().role);
   const auto count = static_cast<std::size_t>(model.inverse().count);
@@ -81,23 +81,24 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   return finite ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
-bool IsReady(const FilterState& f, const Row& row) {
-  return std::ranges::none_of(row.binding->roles,
+bool IsReady(const FilterState& f, const PendingMeasurement& pending) {
+  return std::ranges::none_of(pending.binding->roles,
                               [&](const RoleBinding& role) { return IsMissing(f, role); });
 }
 
-Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
-  RolesAt(f, row, f.state.values());
-  Roles roles = row.roles;  // then with y
-  Outcome outcome = InvertAt(*row.binding, *row.place, *row.measurement,
+Outcome Invert(FilterState& f, PendingMeasurement& pending, const LandmarkOptions::Prior* prior,
+               InverseMeasurement& inverse) {
+  RolesAt(f, pending, f.state.values());
+  Roles roles = pending.roles;  // then with y
+  Outcome outcome = InvertAt(*pending.binding, *pending.place, *pending.measurement,
                              prior == nullptr ? nullptr : &prior->inverse_distance, roles, inverse);
-  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, roles.data());
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(pending, roles.data());
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, pending);
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
   }
-  const int m = row.report->dof;
-  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
+  const int m = pending.report->dof;
+  const Eigen::Map<const RowMajor> r(pending.R.data(), m, m);
   const RowMajor& jp = inverse.by_prior;
   inverse.by_z_r.noalias() = inverse.by_z * r;
   inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
@@ -107,27 +108,28 @@ Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, In
   return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
-[[gnu::noinline]] void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
-  Inverse inverse;
+[[gnu::noinline]] void InitialiseWaiting(FilterState& f, std::span<PendingMeasurement> rows) {
+  InverseMeasurement inverse;
   for (bool progress = true; progress;) {
     progress = false;
-    for (Row& row : rows) {
-      if (!IsAwaited(f, row)) continue;
-      row.report->outcome = Invert(f, row, nullptr, inverse);
-      if (row.report->outcome != Outcome::kAccepted) continue;
-      Initialise(f, row, inverse);
-      row.report->outcome = Outcome::kInitialised;
+    for (PendingMeasurement& pending : rows) {
+      if (!IsAwaited(f, pending)) continue;
+      pending.report->outcome = Invert(f, pending, nullptr, inverse);
+      if (pending.report->outcome != Outcome::kAccepted) continue;
+      Initialise(f, pending, inverse);
+      pending.report->outcome = Outcome::kInitialised;
       progress = true;
     }
   }
-  for (const Row& row : rows) {
-    Outcome& outcome = row.report->outcome;
-    if (outcome == Outcome::kAccepted && !IsReady(f, row)) outcome = Outcome::kNotReady;
+  for (const PendingMeasurement& pending : rows) {
+    Outcome& outcome = pending.report->outcome;
+    if (outcome == Outcome::kAccepted && !IsReady(f, pending)) outcome = Outcome::kNotReady;
   }
 }
 
-void Initialise(FilterState& f, const Row& row, const Inverse& inverse) {
-  const SensorBinding& sensor = *row.binding;
+void Initialise(FilterState& f, const PendingMeasurement& pending,
+                const InverseMeasurement& inverse) {
+  const SensorBinding& sensor = *pending.binding;
   const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model->inverse().role)].block;
   f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
   f.first_estimates[static_cast<std::size_t>(id)].clear();

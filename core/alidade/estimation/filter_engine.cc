@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/estimation/frame_loop.h"
+#include "alidade/estimation/filter_engine.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/estimation/first_values.h"
+#include "alidade/estimation/delayed_initialisation.h"
 
 namespace alidade::internal {
 namespace {
@@ -39,24 +39,25 @@ void ExpectOption(bool holds, const char* option, double value, const char* expe
                                         RoundedText(value, 6) + "; expected " + expected);
 }
 
-FrameLoop::FrameLoop(System system, const EkfOptions& options,
-                     const std::vector<StreamInfo>& streams, std::unique_ptr<Method> equations)
-    : f(std::make_shared<const Binding>(std::move(system), streams),
+FilterEngine::FilterEngine(Problem problem, const EkfOptions& options,
+                           const std::vector<StreamInfo>& streams,
+                           std::unique_ptr<UpdateMethod> equations)
+    : f(std::make_shared<const ProblemIndex>(std::move(problem), streams),
         options.jacobian == JacobianPolicy::kFirstEstimate),
       method(std::move(equations)),
       options_(CheckedOptions(options)),
-      time_(f.binding->system, streams, options.max_dt_s),
-      gate_(f.binding->system, options),
-      consensus_(f.binding->system),
+      time_(f.index->problem, streams, options.max_dt_s),
+      gate_(f.index->problem, options),
+      consensus_(f.index->problem),
       recovery_(options) {
-  if (f.binding->system.landmarks) {
-    landmarks.emplace(*f.binding);
+  if (f.index->problem.landmarks) {
+    landmarks.emplace(*f.index);
     landmarks->AddKnown(f);
   }
   method->Begin(f);
 }
 
-void FrameLoop::Process(const Frame& frame) {
+void FilterEngine::Process(const Frame& frame) {
   f.report.Clear();
   Run(frame);
   if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
@@ -67,7 +68,7 @@ void FrameLoop::Process(const Frame& frame) {
 
 /// The way of a frame. Flattened: its parts are small, and a call of each would cost as much. Large
 /// and rarely called functions are marked `noinline`.
-[[gnu::flatten]] void FrameLoop::Run(const Frame& frame) {
+[[gnu::flatten]] void FilterEngine::Run(const Frame& frame) {
   if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
@@ -76,21 +77,24 @@ void FrameLoop::Process(const Frame& frame) {
   const Outcome refused = f.report.stale   ? Outcome::kStale
                           : f.health.ended ? Outcome::kEnded
                                            : Outcome::kAccepted;
-  rows_.Collect(frame, *f.binding, f.report, refused);
+  rows_.Collect(frame, *f.index, f.report, refused);
   if (refused != Outcome::kAccepted) return;
-  const std::span<Row> all = rows_.all();
-  for (const Row& row : all) {
-    if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, row);
+  const std::span<PendingMeasurement> all = rows_.all();
+  for (const PendingMeasurement& pending : all) {
+    if (pending.report->outcome == Outcome::kFailed) NotePluginFailure(f, pending);
   }
   if (f.blocks.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);
   UpdateInGroups(all);
-  const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
+  const auto is_not_pd = [](const PendingMeasurement& pending) {
+    return pending.report->outcome == Outcome::kNotPd;
+  };
   if (std::ranges::any_of(all, is_not_pd)) recovery_.RepairCovariance(f);
   if (f.health.ended) return;
-  for (Row& row : all) {
-    if (landmarks && row.binding->model->has_landmark()) continue;  // its rejections do not count
-    if (gate_.Count(f, *row.report)) recovery_.Recover(f, row);
+  for (PendingMeasurement& pending : all) {
+    if (landmarks && pending.binding->model->has_landmark())
+      continue;  // its rejections do not count
+    if (gate_.Count(f, *pending.report)) recovery_.Recover(f, pending);
   }
   Spent(FramePart::kUpdate);
   if (!landmarks) return;
@@ -99,7 +103,7 @@ void FrameLoop::Process(const Frame& frame) {
 }
 
 /// The time since the last part goes to this one, in the report.
-void FrameLoop::Spent(FramePart part) {
+void FilterEngine::Spent(FramePart part) {
   if (!landmarks) return;
   const auto now = std::chrono::steady_clock::now();
   f.report.spent_s[static_cast<std::size_t>(part)] +=
@@ -109,42 +113,42 @@ void FrameLoop::Spent(FramePart part) {
 
 /// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
 /// before, and the filter has ended.
-void FrameLoop::StepTo(Timestamp timestamp) {
+void FilterEngine::StepTo(Timestamp timestamp) {
   while (f.timestamp < timestamp) {
     time_.UseInputs(f.timestamp, f.motions, f.report.events);
-    Timeline::Piece piece;
-    Trouble trouble = time_.First(f.timestamp, timestamp, f.report.events, piece);
-    for (Timestamp i = 1; i <= piece.steps && !trouble; ++i) {
-      trouble = method->Step(f, piece.dt_s);
-      if (trouble) break;
+    Timeline::SubStep sub_step;
+    StepError error = time_.NextSubStep(f.timestamp, timestamp, f.report.events, sub_step);
+    for (Timestamp i = 1; i <= sub_step.steps && !error; ++i) {
+      error = method->Step(f, sub_step.dt_s);
+      if (error) break;
       f.motions.CountStep();
-      f.timestamp = piece.EndOf(i);
+      f.timestamp = sub_step.EndOf(i);
     }
-    if (trouble) return End(f, trouble.kind(), trouble.text());
+    if (error) return End(f, error.kind(), error.text());
   }
 }
 
 /// The updates of a frame, group by group.
-void FrameLoop::UpdateInGroups(std::span<Row> all) {
-  std::vector<Row*>& group = groups_.group;
+void FilterEngine::UpdateInGroups(std::span<PendingMeasurement> all) {
+  std::vector<PendingMeasurement*>& group = groups_.group;
   group.clear();
-  const auto is_apart = [&](const Row& row) {
+  const auto is_apart = [&](const PendingMeasurement& pending) {
     return options_.fuse == Fuse::kPerMeasurement ||
-           (!group.empty() && group.back()->sensor != row.sensor);
+           (!group.empty() && group.back()->sensor != pending.sensor);
   };
-  for (Row& row : all) {
-    if (row.report->outcome != Outcome::kAccepted) continue;
-    if (options_.fuse != Fuse::kJoint && is_apart(row)) {
+  for (PendingMeasurement& pending : all) {
+    if (pending.report->outcome != Outcome::kAccepted) continue;
+    if (options_.fuse != Fuse::kJoint && is_apart(pending)) {
       Update(group);
       group.clear();
     }
-    group.push_back(&row);
+    group.push_back(&pending);
   }
   Update(group);
 }
 
 /// One update by those of a group that pass.
-void FrameLoop::Update(std::vector<Row*>& group) {
+void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   PredictAndGate(group);
   if (landmarks && Consensus::IsAsked(group)) {
     UpdateByConsensus(group);
@@ -154,22 +158,22 @@ void FrameLoop::Update(std::vector<Row*>& group) {
 }
 
 /// One update by those that agree, and a second one by those that it rescues.
-[[gnu::noinline]] void FrameLoop::UpdateByConsensus(std::span<Row* const> group) {
+[[gnu::noinline]] void FilterEngine::UpdateByConsensus(std::span<PendingMeasurement* const> group) {
   groups_.agreed.clear();
   groups_.rest.clear();
   consensus_.Split(f, group, static_cast<std::uint64_t>(landmarks->frame()), groups_.agreed,
                    groups_.rest);
   Spent(FramePart::kGate);
   if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
-    for (Row* const row : groups_.rest) {
-      row->report->outcome = groups_.agreed.front()->report->outcome;
+    for (PendingMeasurement* const pending : groups_.rest) {
+      pending->report->outcome = groups_.agreed.front()->report->outcome;
     }
     return;
   }
   PredictAndGate(groups_.rest);
-  std::erase_if(groups_.rest, [&](const Row* row) {
-    if (consensus_.Rescues(*row)) return false;
-    row->report->outcome = Outcome::kGated;
+  std::erase_if(groups_.rest, [&](const PendingMeasurement* pending) {
+    if (consensus_.Rescues(*pending)) return false;
+    pending->report->outcome = Outcome::kGated;
     return true;
   });
   if (Correct(groups_.rest)) {
@@ -178,31 +182,31 @@ void FrameLoop::Update(std::vector<Row*>& group) {
 }
 
 /// Predicts all rows of a group at the state, and leaves those that pass the gate, each by itself.
-void FrameLoop::PredictAndGate(std::vector<Row*>& group) {
+void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   int capacity = 0;
-  for (Row* const row : group) {
-    row->report->outcome = method->Predict(f, *row);
-    if (row->report->outcome == Outcome::kAccepted) capacity += row->report->dof;
+  for (PendingMeasurement* const pending : group) {
+    pending->report->outcome = method->Predict(f, *pending);
+    if (pending->report->outcome == Outcome::kAccepted) capacity += pending->report->dof;
   }
   Spent(FramePart::kEvaluate);
   method->BeginUpdate(f, capacity);
   int columns = 0;
   auto passed = group.begin();
-  for (Row* const row : group) {
-    Outcome& outcome = row->report->outcome;
+  for (PendingMeasurement* const pending : group) {
+    Outcome& outcome = pending->report->outcome;
     if (outcome != Outcome::kAccepted) continue;
-    row->linearised.column = columns;
-    outcome = gate_.Test(f, *row, method->ComputeNis(f, *row));
+    pending->linearised.column = columns;
+    outcome = gate_.Test(f, *pending, method->ComputeNis(f, *pending));
     if (outcome != Outcome::kAccepted) continue;
-    *passed++ = row;
-    columns += row->report->dof;
+    *passed++ = pending;
+    columns += pending->report->dof;
   }
   group.erase(passed, group.end());
   Spent(FramePart::kGate);
 }
 
 /// False where there is no update.
-bool FrameLoop::Correct(std::span<Row* const> rows) {
+bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   if (rows.empty()) return false;
   gate_.ApplyRobustWeights(rows);
   const Outcome outcome = method->Correct(f, rows);
@@ -213,13 +217,13 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
     Note(f, "not_finite", "the update is not finite; rolled back");
   }
   if (outcome != Outcome::kAccepted) {
-    for (const Row* const row : rows) {
-      if (row->report->outcome == Outcome::kAccepted) row->report->outcome = outcome;
+    for (const PendingMeasurement* const pending : rows) {
+      if (pending->report->outcome == Outcome::kAccepted) pending->report->outcome = outcome;
     }
     return false;
   }
   f.motions.EndInterval();
-  const Row& last = *rows.back();
+  const PendingMeasurement& last = *rows.back();
   f.health.last_used.sensor = last.sensor;
   f.health.last_used.timestamp = last.measurement->timestamp;
   std::vector<double>& z = f.health.last_used.z;
@@ -228,32 +232,32 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   return true;
 }
 
-std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
-                                            const std::vector<double>& known) {
+std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark,
+                                               const std::vector<double>& known) {
   if (f.health.ended || f.report.stale) return std::nullopt;
   Measurement one;
   one.landmark = landmark;
   one.known = known;
   const Geometry& geometry =
-      f.binding->system.sensors[static_cast<std::size_t>(sensor)].model->measurement().geometry;
+      f.index->problem.sensors[static_cast<std::size_t>(sensor)].model->measurement().geometry;
   one.values.resize(static_cast<std::size_t>(geometry.ambient));
   geometry.Identity(one.values.data());
-  Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);
-  if (landmarks) landmarks->Attach(f, {&row, 1});
-  if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
-      PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
+  PendingMeasurement& pending = rows_.CollectOne(one, sensor, *f.index, f.report);
+  if (landmarks) landmarks->Attach(f, {&pending, 1});
+  if (pending.report->outcome != Outcome::kAccepted || !IsReady(f, pending) ||
+      PredictAt(f, pending, f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
-  std::ranges::copy(one.values, row.z);  // as if it measured what it expects
-  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
-  const int m = row.report->dof;
+  std::ranges::copy(one.values, pending.z);  // as if it measured what it expects
+  if (method->Predict(f, pending) != Outcome::kAccepted) return std::nullopt;
+  const int m = pending.report->dof;
   method->BeginUpdate(f, m);
-  row.linearised.column = 0;
-  const Outcome outcome = gate_.Test(f, row, method->ComputeNis(f, row));
+  pending.linearised.column = 0;
+  const Outcome outcome = gate_.Test(f, pending, method->ComputeNis(f, pending));
   // Gated: h at the estimate lies far from its mean.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
-  return Prediction{{row.report->h.begin(), row.report->h.end()},
-                    Eigen::Map<const RowMajor>(row.s, m, m)};
+  return Prediction{{pending.report->h.begin(), pending.report->h.end()},
+                    Eigen::Map<const RowMajor>(pending.s, m, m)};
 }
 
 }  // namespace alidade::internal

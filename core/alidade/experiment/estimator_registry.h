@@ -22,7 +22,7 @@ struct Description {
 struct EstimatorType {
   const char* name;
   const char* doc;  ///< one line
-  Support support;
+  EstimatorCapabilities support;
   EstimatorKind kind;
   /// Reads the entry's keys. Errors: kBadConfig.
   std::function<EstimatorMaker(const Node& entry)> read;

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "alidade/estimation/system.h"
+#include "alidade/estimation/problem.h"
 
 namespace alidade {
 
@@ -19,8 +19,8 @@ enum class EstimatorKind {
 /// `filter`, `smoother`, `batch`, `sliding_window`.
 const char* ToString(EstimatorKind kind);
 
-/// What an estimator can do with a system, beyond blocks that are estimated or constant.
-struct Support {
+/// What an estimator can do with a problem, beyond blocks that are estimated or constant.
+struct EstimatorCapabilities {
   bool consider = false;          ///< consider blocks and roles (Schmidt)
   bool known = true;              ///< known roles
   bool at_measurement = false;    ///< jacobian_at: measurement
@@ -35,7 +35,7 @@ struct ProblemDefect {
   std::string what;    ///< `consider blocks`
   std::string remedy;  ///< what to write in its place: `the block estimated or constant`
   BlockId block = -1;
-  int sensor = -1;           ///< index into System::sensors
+  int sensor = -1;           ///< index into Problem::sensors
   int role = -1;             ///< index into its roles
   std::string nearest = {};  ///< the name that may be meant, or ""
 };
@@ -44,12 +44,14 @@ struct ProblemDefect {
 /// starts from the measurement of a sensor that is not there or does not determine it, a cycle of
 /// blocks that start from one another, a role without an inverse measurement model that is
 /// linearised at its measurement. Nothing if there is none.
-std::optional<ProblemDefect> FindDefect(const System& system);
-/// The first thing that `system` asks for beyond `support`, blocks before sensors; nothing if all
+std::optional<ProblemDefect> FindDefect(const Problem& problem);
+/// The first thing that `problem` asks for beyond `support`, blocks before sensors; nothing if all
 /// can be done. Recovery is an option of the estimator, and not looked at.
-std::optional<ProblemDefect> FindUnsupported(const System& system, const Support& support);
-/// The system. Error kBadConfig, by name and with the remedy, if it has a defect of either kind.
+std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
+                                             const EstimatorCapabilities& support);
+/// The problem. Error kBadConfig, by name and with the remedy, if it has a defect of either kind.
 /// `estimator`: `Ukf`.
-System CheckedProblem(System system, const char* estimator, const Support& support);
+Problem CheckedProblem(Problem problem, const char* estimator,
+                       const EstimatorCapabilities& support);
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/base/words.h"
+#include "alidade/base/text.h"
 
 namespace alidade::internal {
 

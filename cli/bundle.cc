@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "alidade/base/text.h"
 #include "alidade/bundle/bundle_folder.h"
 #include "command.h"
 #include "console.h"
@@ -43,8 +44,8 @@ std::string Short(double value) {
 bool ParseLoss(const std::string& text, RobustLoss& loss) {
   const std::size_t equals = std::min(text.find('='), text.size());
   const std::string name = text.substr(0, equals);
-  for (const LossKind kind : {LossKind::kNone, LossKind::kHuber, LossKind::kCauchy}) {
-    if (name == ToString(kind)) loss.kind = kind;
+  for (std::size_t i = 0; i < kLosses.size(); ++i) {
+    if (name == kLosses[i].name) loss.kind = static_cast<LossKind>(i);
   }
   if (name != ToString(loss.kind)) return false;
   if (equals == text.size()) return true;
@@ -61,8 +62,8 @@ std::string IsLoss(const std::string& text) {
     return "the scale of '" + text + "' is out of bounds; expected " + Short(kBundleLossScaleMin) +
            " to " + Short(kBundleLossScaleMax) + " standard deviations";
   }
-  return "'" + text +
-         "' is not a loss; expected none, huber or cauchy, or huber=SCALE, in standard deviations";
+  return "'" + text + "' is not a loss; expected " + internal::Join(internal::NamesOf(kLosses)) +
+         ", or NAME=SCALE, in standard deviations";
 }
 
 /// `k1,k2` as its names.
@@ -195,11 +196,12 @@ void AddBundle(CLI::App& program, Action& action) {
       ->required()
       ->check(IsNamed);
   AddOutput(command, arguments->folder, "folder for the solution; default: none is written");
-  const auto add = [&](const char* name, auto& value, const char* text, const char* help) {
+  const auto add = [&](const char* name, auto& value, const char* text, const std::string& help) {
     return command.add_option(name, value, help)->option_text(text);
   };
   add("--loss", arguments->loss, "LOSS",
-      "none, huber or cauchy; huber=2: from 2 standard deviations on; default none")
+      internal::Join(internal::NamesOf(kLosses)) +
+          "; huber=2: from 2 standard deviations on; default none")
       ->check(IsLoss);
   add("--fix", arguments->fixed, "NAME,...",
       "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")

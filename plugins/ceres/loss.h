@@ -16,12 +16,10 @@ class Loss : public ceres::LossFunction {
  public:
   explicit Loss(const RobustLoss& loss) : loss_(loss) {}
   void Evaluate(double s, double rho[3]) const override {
-    const double d = std::sqrt(s), w = Weight(loss_, d);
+    const double d = std::sqrt(s);
     rho[0] = 2.0 * Rho(loss_, d);
-    rho[1] = w;
-    rho[2] = 0.0;
-    if (loss_.kind == LossKind::kHuber && w < 1.0) rho[2] = -0.5 * w / s;
-    if (loss_.kind == LossKind::kCauchy) rho[2] = -w * w / (loss_.scale * loss_.scale);
+    rho[1] = Weight(loss_, d);
+    rho[2] = FunctionsOf(loss_.kind).curvature(d, loss_.scale);
   }
 
  private:

@@ -2,17 +2,8 @@
 #include "alidade/estimation/estimator.h"
 
 #include <algorithm>
-#include <iterator>
 
 namespace alidade {
-
-const char* ToString(Outcome outcome) {
-  constexpr const char* kNames[] = {"accepted",  "initialised", "gated",  "out_of_domain",
-                                    "invalid",   "not_finite",  "not_pd", "stale",
-                                    "not_ready", "failed",      "ended"};
-  static_assert(std::size(kNames) == kOutcomes);
-  return kNames[static_cast<int>(outcome)];
-}
 
 MeasurementReports& MeasurementReports::operator=(const MeasurementReports& other) {
   if (this == &other) return *this;

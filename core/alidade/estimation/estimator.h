@@ -35,8 +35,34 @@ enum class Outcome {
   kFailed,       ///< the plugin failed
   kEnded,        ///< not looked at: the estimator has nothing left to go on with
 };
-inline constexpr int kOutcomes = static_cast<int>(Outcome::kEnded) + 1;
-const char* ToString(Outcome outcome);
+
+/// How an outcome counts.
+struct OutcomeInfo {
+  const char* name;  ///< in files
+  /// Whether it counts as a rejection by which a filter may be lost; `not_finite` if h was computed.
+  bool is_rejection = false;
+  bool is_gated = false;  ///< by the gate or by outlier rejection
+  bool starts = false;    ///< of what has no value before it
+};
+/// The outcomes that there are, by Outcome. Another one is a row here.
+inline constexpr std::array kOutcomes = {
+    OutcomeInfo{"accepted"},
+    OutcomeInfo{.name = "initialised", .starts = true},
+    OutcomeInfo{.name = "gated", .is_rejection = true, .is_gated = true},
+    OutcomeInfo{.name = "out_of_domain", .is_rejection = true},
+    OutcomeInfo{"invalid"},
+    OutcomeInfo{.name = "not_finite", .is_rejection = true},
+    OutcomeInfo{.name = "not_pd", .is_rejection = true},
+    OutcomeInfo{"stale"},
+    OutcomeInfo{.name = "not_ready", .starts = true},
+    OutcomeInfo{"failed"},
+    OutcomeInfo{"ended"},
+};
+static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
+inline const OutcomeInfo& InfoOf(Outcome outcome) {
+  return kOutcomes[static_cast<std::size_t>(outcome)];
+}
+inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
 /// What a model's status means for the measurement; kOk is kAccepted.
 inline Outcome OutcomeOf(Status status) {
   switch (status) {

@@ -14,9 +14,8 @@ namespace {
 
 /// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
 bool IsRejected(const MeasurementReport& entry) {
-  const Outcome outcome = entry.outcome;
-  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
-         outcome == Outcome::kNotPd || (outcome == Outcome::kNotFinite && !entry.h.empty());
+  return InfoOf(entry.outcome).is_rejection &&
+         (entry.outcome != Outcome::kNotFinite || !entry.h.empty());
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 namespace alidade {
 
@@ -11,14 +13,43 @@ enum class LossKind {
   kCauchy,  ///< logarithmic beyond the scale
 };
 
-/// A robust loss on the Mahalanobis distance d >= 0 of a residual [Holland1977].
-///
-///   none      rho(d) = d^2 / 2                               w(d) = 1
-///   Huber     rho(d) = d^2 / 2 up to k, k d - k^2 / 2 after  w(d) = min(1, k / d)
-///   Cauchy    rho(d) = k^2 / 2 log(1 + d^2 / k^2)            w(d) = 1 / (1 + d^2 / k^2)
-///
-/// w(d) = rho'(d) / d is the weight of the squared error that has the same gradient: a measurement
-/// with covariance R counts like one with R / w.
+/// A robust loss rho on the Mahalanobis distance d >= 0 of a residual, with the scale k
+/// [Holland1977]. w(d) = rho'(d) / d is the weight of the squared error that has the same gradient:
+/// a measurement with covariance R counts like one with R / w.
+struct LossFunctions {
+  const char* name;  ///< in configs
+  double (*rho)(double d, double k);
+  double (*weight)(double d, double k);     ///< w(d), in [0, 1]
+  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: of rho over d^2
+};
+
+/// The losses that there are, by LossKind. Another one is a row here.
+inline constexpr std::array kLosses = {
+    // rho(d) = d^2 / 2,  w(d) = 1
+    LossFunctions{"none", [](double d, double) { return 0.5 * d * d; },
+                  [](double, double) { return 1.0; }, [](double, double) { return 0.0; }},
+    // rho(d) = d^2 / 2 up to k, then k d - k^2 / 2;  w(d) = min(1, k / d)
+    LossFunctions{"huber",
+                  [](double d, double k) { return d <= k ? 0.5 * d * d : k * (d - 0.5 * k); },
+                  [](double d, double k) { return d <= k ? 1.0 : k / d; },
+                  [](double d, double k) { return d <= k ? 0.0 : -0.5 * (k / d) / (d * d); }},
+    // rho(d) = k^2 / 2 log(1 + d^2 / k^2),  w(d) = 1 / (1 + d^2 / k^2)
+    LossFunctions{"cauchy",
+                  [](double d, double k) { return 0.5 * k * k * std::log1p((d / k) * (d / k)); },
+                  [](double d, double k) { return 1.0 / (1.0 + (d / k) * (d / k)); },
+                  [](double d, double k) {
+                    const double w = 1.0 / (1.0 + (d / k) * (d / k));
+                    return -w * w / (k * k);
+                  }},
+};
+
+static_assert(kLosses.size() == static_cast<std::size_t>(LossKind::kCauchy) + 1);
+inline const LossFunctions& FunctionsOf(LossKind kind) {
+  return kLosses[static_cast<std::size_t>(kind)];
+}
+inline const char* ToString(LossKind kind) { return FunctionsOf(kind).name; }
+
+/// A loss with its scale.
 struct RobustLoss {
   LossKind kind = LossKind::kNone;
   double scale = 1.0;  ///< k > 0, in standard deviations
@@ -26,38 +57,13 @@ struct RobustLoss {
   friend bool operator==(const RobustLoss&, const RobustLoss&) = default;
 };
 
-/// rho(d), d >= 0; half the squared error where there is no loss.
+/// rho(d), d >= 0.
 inline double Rho(const RobustLoss& loss, double d) {
-  const double k = loss.scale;
-  switch (loss.kind) {
-    case LossKind::kHuber:
-      return d <= k ? 0.5 * d * d : k * (d - 0.5 * k);
-    case LossKind::kCauchy:
-      return 0.5 * k * k * std::log1p((d / k) * (d / k));
-    case LossKind::kNone:
-      break;
-  }
-  return 0.5 * d * d;
+  return FunctionsOf(loss.kind).rho(d, loss.scale);
 }
-
-/// w(d) = rho'(d) / d, in (0, 1], or 0 where that underflows; d >= 0.
+/// w(d), d >= 0.
 inline double Weight(const RobustLoss& loss, double d) {
-  const double k = loss.scale;
-  switch (loss.kind) {
-    case LossKind::kHuber:
-      return d <= k ? 1.0 : k / d;
-    case LossKind::kCauchy:
-      return 1.0 / (1.0 + (d / k) * (d / k));
-    case LossKind::kNone:
-      break;
-  }
-  return 1.0;
-}
-
-/// `none`, `huber`, `cauchy`.
-inline const char* ToString(LossKind kind) {
-  constexpr const char* kNames[] = {"none", "huber", "cauchy"};
-  return kNames[static_cast<int>(kind)];
+  return FunctionsOf(loss.kind).weight(d, loss.scale);
 }
 
 }  // namespace alidade

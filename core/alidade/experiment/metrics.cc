@@ -162,7 +162,7 @@ struct Metrics::Impl {
   std::int64_t reports = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
   std::vector<Sums> sums;                           ///< all timestamps, then the segments
-  std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
+  std::vector<std::array<std::int64_t*, kOutcomes.size()>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
   std::map<int, double> quantiles;  ///< chi2(0.95, dof)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "alidade/base/text.h"
@@ -366,17 +367,22 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   return binding;
 }
 
-/// `{huber: k}` or `{cauchy: k}`.
+/// `{NAME: SCALE}` of one of kLosses but none.
 RobustLoss ReadLoss(const Node& node) {
-  const auto huber = node.Find("huber"), cauchy = node.Find("cauchy");
-  if (huber.has_value() == cauchy.has_value()) {
-    node.RejectUnread();
-    node.Fail("not one loss with its scale", "one of {huber: SCALE}, {cauchy: SCALE}");
+  std::optional<RobustLoss> loss;
+  std::vector<std::string> known;
+  int given = 0;
+  for (std::size_t i = 1; i < kLosses.size(); ++i) {
+    known.push_back(std::string("{") + kLosses[i].name + ": SCALE}");
+    const auto scale = node.Find(kLosses[i].name);
+    if (!scale) continue;
+    ++given;
+    loss = {static_cast<LossKind>(i),
+            scale->Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
   }
-  const Node& scale = huber ? *huber : *cauchy;
   node.RejectUnread();
-  return {huber ? LossKind::kHuber : LossKind::kCauchy,
-          scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
+  if (given != 1) node.Fail("not one loss with its scale", "one of " + internal::Join(known));
+  return *loss;
 }
 
 void ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,

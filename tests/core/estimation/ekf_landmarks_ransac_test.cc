@@ -189,7 +189,7 @@ TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
     const UpdateReport& report = ekf.Process(frame);
     EXPECT_EQ(report.landmarks.rescued > 0, !overflows);
     EXPECT_EQ(ekf.state().values() == before, overflows);
-    std::ptrdiff_t count[kOutcomes] = {};
+    std::ptrdiff_t count[kOutcomes.size()] = {};
     for (const MeasurementReport& one : report.measurements())
       ++count[static_cast<int>(one.outcome)];
     EXPECT_EQ(count[static_cast<int>(Outcome::kNotFinite)] == kPoints + 1, overflows);

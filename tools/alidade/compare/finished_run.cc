@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "alidade/base/text.h"
 #include "alidade/compare/json_node.h"
 #include "alidade/io/number_rows.h"
 #include "alidade/io/read_file.h"
@@ -222,11 +223,7 @@ std::int64_t CountOf(const EstimatorResult& result, const std::vector<std::strin
 }  // namespace
 
 std::int64_t Candidate::measurements() const {
-  std::vector<std::string> all;
-  for (int i = 0; i < kOutcomes; ++i) {
-    all.emplace_back(ToString(static_cast<Outcome>(i)));
-  }
-  return CountOf(result, all);
+  return CountOf(result, internal::NamesOf(kOutcomes));
 }
 
 std::int64_t Candidate::used() const {

@@ -7,17 +7,11 @@
 namespace alidade::internal {
 
 Mark MarkOf(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kAccepted:
-      return Mark::kAccepted;
-    case Outcome::kInitialised:
-    case Outcome::kNotReady:
-      return Mark::kNew;
-    case Outcome::kGated:
-      return Mark::kRejected;
-    default:
-      return Mark::kUnused;
-  }
+  const OutcomeInfo& info = InfoOf(outcome);
+  return outcome == Outcome::kAccepted ? Mark::kAccepted
+         : info.starts                 ? Mark::kNew
+         : info.is_gated               ? Mark::kRejected
+                                       : Mark::kUnused;
 }
 
 std::vector<ViewFeature> FeatureTrails::Take(const Frame& frame, const UpdateReport* report) {

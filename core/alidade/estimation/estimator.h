@@ -39,7 +39,7 @@ enum class Outcome {
 /// How an outcome counts.
 struct OutcomeInfo {
   const char* name;  ///< in files
-  /// Whether it counts as a rejection by which a filter may be lost; `not_finite` if h was computed.
+  /// Whether it counts towards rejection recovery; `not_finite` only if h was computed.
   bool is_rejection = false;
   bool is_gated = false;  ///< by the gate or by outlier rejection
   bool starts = false;    ///< of what has no value before it

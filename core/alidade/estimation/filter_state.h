@@ -15,7 +15,7 @@
 
 namespace alidade::internal {
 
-/// How a filter is, and what it has said of that, so that it says it once.
+/// Health of a filter, and which findings were reported already: each is reported once.
 struct Health {
   std::vector<char> out_of_domain, inflated;  ///< by sensor: since its last acceptance
   bool diverged = false, ended = false;
@@ -27,37 +27,37 @@ struct Health {
   } last_used;
 };
 
-/// What the parts of a filter share: x and P, what moved them last, and what there is to say of it.
-/// Only a Method changes P of blocks that have a value, but where the part that does it says so: a
-/// method may carry a root. A copy is a snapshot.
+/// State shared by the parts of a filter: x and P, the time, the motion models, the report. Only an
+/// UpdateMethod changes P of blocks that have a value, because it may store a root of P; exceptions
+/// are documented where they are. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Has to be called when a block of the problem gets a value, its first or another one in place
-  /// of a rejected one.
+  /// Updates what depends on which blocks have a value. Has to be called when a block gets its
+  /// first value, or a new one that replaces a rejected one.
   void Activate();
-  /// Whether there are any first_estimates.
+  /// Whether first_estimates are in use (JacobianPolicy::kFirstEstimate).
   bool keeps_first_estimates() const { return keeps_first_estimates_; }
 
   std::shared_ptr<const ProblemIndex> index;
   State state;
   Timestamp timestamp = kNoTimestamp;  ///< of the state
   Motions motions;
-  /// By block of the problem: the value that H is taken at; empty: the latest.
+  /// By block of the problem: the value at which H is computed; empty: the latest estimate.
   std::vector<std::vector<double>> first_estimates;
   UpdateReport report;  ///< of the frame
   Health health;
-  /// What Activate last found among the blocks of the problem.
+  /// Summary of the blocks of the problem, by Activate.
   struct {
-    bool waiting = false;        ///< one has no value yet
-    bool considering = false;    ///< one is a consider state
-    std::vector<int> gain_rows;  ///< of P: of those that have a value
+    bool waiting = false;        ///< a block has no value yet
+    bool considering = false;    ///< a block is a consider state
+    std::vector<int> gain_rows;  ///< rows of P of the blocks that have a value
   } blocks;
-  /// Matrices; what takes from it has a Workspace::Use around it.
+  /// Temporary matrices. A function that uses it has a Workspace::Use.
   Scratch<Workspace> work;
-  Scratch<std::vector<double>> moved;  ///< values on the way to x
-  Scratch<KalmanUpdate> update;        ///< the last one of a method with Jacobians
+  Scratch<std::vector<double>> moved;  ///< the corrected x, before the update is committed
+  Scratch<KalmanUpdate> update;        ///< the last update of a method with Jacobians
 
  private:
   void KeepFirstEstimates();
@@ -65,13 +65,13 @@ struct FilterState {
   bool keeps_first_estimates_;
 };
 
-/// An event of the frame; the end of the frame gives it its timestamp.
+/// Adds an event to the report. Its timestamp is set at the end of the frame.
 Event& Note(FilterState& f, const char* kind, std::string text);
-/// The same of an event by which the filter counts as diverged.
+/// Adds an event after which the filter counts as diverged.
 void NoteDivergence(FilterState& f, const char* kind, std::string text);
-/// `block = value, ...` of the given blocks that have one.
+/// `block = value, ...` of those of the blocks that have a value.
 std::string Describe(const State& state, std::span<const BlockId> blocks);
-/// Ends the filter: what happened, the state that is left, the measurement that led there.
+/// Ends the filter with an event: what happened, the last good state, the last used measurement.
 void End(FilterState& f, const char* kind, const std::string& what);
 
 }  // namespace alidade::internal

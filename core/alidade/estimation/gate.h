@@ -9,25 +9,24 @@
 
 namespace alidade::internal {
 
-/// Which measurements may correct the state, each by itself: those with r' S^-1 r at most the
-/// quantile of chi-square that has the gate's probability. Also the weight of a robust loss, which
-/// depends on the same distance, and how often a sensor was rejected in a row. A copy is a
-/// snapshot.
+/// Chi-square gate: accepts a measurement if its NIS r' S^-1 r is at most the quantile of the
+/// configured probability. Also computes the robust-loss weight, and counts consecutive rejections
+/// by sensor. A copy is a snapshot.
 class Gate {
  public:
   Gate(const Problem& problem, const EkfOptions& options);
 
-  /// Takes the NIS of a row with r, R and S, finds w, and returns whether it passes: kAccepted, or
-  /// why not. What lies so far out that its R / w is not finite does not.
+  /// Tests a measurement by its NIS, and computes its robust weight w. Returns kAccepted, or the
+  /// reason for a rejection. A measurement whose R / w is not finite is rejected.
   Outcome Test(FilterState& f, PendingMeasurement& pending, double nis) {
     return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Pass(f, pending, nis)
                                                                         : Refuse(f, pending, nis);
   }
-  /// R <- R / w in R and in S, of rows that passed.
+  /// R <- R / w, in R and in S, of measurements that passed.
   void ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const;
 
-  /// Counts what became of one measurement. Whether its sensor was rejected so often in a row that
-  /// it has to recover; from there it counts anew.
+  /// Counts the outcome of a measurement. Returns whether its sensor was rejected so often in a row
+  /// that the filter has to recover; then the count starts again.
   bool Count(FilterState& f, const MeasurementReport& entry) {
     if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
       return CountRejection(entry);

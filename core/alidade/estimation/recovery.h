@@ -6,25 +6,25 @@
 
 namespace alidade::internal {
 
-/// What a filter does when it goes wrong: repairs P where it is no longer positive semi-definite,
-/// and takes back what it believes where a sensor is rejected too often in a row. A copy is a
-/// snapshot.
+/// Repairs P if it is no longer positive semi-definite, and resets blocks if a sensor is rejected
+/// too often in a row. A copy is a snapshot.
 class Recovery {
  public:
   explicit Recovery(const EkfOptions& options) : options_(options) {}
 
-  /// After an update that left S not positive definite: where that is P's fault, negative pivots of
-  /// its L D L' count as zero (event `repaired`). Ends the filter where it needed that too often.
+  /// Called after an update whose S was not positive definite. If P is the cause, sets the negative
+  /// pivots of its L D L' to zero (event `repaired`). After max_covariance_repairs of that it ends
+  /// the filter.
   void RepairCovariance(FilterState& f);
-  /// Once the sensor of a row was rejected too often, one frame after the other (event
-  /// `rejection_recovery`): resets what it determines from its measurement, with the blocks that
-  /// move with it at their prior uncertainty, or theirs where that is larger; where that cannot be,
-  /// inflates the blocks that it corrects, once until it is accepted again.
+  /// Called when the sensor of a measurement was rejected too often in a row (event
+  /// `rejection_recovery`). Resets the block that the measurement determines, and the covariance of
+  /// the blocks that move with it to the prior, or keeps theirs if it is larger. If a reset is not
+  /// possible, inflates the covariance of the blocks of the sensor, once until its next acceptance.
   void Recover(FilterState& f, PendingMeasurement& pending);
 
  private:
   EkfOptions options_;
-  int repairs_ = 0;  ///< of P, so far
+  int repairs_ = 0;
 };
 
 }  // namespace alidade::internal

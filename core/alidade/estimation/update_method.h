@@ -8,33 +8,33 @@
 
 namespace alidade::internal {
 
-/// What Kalman filters differ in: how x and P are stepped, what a measurement is expected to be,
-/// and how x and P are corrected by it. Knows nothing of gates or frames.
+/// Propagation and correction equations of one type of Kalman filter: steps x and P, predicts a
+/// measurement, corrects x and P by measurements. Independent of gates and frames.
 class UpdateMethod {
  public:
   virtual ~UpdateMethod() = default;
-  /// With all that it carries besides x and P.
+  /// A copy with everything that the method stores besides x and P.
   virtual std::unique_ptr<UpdateMethod> Clone() const = 0;
 
-  /// The square root of P that it carries; null: none.
+  /// The square root of P if the method stores one, else null.
   virtual const Eigen::MatrixXd* Root() const { return nullptr; }
-  /// Takes over x and P as they are at the start.
+  /// Called once, before the first frame, with the initial x and P.
   virtual void Begin(FilterState& /*f*/) {}
-  /// Moves x and P by dt_s: all of it or nothing, and why.
+  /// Propagates x and P by dt_s. If it fails, both are unchanged and the error is returned.
   virtual StepError Step(FilterState& f, double dt_s) = 0;
   /// Starts an update by at most `capacity` rows.
   virtual void BeginUpdate(FilterState& /*f*/, int /*capacity*/) {}
-  /// h, the innovation, R and what else the others need of a row by itself; kAccepted, or why they
-  /// cannot be had, which it notes.
+  /// Computes h, the innovation and R of one measurement at the state. Returns kAccepted, or the
+  /// reason for a failure, which it also reports as an event.
   virtual Outcome Predict(FilterState& f, PendingMeasurement& pending) = 0;
-  /// Computes S of a row that Predict accepted, in its report. Returns its NIS, which is not a
-  /// number unless S is finite and positive definite. The rows before it that are part of the
-  /// update have the columns before row.linearised.column.
+  /// Computes S of a measurement that Predict accepted, and writes it into its report. Returns the
+  /// NIS, which is NaN unless S is finite and positive definite. The measurement has the columns of
+  /// the update from linearised.column on, those that passed before it the columns before.
   virtual double ComputeNis(FilterState& f, PendingMeasurement& pending) = 0;
-  /// One update with all rows, in the order of ComputeNis, R and S weighed since: all of it happens
-  /// or nothing. kAccepted, and the gain is in the reports by RecordGain; or why
-  /// not, which it notes but for kNotPd and kNotFinite. A row that is the reason may have an
-  /// outcome of its own, in its report.
+  /// Corrects x and P by one stacked update, in the order of ComputeNis; R and S have their robust
+  /// weights by now. Returns kAccepted, with the gains in the reports (RecordGain). Otherwise x and
+  /// P are unchanged, and it returns the reason and reports it as an event, except kNotPd and
+  /// kNotFinite. A measurement that is the reason may have an outcome of its own in its report.
   virtual Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) = 0;
 };
 

@@ -128,7 +128,7 @@ TEST(OdometryPose, NoiseOfEitherKindIsThatOfTheWholeGap) {
   EXPECT_TRUE(held->discrete_noise());
   EXPECT_FALSE(adds->discrete_noise());
   const double still[6] = {}, straight[6] = {2, 0, 0, 0, 0, 0}, turning[6] = {2, 0, 0, 0, 0, 0.5};
-  for (const SharedMotion& motion : {held, adds}) {
+  for (const auto& motion : {held, adds}) {
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), still, 0.03, 0.07), 1e-14);
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), straight, 0.5e-3, 0.5e-3), 1e-5);
     EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), turning, 0.5e-3, 0.5e-3), 1e-3);

@@ -23,7 +23,7 @@ bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
     return prior.block == target.block && prior.from == sensor.name;
   };
   return missing(target) && std::ranges::count_if(sensor.roles, missing) == 1 &&
-         std::ranges::any_of(f.index->problem.priors, waits);
+         std::ranges::any_of(f.problem_index->problem.priors, waits);
 }
 
 }  // namespace

@@ -185,7 +185,7 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   if (solution == Solution::kNotFinite) return Outcome::kNotFinite;
   std::optional<Considered> considered;
   considered_.clear();
-  if (f.blocks.considering || f.index->considers) FindConsidered(f, rows);
+  if (f.blocks.considering || f.problem_index->considers) FindConsidered(f, rows);
   if (!considered_.empty()) considered = ConsiderCorrection(f, rows, recorded);
   if (!f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved)) {
     return Outcome::kNotFinite;

@@ -12,31 +12,34 @@ namespace alidade {
 namespace {
 
 std::optional<ProblemDefect> OfBlocks(const Problem& problem,
-                                      const EstimatorCapabilities& support) {
+                                      const EstimatorCapabilities& capabilities) {
   const std::vector<Block>& blocks = problem.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (blocks[b].status != BlockStatus::kConsider || support.consider) continue;
-    return ProblemDefect{"consider blocks", "the block estimated or constant",
+    if (blocks[b].status != BlockStatus::kConsider || capabilities.consider) continue;
+    return ProblemDefect{"consider", "consider blocks", "the block estimated or constant",
                          static_cast<BlockId>(b)};
   }
   for (const Prior& prior : problem.priors) {
-    if (prior.from.empty() || support.from_measurement) continue;
-    return ProblemDefect{"blocks that start from a measurement", "mean and sigma", prior.block};
+    if (prior.from.empty() || capabilities.from_measurement) continue;
+    return ProblemDefect{"from_measurement", "blocks that start from a measurement",
+                         "mean and sigma", prior.block};
   }
-  if (problem.landmarks && !support.landmarks) {
-    return ProblemDefect{"landmarks", "`sensors` that measure none"};
+  if (problem.landmarks && !capabilities.landmarks) {
+    return ProblemDefect{"landmarks", "landmarks", "`sensors` that measure none"};
   }
   return std::nullopt;
 }
 
-std::optional<ProblemDefect> OfRole(const RoleBinding& role, const EstimatorCapabilities& support) {
-  if (role.mode == RoleMode::kConsider && !support.consider) {
-    return ProblemDefect{"consider roles", support.known ? "estimate or known" : "estimate"};
+std::optional<ProblemDefect> OfRole(const RoleBinding& role,
+                                    const EstimatorCapabilities& capabilities) {
+  if (role.mode == RoleMode::kConsider && !capabilities.consider) {
+    return ProblemDefect{"mode", "consider roles",
+                         capabilities.known ? "estimate or known" : "estimate"};
   }
-  if (role.mode == RoleMode::kKnown && !support.known)
-    return ProblemDefect{"known roles", "estimate"};
-  if (role.jacobian_at == JacobianAt::kMeasurement && !support.at_measurement) {
-    return ProblemDefect{"jacobian_at: measurement", "prediction"};
+  if (role.mode == RoleMode::kKnown && !capabilities.known)
+    return ProblemDefect{"mode", "known roles", "estimate"};
+  if (role.jacobian_at == JacobianAt::kMeasurement && !capabilities.at_measurement) {
+    return ProblemDefect{"jacobian_at", "jacobian_at: measurement", "prediction"};
   }
   return std::nullopt;
 }
@@ -51,14 +54,15 @@ const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
 std::optional<ProblemDefect> OfStart(const Problem& problem, const Prior& prior) {
   const SensorBinding* const sensor = SensorOf(problem, prior);
   if (sensor == nullptr) {
-    ProblemDefect defect{"no sensor '" + prior.from + "' here", "a sensor of this estimator",
-                         prior.block};
+    ProblemDefect defect{"from_measurement", "no sensor '" + prior.from + "' here",
+                         "a sensor of this estimator", prior.block};
     defect.nearest = Nearest(prior.from, internal::NamesOf(problem.sensors));
     return defect;
   }
   const int role = sensor->model->inverse().role;
   if (role >= 0 && sensor->roles[static_cast<std::size_t>(role)].block == prior.block) return {};
-  return ProblemDefect{"sensor '" + prior.from + "' does not determine this block",
+  return ProblemDefect{"from_measurement",
+                       "sensor '" + prior.from + "' does not determine this block",
                        "a sensor whose inverse measurement model is this block", prior.block};
 }
 
@@ -69,7 +73,7 @@ std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<Block
   if (std::ranges::find(chain, last) != chain.end() - 1) {
     std::vector<std::string> names;
     for (const BlockId block : chain) names.push_back(problem.layout[block].name);
-    return ProblemDefect{"cyclic: " + internal::Join(names, " <- "),
+    return ProblemDefect{"from_measurement", "cyclic: " + internal::Join(names, " <- "),
                          "one block of the cycle with a mean of its own", last};
   }
   const auto prior = std::ranges::find(problem.priors, last, &Prior::block);
@@ -117,22 +121,26 @@ std::optional<ProblemDefect> FindDefect(const Problem& problem) {
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
       const bool inverted = sensor.model->inverse().role == static_cast<int>(r);
       if (sensor.roles[r].jacobian_at != JacobianAt::kMeasurement || inverted) continue;
-      return ProblemDefect{"jacobian_at: measurement of role '" + sensor.model->roles()[r].name +
-                               "', of which model '" + sensor.model->name() +
-                               "' has no inverse measurement model",
-                           "prediction", -1, static_cast<int>(s), static_cast<int>(r)};
+      return ProblemDefect{"jacobian_at",
+                           "model '" + sensor.model->name() +
+                               "' has no inverse measurement model of role '" +
+                               sensor.model->roles()[r].name + "'",
+                           "prediction",
+                           -1,
+                           static_cast<int>(s),
+                           static_cast<int>(r)};
     }
   }
   return {};
 }
 
 std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
-                                             const EstimatorCapabilities& support) {
-  if (auto found = OfBlocks(problem, support)) return found;
+                                             const EstimatorCapabilities& capabilities) {
+  if (auto found = OfBlocks(problem, capabilities)) return found;
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const SensorBinding& sensor = problem.sensors[s];
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
-      auto found = OfRole(sensor.roles[r], support);
+      auto found = OfRole(sensor.roles[r], capabilities);
       if (!found) continue;
       found->sensor = static_cast<int>(s);
       found->role = static_cast<int>(r);
@@ -143,14 +151,15 @@ std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
 }
 
 Problem CheckedProblem(Problem problem, const char* estimator,
-                       const EstimatorCapabilities& support) {
+                       const EstimatorCapabilities& capabilities) {
   const std::string name = estimator;
-  if (const auto defect = FindUnsupported(problem, support)) {
+  if (const auto defect = FindUnsupported(problem, capabilities)) {
     throw Error(ExitCode::kBadConfig,
                 name + " does not support " + Describe(*defect, problem) + ", or an Ekf");
   }
   if (const auto defect = FindDefect(problem)) {
-    throw Error(ExitCode::kBadConfig, name + ": " + Describe(*defect, problem));
+    throw Error(ExitCode::kBadConfig,
+                name + ": " + defect->key + ": " + Describe(*defect, problem));
   }
   return problem;
 }

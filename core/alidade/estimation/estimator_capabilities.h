@@ -32,6 +32,7 @@ struct EstimatorCapabilities {
 /// Why a problem cannot be solved: for a block, for a role of a sensor, or without either for its
 /// landmarks.
 struct ProblemDefect {
+  const char* key;     ///< of a config: `consider`, `from_measurement`, `mode`, `jacobian_at`
   std::string what;    ///< `consider blocks`
   std::string remedy;  ///< what to write in its place: `the block estimated or constant`
   BlockId block = -1;
@@ -45,13 +46,13 @@ struct ProblemDefect {
 /// blocks that start from one another, a role without an inverse measurement model that is
 /// linearised at its measurement. Nothing if there is none.
 std::optional<ProblemDefect> FindDefect(const Problem& problem);
-/// The first thing that `problem` asks for beyond `support`, blocks before sensors; nothing if all
-/// can be done. Recovery is an option of the estimator, and not looked at.
+/// The first thing that `problem` asks for beyond `capabilities`, blocks before sensors; nothing if
+/// all can be done. Recovery is an option of the estimator, and not looked at.
 std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
-                                             const EstimatorCapabilities& support);
+                                             const EstimatorCapabilities& capabilities);
 /// The problem. Error kBadConfig, by name and with the remedy, if it has a defect of either kind.
 /// `estimator`: `Ukf`.
 Problem CheckedProblem(Problem problem, const char* estimator,
-                       const EstimatorCapabilities& support);
+                       const EstimatorCapabilities& capabilities);
 
 }  // namespace alidade

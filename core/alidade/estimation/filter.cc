@@ -41,8 +41,10 @@ int FindSensor(const Problem& problem, std::string_view name, const std::vector<
 void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
-    throw Error(ExitCode::kBadData, "no stream " + std::to_string(one.stream) +
-                                        "; the filter has " + std::to_string(streams.size()));
+    throw Error(ExitCode::kBadData,
+                one.stream < 0 ? "a reading of a state that takes no control input, or of no sensor"
+                               : "no stream " + std::to_string(one.stream) + "; the filter has " +
+                                     std::to_string(streams.size()));
   }
   const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
   if (std::ssize(one.values) != stream.size) {
@@ -72,29 +74,29 @@ void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem
 
 Filter::Filter(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
                std::unique_ptr<internal::UpdateMethod> method)
-    : loop_(std::make_unique<FilterEngine>(std::move(problem), options, streams,
-                                           std::move(method))) {}
+    : engine_(std::make_unique<FilterEngine>(std::move(problem), options, streams,
+                                             std::move(method))) {}
 
-void Filter::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
+void Filter::Start(Timestamp timestamp) { engine_->f.timestamp = timestamp; }
 
 const UpdateReport& Filter::Process(const Frame& frame) {
-  loop_->Process(frame);
-  return loop_->f.report;
+  engine_->Process(frame);
+  return engine_->f.report;
 }
 
-const Problem& Filter::problem() const { return loop_->f.index->problem; }
-const State& Filter::state() const { return loop_->f.state; }
-Timestamp Filter::timestamp() const { return loop_->f.timestamp; }
-bool Filter::diverged() const { return loop_->f.health.diverged; }
-bool Filter::failed() const { return loop_->f.health.ended; }
+const Problem& Filter::problem() const { return engine_->f.problem_index->problem; }
+const State& Filter::state() const { return engine_->f.state; }
+Timestamp Filter::timestamp() const { return engine_->f.timestamp; }
+bool Filter::diverged() const { return engine_->f.health.diverged; }
+bool Filter::failed() const { return engine_->f.health.ended; }
 
 std::vector<LandmarkEstimate> Filter::landmarks() const {
-  if (!loop_->landmarks) return {};
-  return loop_->landmarks->Estimates(loop_->f.state);
+  if (!engine_->landmarks) return {};
+  return engine_->landmarks->Estimates(engine_->f.state);
 }
 
 int Filter::stream(std::string_view name) const {
-  const std::vector<StreamInfo>& streams = loop_->f.index->streams;
+  const std::vector<StreamInfo>& streams = engine_->f.problem_index->streams;
   const auto found = std::ranges::find(streams, name, &StreamInfo::name);
   if (found == streams.end()) RefuseName("stream", name, internal::NamesOf(streams));
   return static_cast<int>(found - streams.begin());
@@ -110,7 +112,7 @@ Frame Filter::MakeFrame(Timestamp timestamp, const std::vector<Reading>& reading
   Frame frame;
   frame.timestamp = timestamp;
   for (const Reading& one : readings) {
-    CheckReading(loop_->f.index->streams, problem(), one);
+    CheckReading(engine_->f.problem_index->streams, problem(), one);
     frame.measurements.push_back(
         {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
   }
@@ -124,7 +126,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 BlockEstimate Filter::Estimate(BlockId id) const { return state().Estimate(id); }
 
 State Filter::At(Timestamp timestamp) const {
-  FilterEngine later(*loop_);
+  FilterEngine later(*engine_);
   later.Process({timestamp, {}});
   return std::move(later.f.state);
 }
@@ -133,7 +135,7 @@ std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp time
                                          std::int64_t landmark,
                                          const std::vector<double>& known) const {
   const int index = FindSensor(problem(), sensor, known);
-  FilterEngine later(*loop_);
+  FilterEngine later(*engine_);
   later.Process({timestamp, {}});
   return later.Expect(index, landmark, known);
 }
@@ -144,7 +146,7 @@ std::vector<std::optional<Prediction>> Filter::ExpectEach(
   const int index = FindSensor(problem(), sensor, {});
   std::vector<std::optional<Prediction>> each;
   if (landmarks.empty()) return each;
-  FilterEngine later(*loop_);
+  FilterEngine later(*engine_);
   later.Process({timestamp, {}});
   for (const std::int64_t landmark : landmarks) each.push_back(later.Expect(index, landmark, {}));
   return each;

@@ -113,7 +113,7 @@ struct Prediction {
 ///
 /// Threads: as a value of the standard library. Const members may be called from several threads at
 /// once, while none calls another one; a copy belongs to whoever has it. What copies share, the
-/// system and its models, does not change, and models may be called from several threads.
+/// problem and its models, does not change, and models may be called from several threads.
 class Filter : public Estimator {
  public:
   // By frames.
@@ -178,12 +178,12 @@ class Filter : public Estimator {
   /// `streams` are the source's, in the order of Measurement::stream.
   Filter(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
          std::unique_ptr<internal::UpdateMethod> method);
-  internal::FilterEngine& loop() { return *loop_; }
-  const internal::FilterEngine& loop() const { return *loop_; }
+  internal::FilterEngine& engine() { return *engine_; }
+  const internal::FilterEngine& engine() const { return *engine_; }
   /// @endcond
 
  private:
-  ClonePtr<internal::FilterEngine> loop_;
+  ClonePtr<internal::FilterEngine> engine_;
 };
 
 }  // namespace alidade

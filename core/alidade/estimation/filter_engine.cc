@@ -46,12 +46,12 @@ FilterEngine::FilterEngine(Problem problem, const EkfOptions& options,
         options.jacobian == JacobianPolicy::kFirstEstimate),
       method(std::move(equations)),
       options_(CheckedOptions(options)),
-      time_(f.index->problem, streams, options.max_dt_s),
-      gate_(f.index->problem, options),
-      consensus_(f.index->problem),
+      time_(f.problem_index->problem, streams, options.max_dt_s),
+      gate_(f.problem_index->problem, options),
+      consensus_(f.problem_index->problem),
       recovery_(options) {
-  if (f.index->problem.landmarks) {
-    landmarks.emplace(*f.index);
+  if (f.problem_index->problem.landmarks) {
+    landmarks.emplace(*f.problem_index);
     landmarks->AddKnown(f);
   }
   method->Begin(f);
@@ -77,7 +77,7 @@ void FilterEngine::Process(const Frame& frame) {
   const Outcome refused = f.report.stale   ? Outcome::kStale
                           : f.health.ended ? Outcome::kEnded
                                            : Outcome::kAccepted;
-  rows_.Collect(frame, *f.index, f.report, refused);
+  rows_.Collect(frame, *f.problem_index, f.report, refused);
   if (refused != Outcome::kAccepted) return;
   const std::span<PendingMeasurement> all = rows_.all();
   for (const PendingMeasurement& pending : all) {
@@ -238,11 +238,12 @@ std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark
   Measurement one;
   one.landmark = landmark;
   one.known = known;
-  const Geometry& geometry =
-      f.index->problem.sensors[static_cast<std::size_t>(sensor)].model->measurement().geometry;
+  const Geometry& geometry = f.problem_index->problem.sensors[static_cast<std::size_t>(sensor)]
+                                 .model->measurement()
+                                 .geometry;
   one.values.resize(static_cast<std::size_t>(geometry.ambient));
   geometry.Identity(one.values.data());
-  PendingMeasurement& pending = rows_.CollectOne(one, sensor, *f.index, f.report);
+  PendingMeasurement& pending = rows_.CollectOne(one, sensor, *f.problem_index, f.report);
   if (landmarks) landmarks->Attach(f, {&pending, 1});
   if (pending.report->outcome != Outcome::kAccepted || !IsReady(f, pending) ||
       PredictAt(f, pending, f.state.values(), one.values.data()) != Outcome::kAccepted) {

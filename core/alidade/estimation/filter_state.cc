@@ -9,18 +9,18 @@
 
 namespace alidade::internal {
 FilterState::FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_first_estimates)
-    : index(std::move(of)),
-      state(index->initial),
-      motions(*index),
-      first_estimates(index->problem.layout.blocks().size()),
+    : problem_index(std::move(of)),
+      state(problem_index->initial),
+      motions(*problem_index),
+      first_estimates(problem_index->problem.layout.blocks().size()),
       keeps_first_estimates_(keeps_first_estimates) {
-  health.out_of_domain.assign(index->sensor_places.size(), 0);
+  health.out_of_domain.assign(problem_index->sensor_places.size(), 0);
   health.inflated = health.out_of_domain;
   Activate();
 }
 
 void FilterState::Activate() {
-  const std::size_t count = index->problem.layout.blocks().size();
+  const std::size_t count = problem_index->problem.layout.blocks().size();
   blocks.waiting = blocks.considering = false;
   blocks.gain_rows.clear();
   for (std::size_t i = 0; i < count; ++i) {
@@ -37,7 +37,7 @@ void FilterState::Activate() {
 
 /// The values of stationary blocks that have none noted yet.
 void FilterState::KeepFirstEstimates() {
-  for (const MotionBinding& motion : index->problem.motions) {
+  for (const MotionBinding& motion : problem_index->problem.motions) {
     if (!motion.model->stationary()) continue;
     for (const BlockId id : motion.blocks) {
       const Block& block = state.layout()[id];
@@ -73,14 +73,15 @@ void NoteDivergence(FilterState& f, const char* kind, std::string text) {
 
 [[gnu::noinline]] void End(FilterState& f, const char* kind, const std::string& what) {
   f.health.ended = true;
-  std::vector<BlockId> all(f.index->problem.layout.blocks().size());
+  std::vector<BlockId> all(f.problem_index->problem.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
   std::string text =
       what + "; last good state at " + SecondsText(f.timestamp) + ": " + Describe(f.state, all);
   if (f.health.last_used.sensor >= 0) {
-    text += "; last measurement used: sensor '" +
-            f.index->problem.sensors[static_cast<std::size_t>(f.health.last_used.sensor)].name +
-            "' at " + SecondsText(f.health.last_used.timestamp) + ", z =";
+    text +=
+        "; last measurement used: sensor '" +
+        f.problem_index->problem.sensors[static_cast<std::size_t>(f.health.last_used.sensor)].name +
+        "' at " + SecondsText(f.health.last_used.timestamp) + ", z =";
     for (const double z : f.health.last_used.z) text += ' ' + RoundedText(z, 6);
   }
   NoteDivergence(f, kind, std::move(text));

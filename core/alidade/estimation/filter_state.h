@@ -40,7 +40,7 @@ struct FilterState {
   /// Whether first_estimates are in use (JacobianPolicy::kFirstEstimate).
   bool keeps_first_estimates() const { return keeps_first_estimates_; }
 
-  std::shared_ptr<const ProblemIndex> index;
+  std::shared_ptr<const ProblemIndex> problem_index;
   State state;
   Timestamp timestamp = kNoTimestamp;  ///< of the state
   Motions motions;

@@ -33,13 +33,13 @@ class IekfEquations : public UpdateMethod {
   std::unique_ptr<UpdateMethod> Clone() const override {
     return std::make_unique<IekfEquations>(*this);
   }
-  StepError Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
-  void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
+  StepError Step(FilterState& f, double dt_s) override { return ekf_.Step(f, dt_s); }
+  void BeginUpdate(FilterState& f, int capacity) override { ekf_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
-    return linear_.Predict(f, pending);
+    return ekf_.Predict(f, pending);
   }
   double ComputeNis(FilterState& f, PendingMeasurement& pending) override {
-    return linear_.ComputeNis(f, pending);
+    return ekf_.ComputeNis(f, pending);
   }
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
@@ -64,7 +64,7 @@ class IekfEquations : public UpdateMethod {
                    Workspace::Vector& innovations);
   bool Relinearise(FilterState& f, std::span<PendingMeasurement* const> rows, const double* dx);
 
-  EkfEquations linear_;
+  EkfEquations ekf_;
   int max_iterations_;
   double tolerance_;
   std::vector<double> iterate_;        ///< values on the way; the state is the prior
@@ -78,7 +78,7 @@ Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* con
     at_prediction_.insert(at_prediction_.end(), pending->h, pending->s + pending->report->s.size());
   }
   const std::optional<Minimum> minimum = Minimise(f, rows);
-  const Outcome outcome = linear_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
+  const Outcome outcome = ekf_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
   const double* at = at_prediction_.data();
   for (const PendingMeasurement* pending : rows) {
     const auto count = pending->s + pending->report->s.size() - pending->h;
@@ -102,7 +102,7 @@ Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* con
 std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
     FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
-  linear_.AssignColumns(f, rows);
+  ekf_.AssignColumns(f, rows);
   Minimum minimum{f.work.Take(n)};
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
@@ -216,7 +216,7 @@ bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* co
       PlusJacobian(geometry, at[i], dx + offset, j.data());
       ChainJacobian(*pending, place.columns[i], geometry.tangent, j.data(), f.work);
     }
-    linear_.ComputeNis(f, *pending);
+    ekf_.ComputeNis(f, *pending);
   }
   return true;
 }
@@ -227,8 +227,10 @@ bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* co
 Iekf::Iekf(Problem problem, const IekfOptions& options, const std::vector<StreamInfo>& streams)
     : Filter(CheckedProblem(std::move(problem), "Iekf", kCapabilities), options, streams,
              std::make_unique<internal::IekfEquations>(options.max_iterations, options.tolerance)) {
-  internal::ExpectOption(options.jacobian == JacobianPolicy::kLatest, "jacobian",
-                         static_cast<double>(options.jacobian), "JacobianPolicy::kLatest");
+  if (options.jacobian != JacobianPolicy::kLatest) {
+    throw Error(ExitCode::kBadConfig,
+                "option jacobian is JacobianPolicy::kFirstEstimate; expected kLatest, or an Ekf");
+  }
   internal::ExpectOption(options.max_iterations > 1, "max_iterations", options.max_iterations,
                          "at least 2");
   internal::ExpectOption(options.tolerance > 0.0, "tolerance", options.tolerance, "> 0");

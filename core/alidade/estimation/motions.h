@@ -15,7 +15,7 @@ namespace alidade::internal {
 // A motion model at any values x of the whole state: that of a filter, a sigma point, a point of a
 // batch. n_w: noise inputs.
 
-/// Why a step cannot be done; empty: it can. As small as a pointer, for every step returns one.
+/// Why a step failed; false if it did not. As small as a pointer, because every step returns one.
 class StepError {
  public:
   StepError() = default;
@@ -33,7 +33,7 @@ class StepError {
   std::unique_ptr<const Detail> detail_;
 };
 
-/// Destinations of a step, row-major; null: not wanted.
+/// Destinations of a step, row-major; null: not computed.
 struct StepOutput {
   double* next = nullptr;  ///< x', at the places of the model's blocks
   double* f = nullptr;     ///< F, n x n; G has to be wanted too
@@ -43,7 +43,7 @@ struct StepOutput {
 /// x' = f(x, u, w, dt) of one motion model at the values x of the whole state. w may be null: zero.
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, const StepOutput& to);
-/// What an outcome of it that is not kAccepted means.
+/// Converts an outcome of StepAt into an error; no error if it is kAccepted.
 StepError StepErrorOf(const MotionBinding& motion, Outcome outcome);
 /// x <- x' of its blocks that are not constant, brought back to their manifolds.
 inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
@@ -53,7 +53,7 @@ inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
   }
 }
 
-/// What the motion models of a problem make of the state over one step: x', F and G Lq.
+/// Propagation by the motion models of a problem over one step: x', F and G Lq.
 /// Discrete noise w ~ N(0, I) is held over an interval as Ekf has it: M = Cov(x, w), N = G Lq,
 /// A = F M. n: size of P, n_w: noise inputs of the models that move. A copy is a snapshot.
 class Motions {
@@ -71,7 +71,7 @@ class Motions {
 
   explicit Motions(const ProblemIndex& index);
 
-  /// Finds out which models move: those all of whose blocks have a value.
+  /// Determines the active models: those that are not stationary and whose blocks all have a value.
   void Activate(const StateLayout& layout);
   std::vector<Step>& steps() { return steps_; }
   /// x' of the active models, by the places of their blocks.

@@ -12,47 +12,47 @@
 #include "alidade/state/kernels.h"
 #include "alidade/state/workspace.h"
 
-/// Measurements on their way into an update: what a frame has of them, and what their sensor models
-/// say at some x.
+/// The measurements of a frame before their update, with the results of their sensor models.
 namespace alidade::internal {
 
-/// One measurement on its way into an update: m = dof, n = size of P.
+/// One measurement by one sensor before its update: m = dof, n = size of P.
 struct PendingMeasurement {
   const Measurement* measurement = nullptr;
   MeasurementReport* report = nullptr;
   int sensor = -1;
   const SensorBinding* binding = nullptr;
-  const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
-  const SensorPlace* place = nullptr;  ///< the sensor's, or `own`; set by Bind
-  SensorPlace own;                     ///< with the blocks of the landmark that it measures
+  const SensorModel* model = nullptr;  ///< of the sensor, or for the landmark's representation
+  const SensorPlace* place = nullptr;  ///< of the sensor, or `own`; set by Bind
+  SensorPlace own;                     ///< with the blocks of the landmark that is measured
   std::vector<double> numbers;  ///< z, h, the innovation, S, R and L; the report points to them
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;  ///< s: m x m, row-major
   std::span<double> R;                                                     ///< R, m x m, row-major
   double* root = nullptr;                                                  ///< L of R = L L'
-  std::vector<double> H;                       ///< H, m rows of the place's width
-  std::vector<double> gain;                    ///< as in the report
-  std::array<double*, kMaxRoles> jacobians{};  ///< in H, by role
-  Roles roles{};                               ///< as RolesAt last had them
-  const double* roles_of = nullptr;            ///< the values of the filter, if roles are those
+  std::vector<double> H;                       ///< m rows of the width of `place`, row-major
+  std::vector<double> gain;                    ///< K, as in the report
+  std::array<double*, kMaxRoles> jacobians{};  ///< by role: its first column in H
+  Roles roles{};                               ///< the result of the last RolesAt
+  const double* roles_of = nullptr;            ///< the filter's x, if `roles` point into it
   double weight = 1.0;                         ///< w of the robust loss; R is divided by it
-  MeasurementRows linearised;  ///< H, innovation, R and S; its column, if it passes the gate
+  MeasurementRows linearised;  ///< H, innovation, R and S for the update, and its column there
 
-  /// Gives it another place.
+  /// Sets `place`, and the memory and pointers that depend on it.
   void Bind(const SensorPlace& to);
-  /// Whether it measures a landmark in the state.
+  /// Whether the landmark that is measured is in the state.
   bool on_landmark() const { return place == &own; }
 };
 
-/// The rows of a frame, in memory that is kept from one to the next: there lie the numbers of their
-/// reports.
+/// The pending measurements of a frame. Their memory, to which the report points, is kept from one
+/// frame to the next.
 class PendingMeasurements {
  public:
-  /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
-  /// its entry in the report: kAccepted as long as nothing speaks against it. Unless `refused` is
-  /// kAccepted all have that outcome, and no model is asked.
+  /// Collects one for each measurement and sensor bound to its stream, in the order of the sensors,
+  /// and adds its entry to the report. The outcome is kAccepted, unless the measurement is not
+  /// finite or its sensor finds it invalid. If `refused` is not kAccepted, all have that outcome
+  /// and no model is called.
   void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
                Outcome refused = Outcome::kAccepted);
-  /// The same of one measurement and one sensor, whatever their streams. kAccepted.
+  /// Collects one measurement by one sensor, whatever their streams, with the outcome kAccepted.
   PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
                                  const ProblemIndex& index, UpdateReport& report);
   std::span<PendingMeasurement> all() {
@@ -74,10 +74,8 @@ class PendingMeasurements {
   Scratch<Eigen::MatrixXd> root_;
 };
 
-// The sensor model of a row.
-
-/// What fills its roles at x; roles that the sensor knows have their value in f. Until the next
-/// call.
+/// Pointers to the values of its roles at x, valid until the next call. Roles that the sensor knows
+/// point to their values in `f`.
 inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pending,
                                     const std::vector<double>& x) {
   const double* const values = f.state.values().data();
@@ -86,10 +84,10 @@ inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pe
   pending.roles_of = x.data() == values ? values : nullptr;
   return pending.roles.data();
 }
-/// h at x, ambient, in `h`.
+/// Computes h at x, ambient, into `h`.
 Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::vector<double>& x,
                   double* h);
-/// h at the roles, in the report; H and R, in the row.
+/// Computes h, H and R at the roles; h is in the report too.
 [[gnu::always_inline]] inline Outcome LineariseAt(PendingMeasurement& pending,
                                                   const double* const* roles) {
   const SensorPlace& place = *pending.place;
@@ -107,9 +105,9 @@ Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::
   }
   return OutcomeOf(status);
 }
-/// R at the roles, or as the measurement itself says, in the row.
+/// Computes R at the roles, or copies that of the measurement.
 Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles);
-/// z (-) h of the h in the report, in the report.
+/// Computes z (-) h of the last h; it is in the report too.
 inline void ComputeInnovation(PendingMeasurement& pending) {
   pending.report->innovation = {pending.innovation, static_cast<std::size_t>(pending.place->dof)};
   pending.model->measurement().geometry.Minus(pending.z, pending.h, pending.innovation);
@@ -118,11 +116,11 @@ inline void ComputeInnovation(PendingMeasurement& pending) {
 void ChainJacobian(PendingMeasurement& pending, int column, int size, const double* j,
                    Workspace& work);
 
-/// r' S^-1 r by S = L D L', m x m, row-major; not a number unless S is positive definite.
+/// r' S^-1 r by S = L D L', m x m, row-major; NaN unless S is positive definite.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
-/// Tells why h of a row could not be had; outside its domain, by which the filter counts as
-/// diverged, once until the sensor is accepted again.
+/// Reports why h could not be computed. If h is not defined, the filter counts as diverged; this is
+/// reported once until the next acceptance of the sensor.
 void NoteRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
 void NotePluginFailure(FilterState& f, const PendingMeasurement& pending);
 

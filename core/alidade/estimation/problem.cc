@@ -6,8 +6,10 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/estimation/owned_state.h"
+#include "alidade/state/dense_algebra.h"
 
 namespace alidade {
 namespace {
@@ -38,13 +40,16 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   if (initial.status == BlockStatus::kConstant) return prior;
   const int n = geometry.tangent;
   if (initial.covariance.size() > 0) {
+    constexpr double kRounding = 1e-12;
     prior.covariance = initial.covariance;
-    const bool fits = prior.covariance.rows() == n && prior.covariance.cols() == n;
-    if (!fits || !prior.covariance.allFinite() ||
-        !prior.covariance.isApprox(prior.covariance.transpose()) ||
-        prior.covariance.diagonal().minCoeff() < 0.0) {
-      Refuse(who, "needs a symmetric covariance of " + std::to_string(n) + " x " +
-                      std::to_string(n) + " finite numbers with " + value);
+    const bool fits = prior.covariance.rows() == n && prior.covariance.cols() == n &&
+                      prior.covariance.allFinite() &&
+                      prior.covariance.isApprox(prior.covariance.transpose());
+    Eigen::LDLT<Eigen::MatrixXd> ldlt;
+    Eigen::MatrixXd root;
+    if (!fits || internal::SquareRootOf(prior.covariance, ldlt, root) < -kRounding) {
+      Refuse(who, "needs a symmetric, positive semi-definite covariance of " + std::to_string(n) +
+                      " x " + std::to_string(n) + " finite numbers with " + value);
     }
     return prior;
   }
@@ -52,8 +57,8 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   if (sigma.size() == 1) sigma.assign(static_cast<std::size_t>(n), sigma[0]);
   const auto good = [](double one) { return std::isfinite(one) && one >= 0.0; };
   if (std::ssize(sigma) != n || !std::ranges::all_of(sigma, good)) {
-    Refuse(who, "needs a finite standard deviation of at least 0, or " + std::to_string(n) +
-                    " of them, with " + value);
+    Refuse(who, "needs a finite standard deviation of at least 0" +
+                    (n == 1 ? "" : ", or " + std::to_string(n) + " of them,") + " with " + value);
   }
   prior.covariance = Eigen::Map<const Eigen::VectorXd>(sigma.data(), n).cwiseAbs2().asDiagonal();
   return prior;
@@ -68,8 +73,7 @@ int AddStream(Problem& problem, const StreamInfo& stream, const std::string& who
   }
   if (found->size != stream.size || found->known != stream.known) {
     const auto numbers = [](const StreamInfo& one) {
-      return std::to_string(one.size) + " values with " + std::to_string(one.known) +
-             " known numbers";
+      return std::to_string(one.size) + " and " + std::to_string(one.known) + " known numbers";
     };
     Refuse(who, "reads " + numbers(stream) + " from stream '" + stream.name + "', and another " +
                     numbers(*found));
@@ -86,7 +90,9 @@ void CheckRole(const Problem& problem, const Space& role, const RoleBinding& bin
     if (!role.optional()) Refuse(who, "needs a block that fills its " + its_role);
     return;
   }
-  ALIDADE_EXPECTS(binding.block < std::ssize(problem.layout.blocks()));
+  if (binding.block >= std::ssize(problem.layout.blocks())) {
+    Refuse(who, "has in its " + its_role + ", a block that is not of this problem");
+  }
   const Block& block = problem.layout[binding.block];
   if (block.geometry() == role.geometry) return;
   Refuse(who, "has a " + its_role + "; block '" + block.name + "' is " +
@@ -146,6 +152,9 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
   if (std::ranges::any_of(layout.blocks(), taken)) Refuse(who, "is there already");
   const std::vector<Space>& spaces = model->blocks();
   for (const InitialValue& one : initial) {
+    if (std::ranges::count(initial, one.block, &InitialValue::block) > 1) {
+      Refuse(who, "has two initial values of '" + one.block + "'");
+    }
     if (std::ranges::count(spaces, one.block, &Space::name) == 0) {
       Refuse(who,
              "has no block '" + one.block + "'; its blocks are " + internal::Join(NamesOf(spaces)));
@@ -167,23 +176,30 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
     if (values.back().name.empty()) values.back().name = space.name;
     added.push_back(PriorOf(values.back(), space, -1, who));
   }
+  if (!input.stream.empty() && !model->has_input()) {
+    Refuse(who, "has model '" + model->name() + "', which takes no control input");
+  }
+  Problem changed = *this;  // as a whole, or nothing
   StateHandle handle{name, {}, -1};
   MotionBinding motion{name, std::move(model), {}, {}};
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     const std::string& block = values[i].name;
-    const BlockId id = layout.Declare(name + '.' + block, name, spaces[i], values[i].status);
+    const std::string full = name + '.' + block;
+    if (changed.layout.Find(full) >= 0) Refuse(who, "has a block '" + full + "', which is there");
+    const BlockId id = changed.layout.Declare(full, name, spaces[i], values[i].status);
     handle.blocks.emplace(block, id);
     motion.blocks.push_back(id);
     added[i].block = id;
   }
-  std::ranges::move(added, std::back_inserter(priors));
+  std::ranges::move(added, std::back_inserter(changed.priors));
   if (motion.model->has_input()) {
     const Space& space = motion.model->input();
     motion.input = input;
     if (input.stream.empty()) motion.input.stream = name + '.' + space.name;
-    handle.input = AddStream(*this, {motion.input.stream, space.geometry.ambient}, who);
+    handle.input = AddStream(changed, {motion.input.stream, space.geometry.ambient}, who);
   }
-  motions.push_back(std::move(motion));
+  changed.motions.push_back(std::move(motion));
+  *this = std::move(changed);
   return handle;
 }
 
@@ -209,31 +225,55 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
     if (block < 0 || std::ranges::count(roles, block, &RoleBinding::block) < 2) continue;
     Refuse(who, "has block '" + layout[block].name + "' in two roles; expected one for each");
   }
+  for (const auto& [role, state] : options.owned) {
+    if (role < spaces.size() && brings(role)) continue;
+    Refuse(who, "brings no state in its role " + std::to_string(role) +
+                    ", which the option `owned` names");
+  }
+  if (options.loss.kind != LossKind::kNone && !(options.loss.scale > 0.0)) {
+    Refuse(who, "has a robust loss of scale " + internal::RoundedText(options.loss.scale) +
+                    "; expected > 0");
+  }
+  Problem changed = *this;  // as a whole, or nothing
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     if (!brings(i)) continue;
     const auto given = options.owned.find(i);
     roles[i] = internal::AddOwnedState(
-        *this, name, spaces[i],
+        changed, name, spaces[i],
         given != options.owned.end() ? given->second : OwnedState::Of(model->owned(i)));
   }
-  if (of_landmark > 0 && !landmarks) landmarks.emplace();
+  if (of_landmark > 0 && !changed.landmarks) changed.landmarks.emplace();
   const std::string& stream = options.stream.empty() ? name : options.stream;
   const SensorHandle handle{
       static_cast<int>(sensors.size()),
-      AddStream(*this, {stream, model->measurement().geometry.ambient, 0.0, model->known_size()},
+      AddStream(changed, {stream, model->measurement().geometry.ambient, 0.0, model->known_size()},
                 who)};
-  sensors.push_back({name, stream, std::move(model), std::move(roles), options.loss, options.xyz,
-                     options.outlier_rejection});
+  changed.sensors.push_back({name, stream, std::move(model), std::move(roles), options.loss,
+                             options.xyz, options.outlier_rejection});
+  *this = std::move(changed);
   return handle;
 }
 
 BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                                 OwnedState state) {
-  Prior prior = PriorOf(state.initial, role, -1, "sensor '" + sensor + "'");
+  const std::string who = "sensor '" + sensor + "'";
+  if (!state.initial.from.empty()) {
+    Refuse(who, "brings the state '" + role.name + "', which starts from no measurement");
+  }
+  const std::string name = sensor + '.' + role.name;
+  if (problem.layout.Find(name) >= 0)
+    Refuse(who, "brings the state '" + name + "', which is there");
+  Prior prior = PriorOf(state.initial, role, -1, who);
   const BlockStatus status = state.initial.status;
-  prior.block = problem.layout.Declare(sensor + '.' + role.name, sensor, role, status);
   if (status == BlockStatus::kConstant) state.process.dynamics = OwnedDynamics::kConstant;
   state.process.mean = prior.mean;
+  state.process.sqrt_prior.clear();
+  OwnedRole checked = state.process;
+  const std::string defect = CheckOwned(role.geometry, checked);
+  if (!defect.empty()) {
+    Refuse(who, "brings the state '" + role.name + "', whose dynamics " + defect);
+  }
+  prior.block = problem.layout.Declare(name, sensor, role, status);
   problem.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});
   problem.priors.push_back(std::move(prior));
   return problem.priors.back().block;

@@ -114,12 +114,12 @@ struct OwnedState {
   static OwnedState Of(const OwnedRole& owned);
 
   InitialValue initial;
-  OwnedRole
-      process;  ///< its dynamics and their noise count; a Gauss-Markov process has the mean of
-                ///< `initial`
+  /// Its dynamics, density and time constant count. A Gauss-Markov process returns to the mean of
+  /// `initial`.
+  OwnedRole process;
 };
 
-/// A state of a problem: its blocks by the names of the motion model.
+/// A state of a problem: its blocks by their names there.
 struct StateHandle {
   /// Error kBadConfig if there is no block of that name.
   BlockId operator[](std::string_view block) const;

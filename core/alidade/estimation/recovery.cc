@@ -22,9 +22,9 @@ Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 /// Of the blocks that one motion model moves together with `id`: the values they have are no better
 /// known than at the start, nor than they are. Uncorrelated. `id` itself is initialised after it.
 void DropMotionOf(FilterState& f, BlockId id) {
-  for (const MotionBinding& motion : f.index->problem.motions) {
+  for (const MotionBinding& motion : f.problem_index->problem.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
-    for (const Prior& prior : f.index->problem.priors) {
+    for (const Prior& prior : f.problem_index->problem.priors) {
       const Block& block = f.state.layout()[prior.block];
       if (std::ranges::find(motion.blocks, prior.block) == motion.blocks.end() ||
           prior.covariance.size() == 0 || !block.has_covariance() ||

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <deque>
 #include <memory>
@@ -76,6 +77,8 @@ class Rollback {
   /// and nothing has changed.
   Processed Process(Frame frame);
   /// Process, of what came of one timestamp. Errors: those of Filter::Push; nothing has changed.
+  template <std::floating_point Seconds>
+  Processed Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
   Processed Push(Timestamp timestamp, const std::vector<Reading>& readings) {
     return Process(filter().MakeFrame(timestamp, readings));
   }

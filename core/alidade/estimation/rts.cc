@@ -36,12 +36,12 @@ class RecordingEquations : public UpdateMethod {
     return std::make_unique<RecordingEquations>(*this);
   }
   StepError Step(FilterState& f, double dt_s) override;
-  void BeginUpdate(FilterState& f, int capacity) override { linear_.BeginUpdate(f, capacity); }
+  void BeginUpdate(FilterState& f, int capacity) override { ekf_.BeginUpdate(f, capacity); }
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
-    return linear_.Predict(f, pending);
+    return ekf_.Predict(f, pending);
   }
   double ComputeNis(FilterState& f, PendingMeasurement& pending) override {
-    return linear_.ComputeNis(f, pending);
+    return ekf_.ComputeNis(f, pending);
   }
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
@@ -50,7 +50,7 @@ class RecordingEquations : public UpdateMethod {
   const Adjoint& frame() const { return frame_; }
 
  private:
-  EkfEquations linear_;
+  EkfEquations ekf_;
   Adjoint frame_;
 };
 
@@ -62,7 +62,7 @@ void RecordingEquations::StartFrame(const FilterState& f) {
 }
 
 StepError RecordingEquations::Step(FilterState& f, double dt_s) {
-  if (StepError error = linear_.Step(f, dt_s)) return error;
+  if (StepError error = ekf_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
   const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
@@ -72,7 +72,7 @@ StepError RecordingEquations::Step(FilterState& f, double dt_s) {
 
 Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const std::vector<double> before = f.state.values();
-  const Outcome outcome = linear_.Correct(f, rows);
+  const Outcome outcome = ekf_.Correct(f, rows);
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
   const Workspace::Use use(f.work);
   const Eigen::Index n = f.size(), m = f.update.rows();
@@ -116,22 +116,22 @@ RtsSmoother::RtsSmoother(Problem problem, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams,
                          std::unique_ptr<internal::RecordingEquations> tape)
     : tape_(tape.get()),
-      loop_(std::make_unique<internal::FilterEngine>(
+      engine_(std::make_unique<internal::FilterEngine>(
           CheckedProblem(std::move(problem), "RtsSmoother", kCapabilities),
           internal::WithoutRecovery(options), streams, std::move(tape))) {}
 
 RtsSmoother::~RtsSmoother() = default;
 
-void RtsSmoother::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
-const State& RtsSmoother::state() const { return loop_->f.state; }
-Timestamp RtsSmoother::timestamp() const { return loop_->f.timestamp; }
-bool RtsSmoother::diverged() const { return loop_->f.health.diverged; }
-bool RtsSmoother::failed() const { return loop_->f.health.ended; }
+void RtsSmoother::Start(Timestamp timestamp) { engine_->f.timestamp = timestamp; }
+const State& RtsSmoother::state() const { return engine_->f.state; }
+Timestamp RtsSmoother::timestamp() const { return engine_->f.timestamp; }
+bool RtsSmoother::diverged() const { return engine_->f.health.diverged; }
+bool RtsSmoother::failed() const { return engine_->f.health.ended; }
 
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  const internal::FilterState& f = loop_->f;
+  const internal::FilterState& f = engine_->f;
   tape_->StartFrame(f);
-  loop_->Process(frame);
+  engine_->Process(frame);
   Workspace work;
   Eigen::MatrixXd held(f.size(), 0);
   if (f.motions.in_interval()) held = f.motions.Held(&internal::Motions::Step::m, f.size(), work);

@@ -61,7 +61,7 @@ class RtsSmoother : public Estimator {
               std::unique_ptr<internal::RecordingEquations> tape);
 
   internal::RecordingEquations* tape_;  ///< the method of the loop
-  std::unique_ptr<internal::FilterEngine> loop_;
+  std::unique_ptr<internal::FilterEngine> engine_;
   std::vector<Passed> passed_frames_;
 };
 

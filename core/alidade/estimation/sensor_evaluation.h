@@ -8,17 +8,17 @@
 /// a point of a batch. m: tangent size of the measurement.
 namespace alidade::internal {
 
-/// The values that fill the roles of a sensor at x; of roles that it knows those of `known_roles`.
-/// Null: the role has no place.
+/// Pointers to the values of the roles of a sensor in x; of roles that it knows, in `known_roles`.
+/// Null for a role that is not bound.
 void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
 
-/// Destinations of an evaluation, row-major; null: not wanted.
+/// Destinations of an evaluation, row-major; null: not computed.
 struct EvaluationOutput {
   double* h = nullptr;         ///< ambient
-  double* jacobian = nullptr;  ///< H, m rows of the place's width; h has to be wanted too
+  double* jacobian = nullptr;  ///< H, m rows of the width of the place; requires h
   double* l = nullptr;         ///< of R = L L', m x m
 };
-/// A sensor model at the roles.
+/// Evaluates a sensor model at the roles.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
                    const EvaluationOutput& to);
@@ -38,7 +38,8 @@ inline void Square(const double* l, int m, double* r) {
   }
 }
 
-/// R at the roles, or as the measurement itself says, m x m, row-major. `l` is memory, m x m.
+/// Computes R at the roles, or copies that of the measurement, m x m, row-major. `l` is memory of
+/// the same size.
 Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
                 const double* const* roles, double* l, double* r);
 

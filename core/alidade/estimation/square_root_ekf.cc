@@ -50,7 +50,7 @@ class SquareRootEquations : public UpdateMethod {
   void Begin(FilterState& f) override;
   StepError Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override {
-    return linear_.Predict(f, pending);
+    return ekf_.Predict(f, pending);
   }
   double ComputeNis(FilterState& f, PendingMeasurement& pending) override;
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
@@ -66,14 +66,14 @@ class SquareRootEquations : public UpdateMethod {
     Eigen::MatrixXd root;
   };
 
-  EkfEquations linear_;
+  EkfEquations ekf_;
   Eigen::MatrixXd root_;
   Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
   std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
 };
 
 void SquareRootEquations::Begin(FilterState& f) {
-  noise_roots_.resize(f.index->sensor_places.size());
+  noise_roots_.resize(f.problem_index->sensor_places.size());
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   SquareRootOf(f.state.covariance().Dense(), ldlt, root_);
   SetCovariance(f);
@@ -90,7 +90,7 @@ void SquareRootEquations::SetCovariance(FilterState& f) const {
 
 StepError SquareRootEquations::Step(FilterState& f, double dt_s) {
   const bool goes_on = f.motions.in_interval();
-  if (StepError error = linear_.Step(f, dt_s)) return error;
+  if (StepError error = ekf_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
   Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
@@ -173,7 +173,7 @@ SquareRootEkf::SquareRootEkf(Problem problem, const EkfOptions& options,
              std::make_unique<internal::SquareRootEquations>()) {}
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
-  const Eigen::MatrixXd* const root = loop().method->Root();
+  const Eigen::MatrixXd* const root = engine().method->Root();
   ALIDADE_EXPECTS(root != nullptr);
   return *root;
 }

@@ -6,17 +6,17 @@
 
 #include "alidade/estimation/pending_measurements.h"
 
-/// The rows of an update below one another: m rows in all, n = size of P.
+/// The measurements of an update stacked: m rows in all, n = size of P.
 namespace alidade::internal {
 
-/// m, of all rows of an update.
+/// m.
 int TotalDof(std::span<PendingMeasurement* const> rows);
 
-/// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
+/// Whether the gain is reported: not for sensors of landmarks, whose blocks come and go.
 inline bool GainIsRecorded(const PendingMeasurement& pending) {
   return !pending.place->has_landmark;
 }
-/// Gives the reports of the rows their columns of K: copy(rows of P, column, count, to).
+/// Writes the columns of K to the reports, by copy(rows of P, column, count, destination).
 template <class Copy>
 void RecordGainBy(const FilterState& f, std::span<PendingMeasurement* const> rows,
                   const Copy& copy) {
@@ -33,7 +33,7 @@ void RecordGainBy(const FilterState& f, std::span<PendingMeasurement* const> row
     column += m;
   }
 }
-/// The same of K as a matrix.
+/// Writes the columns of K, a matrix, to the reports.
 void RecordGain(const FilterState& f, std::span<PendingMeasurement* const> rows,
                 const ConstMatrix& gain);
 
@@ -42,19 +42,19 @@ struct Stacked {
   Workspace::Vector innovation;  ///< m
 };
 
-/// The rows as they are, in f.work.
+/// H, R and the innovation stacked, in f.work.
 Stacked Stack(FilterState& f, std::span<PendingMeasurement* const> rows);
-/// H, R and the innovation of all rows, in f.work.
+/// Each of them by itself, in f.work.
 Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<PendingMeasurement* const> rows);
-/// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
-/// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
+/// Calls zero(offset, size, at, k) for each part of the gain that is zero because of a consider
+/// block or role: rows [offset, offset + size) of P, columns [at, at + k) of the update.
 template <class Zero>
 void ForEachConsidered(const FilterState& f, std::span<PendingMeasurement* const> rows,
                        const Zero& zero) {
-  for (std::size_t i = 0; f.blocks.considering && i < f.index->problem.layout.blocks().size();
-       ++i) {
+  for (std::size_t i = 0;
+       f.blocks.considering && i < f.problem_index->problem.layout.blocks().size(); ++i) {
     const Block& block = f.state.layout()[static_cast<BlockId>(i)];
     if (!block.present || block.status != BlockStatus::kConsider) continue;
     zero(block.tangent_offset, block.geometry().tangent, 0, TotalDof(rows));

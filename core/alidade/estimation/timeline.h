@@ -12,9 +12,9 @@
 
 namespace alidade::internal {
 
-/// How a filter gets from one timestamp to another: in pieces over which no control input changes,
-/// each in equal steps of at most max_dt_s. Control inputs are held from one to the next
-/// (zero-order hold).
+/// Divides the time between two timestamps into sub-steps during which no control input changes,
+/// each of equal steps of at most max_dt_s. Control inputs are held until the next one (zero-order
+/// hold).
 ///
 ///   u(t) = u_k   for t_k <= t < min(t_{k+1}, t_k + timeout)
 ///   u(t) = 0     for any other t: the neutral element of the input's geometry
@@ -44,9 +44,9 @@ class Timeline {
 
   /// The time of the priors, where nothing else sets it: initial_time_s, or the first frame's.
   Timestamp StartFor(const Frame& first) const { return start_.value_or(first.timestamp); }
-  /// The first piece of the way from `from` to `to`, later. A piece of at least twice as many steps
-  /// as any noted before is noted as the event `substeps`. What is not empty: it would need too
-  /// many.
+  /// Computes the next sub-step from `from` towards `to`, which is later. If it has at least twice
+  /// as many steps as any before, the event `substeps` reports it. Returns an error if it would
+  /// need too many steps.
   StepError NextSubStep(Timestamp from, Timestamp to, std::vector<Event>& events,
                         SubStep& sub_step);
 
@@ -56,7 +56,7 @@ class Timeline {
   /// takes none. Where none acts, an event `input_stale`, once until one does. Good until the next
   /// TakeInputs.
   std::span<const double> Input(std::size_t motion, Timestamp from, std::vector<Event>& events);
-  /// Gives the motion models that move theirs.
+  /// Sets the control inputs of the active motion models.
   void UseInputs(Timestamp from, Motions& motions, std::vector<Event>& events);
   /// Takes the inputs of a frame, which then act from its timestamp on, and lists them in
   /// `report.inputs`. One that is older than the one held is passed over; one that is not finite or

@@ -76,7 +76,9 @@ class UkfEquations : public UpdateMethod {
   std::unique_ptr<UpdateMethod> Clone() const override {
     return std::make_unique<UkfEquations>(*this);
   }
-  void Begin(FilterState& f) override { guarded_.assign(f.index->sensor_places.size() + 1, false); }
+  void Begin(FilterState& f) override {
+    guarded_.assign(f.problem_index->sensor_places.size() + 1, false);
+  }
   StepError Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override;
   double ComputeNis(FilterState& f, PendingMeasurement& pending) override;
@@ -173,10 +175,10 @@ void UkfEquations::TakeHeld(FilterState& f, const Workspace::Matrix& deviations,
   const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
   held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < f.index->motion_places.size(); ++i) {
+  for (std::size_t i = 0; i < f.problem_index->motion_places.size(); ++i) {
     if (!f.motions.steps()[i].active) continue;
-    const Eigen::Index inputs = f.index->problem.motions[i].model->noise_size();
-    if (!f.index->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
+    const Eigen::Index inputs = f.problem_index->problem.motions[i].model->noise_size();
+    if (!f.problem_index->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
     column += inputs;
   }
 }
@@ -186,8 +188,8 @@ void UkfEquations::TakeHeld(FilterState& f, const Workspace::Matrix& deviations,
 void UkfEquations::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
   const bool guarded = halvings > 0 || !narrow_enough;
   if (guarded && !guarded_[index]) {
-    const std::string who = index < f.index->sensor_places.size()
-                                ? "sensor '" + f.index->problem.sensors[index].name + "'"
+    const std::string who = index < f.problem_index->sensor_places.size()
+                                ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
                                 : "motion";
     Note(f, "guarded",
          who + ": sigma points leave its domain or have no mean" +
@@ -207,12 +209,12 @@ Outcome UkfEquations::StepPoint(FilterState& f, const double* from, const double
   for (std::size_t i = 0; i < f.motions.steps().size(); ++i) {
     const Motions::Step& step = f.motions.steps()[i];
     if (!step.active) continue;
-    const MotionBinding& motion = f.index->problem.motions[i];
+    const MotionBinding& motion = f.problem_index->problem.motions[i];
     const Eigen::Index inputs = motion.model->noise_size();
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const MotionPlace& place = f.index->motion_places[i];
+    const MotionPlace& place = f.problem_index->motion_places[i];
     const Outcome outcome =
         StepAt(motion, place, from, step.u.data(), w.data(), dt_s, {.next = next.data()});
     if (outcome == Outcome::kFailed) {

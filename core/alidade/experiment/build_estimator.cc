@@ -20,8 +20,8 @@ namespace {
 const EstimatorCapabilities& SupportOf(const PluginEntry& entry) {
   static constexpr EstimatorCapabilities kUnsaid = {
       .consider = true, .at_measurement = true, .from_measurement = true};
-  const EstimatorCapabilities* const support = EstimatorOf(entry).support;
-  return support != nullptr ? *support : kUnsaid;
+  const EstimatorCapabilities* const capabilities = EstimatorOf(entry).capabilities;
+  return capabilities != nullptr ? *capabilities : kUnsaid;
 }
 
 /// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
@@ -101,10 +101,10 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
   FailOffered(type, host, node);
 }
 
-/// Refuses by name what `problem`, built from the config `root`, asks for beyond `support`.
-void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& support,
+/// Refuses by name what `problem`, built from the config `root`, asks for beyond `capabilities`.
+void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& capabilities,
                        const Node& root, const Problem& problem) {
-  const auto asked = FindUnsupported(problem, support);
+  const auto asked = FindUnsupported(problem, capabilities);
   if (!asked) return;
   NodeOf(*asked, root, problem)
       .Fail("estimator type '" + type + "' does not support " + asked->what,
@@ -271,8 +271,8 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   const PluginEntry* const of_plugin =
       of_core == nullptr ? &FindOffered(spec.type, host, type) : nullptr;
   spec.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
-  const EstimatorCapabilities& support =
-      of_core != nullptr ? of_core->support : SupportOf(*of_plugin);
+  const EstimatorCapabilities& capabilities =
+      of_core != nullptr ? of_core->capabilities : SupportOf(*of_plugin);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, spec.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -301,7 +301,7 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   RefuseUnsupportedKeys(spec.type, entry);
   entry.RejectUnread();
   spec.problem = ReadProblem(own.root(), host, only);
-  RefuseUnsupported(spec.type, support, own.root(), spec.problem);
+  RefuseUnsupported(spec.type, capabilities, own.root(), spec.problem);
   if (of_core != nullptr) {
     RefuseLoneMatches(entry, spec.problem);
   }

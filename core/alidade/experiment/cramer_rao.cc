@@ -98,7 +98,7 @@ std::string CramerRaoBound::WhyNone(const Problem& problem, const std::vector<St
 
 CramerRaoBound::CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                                const std::vector<StreamInfo>& truths, TrueLandmark true_landmark)
-    : loop_(Ideal(problem), WithoutRecovery({}), streams, std::make_unique<EkfEquations>()),
+    : engine_(Ideal(problem), WithoutRecovery({}), streams, std::make_unique<EkfEquations>()),
       true_landmark_(std::move(true_landmark)),
       truths_(MatchTruths(problem.layout, truths)) {
   ALIDADE_EXPECTS(WhyNone(problem, truths).empty());
@@ -112,17 +112,17 @@ CramerRaoBound::CramerRaoBound(const Problem& problem, const std::vector<StreamI
 
 bool CramerRaoBound::Add(const SourceFrame& frame) {
   if (lost_) return false;
-  FilterState& f = loop_.f;
+  FilterState& f = engine_.f;
   if (f.timestamp == kNoTimestamp) lost_ = !MoveToTruth(frame.truth);
-  loop_.Process({frame.timestamp, {}});
+  engine_.Process({frame.timestamp, {}});
   lost_ = lost_ || !MoveToTruth(frame.truth);
-  if (!loop_.landmarks) {
-    loop_.Process(frame);
+  if (!engine_.landmarks) {
+    engine_.Process(frame);
   } else if (!lost_) {
     Frame at_truth = frame;
     bool all = !f.blocks.waiting;
     lost_ = !MeasureAtTruth(at_truth, all);
-    loop_.Process(at_truth);
+    engine_.Process(at_truth);
     lost_ = lost_ || (!all && f.report.landmarks.initialised > 0);
   }
   lost_ = lost_ || LostOne(f.report) || f.health.ended || !MoveToTruth(frame.truth);
@@ -133,11 +133,11 @@ bool CramerRaoBound::Add(const SourceFrame& frame) {
 /// false where that is beyond the sensor's limits, so that it stays as it was measured. False where
 /// a landmark has no truth.
 bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
-  const FilterState& f = loop_.f;
+  const FilterState& f = engine_.f;
   for (Measurement& one : frame.measurements) {
     const int index = sensors_[static_cast<std::size_t>(one.stream)];
     if (index < 0) continue;
-    const SensorBinding& sensor = f.index->problem.sensors[static_cast<std::size_t>(index)];
+    const SensorBinding& sensor = f.problem_index->problem.sensors[static_cast<std::size_t>(index)];
     const SensorModel& model = *sensor.model;
     if (f.blocks.waiting || model.Valid({one.values.data(), one.known.data()}) != Status::kOk)
       continue;
@@ -171,7 +171,7 @@ bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
 
 /// False where the truth of a block that has a covariance is not known.
 bool CramerRaoBound::MoveToTruth(const Truth& truth) {
-  State& state = loop_.f.state;
+  State& state = engine_.f.state;
   std::vector<double> values = state.values();
   for (BlockId id = 0; id < std::ssize(truths_); ++id) {
     const Block& block = state.layout()[id];
@@ -180,7 +180,7 @@ bool CramerRaoBound::MoveToTruth(const Truth& truth) {
     if (block.has_covariance() && !known) return false;
     if (block.present && known) std::ranges::copy(truth[t], values.begin() + block.value_offset);
   }
-  if (loop_.landmarks && !MoveLandmarks(values)) return false;
+  if (engine_.landmarks && !MoveLandmarks(values)) return false;
   state.MoveTo(values);
   return true;
 }
@@ -217,7 +217,7 @@ std::optional<std::vector<double>> CramerRaoBound::AtTruth(
 
 /// False where the place of one is not known.
 bool CramerRaoBound::MoveLandmarks(std::vector<double>& values) {
-  const std::vector<Block>& blocks = loop_.f.state.layout().blocks();
+  const std::vector<Block>& blocks = engine_.f.state.layout().blocks();
   std::map<std::string, std::vector<double>> present;
   std::vector<const Block*> fresh, anchors;
   for (std::size_t id = truths_.size(); id < blocks.size(); ++id) {

@@ -47,7 +47,7 @@ class CramerRaoBound {
   /// truth: there is no bound from here on.
   bool Add(const SourceFrame& frame);
   /// P, and the truth.
-  const State& state() const { return loop_.f.state; }
+  const State& state() const { return engine_.f.state; }
 
  private:
   bool MoveToTruth(const Truth& truth);
@@ -56,7 +56,7 @@ class CramerRaoBound {
                                              std::span<const Block* const> anchors) const;
   bool MeasureAtTruth(Frame& frame, bool& all) const;
 
-  FilterEngine loop_;
+  FilterEngine engine_;
   TrueLandmark true_landmark_;
   std::vector<int> sensors_;                              ///< by stream; -1: none
   std::map<std::string, std::vector<double>> landmarks_;  ///< true values, by block

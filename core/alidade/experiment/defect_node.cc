@@ -2,6 +2,7 @@
 #include "alidade/experiment/defect_node.h"
 
 #include <string>
+#include <string_view>
 
 namespace alidade::internal {
 namespace {
@@ -24,16 +25,15 @@ Node NodeOf(const ProblemDefect& defect, const Node& root, const Problem& proble
     const Block& block = problem.layout[defect.block];
     const auto entry = root.At("state").Find(block.owner);
     const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
-    if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
-    return state.At("initial").At(NameIn(block)).At("from_measurement");
+    if (defect.key == std::string_view("consider")) return ConsiderOf(state, block);
+    return state.At("initial").At(NameIn(block)).At(defect.key);
   }
   if (defect.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
   const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(defect.role)].name);
   if (!role) return roles;  // one that a time offset adds
-  // A mode that cannot be done comes before jacobian_at.
-  return role->At(defect.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
+  return role->At(defect.key);
 }
 
 }  // namespace alidade::internal

@@ -38,7 +38,7 @@ struct EstimatorEntry {
   EstimatorKind kind = EstimatorKind::kFilter;
   /// What it can do; what a problem asks for beyond is refused by name before `create`'s maker is
   /// asked. Null: it takes no landmarks, and refuses by itself what else it cannot do.
-  const EstimatorCapabilities* support = nullptr;
+  const EstimatorCapabilities* capabilities = nullptr;
 };
 constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
   return {kEstimatorKind, estimator.name, estimator.doc, estimator.citation, "", &estimator};

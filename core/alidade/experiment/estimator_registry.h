@@ -22,7 +22,7 @@ struct Description {
 struct EstimatorType {
   const char* name;
   const char* doc;  ///< one line
-  EstimatorCapabilities support;
+  EstimatorCapabilities capabilities;
   EstimatorKind kind;
   /// Reads the entry's keys. Errors: kBadConfig.
   std::function<EstimatorMaker(const Node& entry)> read;

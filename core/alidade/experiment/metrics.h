@@ -66,7 +66,7 @@ class Metrics {
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
   /// The errors of an estimate from that of another estimator, which stands for the truth: rmse,
   /// lag_ms and final_error alone. How far the two may be apart P does not say, as they share their
-  /// data. Both are values by block of their estimator's system, empty where there is none.
+  /// data. Both are values by block of their estimator's problem, empty where there is none.
   void AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
                      const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);

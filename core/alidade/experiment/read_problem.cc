@@ -21,19 +21,14 @@ namespace {
 
 using internal::NamesOf;
 
-/// Refuses an entry whose stream another one reads with another size.
-void CheckStream(const Node& entry, const std::string& name, int size, int known,
-                 const Problem& problem) {
-  const auto found = std::ranges::find(problem.streams, name, &StreamInfo::name);
-  if (found == problem.streams.end() || (found->size == size && found->known == known)) return;
-  const auto text = [](int values, int with) {
-    return std::to_string(values) + " values" +
-           (with > 0 ? " and " + std::to_string(with) + " known numbers" : std::string());
-  };
-  const Node node = entry.Find("input") ? entry.At("input").At("stream") : entry.At("stream");
-  node.Fail("stream '" + name + "' has " + text(found->size, found->known) +
-                " at a time for another entry",
-            text(size, known));
+/// Adds to the problem; what does not fit is an error at the place of the entry.
+template <class Add>
+void AddAt(const Node& entry, const Add& add) {
+  try {
+    add();
+  } catch (const Error& e) {
+    entry.Fail(e.what());
+  }
 }
 
 /// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
@@ -186,9 +181,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   }
   initial.RejectUnread();
   entry.RejectUnread();
-  CheckStream(entry, input.stream, model->has_input() ? model->input().geometry.ambient : 0, 0,
-              problem);
-  problem.AddState(name, model, values, input);
+  AddAt(entry, [&] { problem.AddState(name, model, values, input); });
 }
 
 /// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
@@ -413,9 +406,7 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
     }
   }
   if (model->has_landmark()) internal::ReadLandmarkKeys(name, entry, *model, host, options);
-  CheckStream(entry, options.stream, model->measurement().geometry.ambient, model->known_size(),
-              problem);
-  problem.AddSensor(name, model, bound, options);
+  AddAt(entry, [&] { problem.AddSensor(name, model, bound, options); });
   owned.AddTimeOffset(problem, problem.sensors.back());
   roles.RejectUnread();
   owned.RejectUnread();

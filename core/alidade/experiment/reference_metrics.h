@@ -26,7 +26,7 @@ struct FrameWithSegments {
   std::vector<bool> in_segment;
 };
 
-/// Gives `metrics`, made for BlocksOf the reference's system, the differences of `estimates` from
+/// Gives `metrics`, made for BlocksOf the reference's problem, the differences of `estimates` from
 /// those of the reference at the same frames of `seen`. A value of the reference that is not finite
 /// counts as unknown.
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,

@@ -72,8 +72,9 @@ double State::sigma(BlockId id, int i) const {
 }
 
 BlockEstimate State::Estimate(BlockId id) const {
+  ALIDADE_EXPECTS(id >= 0 && id < std::ssize(layout_.blocks()));
   const Block& block = layout_[id];
-  ALIDADE_EXPECTS(block.present);
+  if (!block.present) throw ContractViolation("block '" + block.name + "' has no value yet");
   BlockEstimate estimate{Eigen::Map<const Eigen::VectorXd>(value(id), block.geometry().ambient),
                          Eigen::VectorXd(block.geometry().tangent)};
   for (int i = 0; i < block.geometry().tangent; ++i) estimate.sigma[i] = sigma(id, i);

@@ -230,7 +230,7 @@ constexpr EstimatorCapabilities kCapabilities = {
 
 EstimatorMaker MakerOf(const BatchOptions& options) {
   return [options](const Problem& problem, const std::vector<StreamInfo>& streams) {
-    ALIDADE_EXPECTS(!FindUnsupported(problem, kCapabilities));
+    ALIDADE_EXPECTS(!FindUnsupported(problem, kCapabilities) && !FindDefect(problem));
     return std::make_unique<CeresBatch>(problem, options, streams);
   };
 }

@@ -182,7 +182,7 @@ EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
       "current: of each frame when it comes; lagged: when it leaves the window, at the end", 0);
   return [lag_s, lagged = output == 1, options = ReadSolveOptions(p)](
              const Problem& problem, const std::vector<StreamInfo>& streams) {
-    ALIDADE_EXPECTS(!FindUnsupported(problem, kFixedLagCapabilities));
+    ALIDADE_EXPECTS(!FindUnsupported(problem, kFixedLagCapabilities) && !FindDefect(problem));
     return std::make_unique<FixedLag>(problem, lag_s, lagged, options, streams);
   };
 }

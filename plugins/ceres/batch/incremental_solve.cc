@@ -796,8 +796,8 @@ Eigen::MatrixXd IncrementalSolve::Covariance() const {
     of_rows(places[i], static_cast<Eigen::Index>(i)) = 1.0;
   }
   if (!rows.empty()) p(rows, rows) = Eigen::MatrixXd(root_.solve(of_rows))(places, Eigen::all);
-  const auto problem = run_.binding_.initial.covariance().size();
-  return Clipped(p.topLeftCorner(problem, problem));
+  const auto size = run_.binding_.initial.covariance().size();
+  return Clipped(p.topLeftCorner(size, size));
 }
 
 bool IncrementalSolve::PutMap(std::vector<LandmarkEstimate>& map) const {

@@ -119,8 +119,8 @@ Eigen::MatrixXd KktSystem::Covariances::JointOf(std::size_t k) const {
 Eigen::MatrixXd KktSystem::Covariances::OfFrame(std::size_t frame) const {
   const std::size_t k = s_.node_of_[frame];
   const Node& node = s_.nodes_[k];
-  const auto problem = s_.run_.binding_.initial.covariance().size();
-  if (frame == node.last) return Clipped(JointOf(k).topLeftCorner(problem, problem));
+  const auto size = s_.run_.binding_.initial.covariance().size();
+  if (frame == node.last) return Clipped(JointOf(k).topLeftCorner(size, size));
   const auto n = Eigen::Index{s_.run_.initial_.covariance().size()};
   std::vector<int> multipliers;
   if (node.multiplier >= 0) multipliers.push_back(node.multiplier);
@@ -153,7 +153,7 @@ Eigen::MatrixXd KktSystem::Covariances::OfFrame(std::size_t frame) const {
     const Eigen::MatrixXd fc = internal::ProductTransposed(internal::Product(f, cross), by_w);
     p += internal::Congruence(f, JointOf(k - 1)) + fc + fc.transpose();
   }
-  return Clipped(p.topLeftCorner(problem, problem));
+  return Clipped(p.topLeftCorner(size, size));
 }
 
 Eigen::MatrixXd KktSystem::Covariances::OfLandmark(std::size_t i) const {

@@ -272,10 +272,10 @@ void CondensedRun::DropFirst(Trajectory& about) {
   }
   if (about.empty()) return;
   about.erase(about.begin());
-  const auto problem = std::ssize(binding_.initial.values());
+  const auto size = std::ssize(binding_.initial.values());
   for (std::vector<double>& x : about) {
     x.resize(initial_.values().size());
-    std::copy(initial_.values().begin() + problem, initial_.values().end(), x.begin() + problem);
+    std::copy(initial_.values().begin() + size, initial_.values().end(), x.begin() + size);
   }
 }
 

@@ -127,6 +127,23 @@ TEST(Problem, AStateOfASensorMayStartOtherwiseThanItsModelSays) {
   EXPECT_EQ(sigma[0], 0.5);
 }
 
+TEST(Problem, WhatIsRefusedChangesNothing) {
+  Problem problem;
+  const auto receiver =
+      problem.AddState("receiver", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 10.0}});
+  problem.AddSensor("range", Pseudorange(1.0), {receiver["value"]});
+  const std::size_t blocks = problem.layout.blocks().size();
+  const auto depth = problem.AddState("depth", Constant<1>(1), {{"value", 1.0, 1.0}});
+  const auto add = [&](const std::string& stream) {
+    problem.AddSensor("other", Pseudorange(1.0), {receiver["value"]}, {.stream = stream});
+  };
+  problem.AddSensor("stereo", StereoDisparity(400.0, 0.065, 1.0), {depth["value"]});
+  EXPECT_NE(RefusalOf([&] { add("stereo"); }), "nothing");
+  EXPECT_EQ(problem.layout.blocks().size(), blocks + 1);
+  EXPECT_EQ(problem.FindSensor("other"), -1);
+  EXPECT_EQ(RefusalOf([&] { add("range"); }), "nothing");
+}
+
 TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   const StereoDisparity stereo(400.0, 0.065, 1.0);
   EXPECT_EQ(Refusal([](Problem& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
@@ -146,8 +163,29 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, -1.0}});
             }),
-            "state 'b' needs a finite standard deviation of at least 0, or 1 of them, with the "
-            "initial value of 'value', a vector(1)");
+            "state 'b' needs a finite standard deviation of at least 0 with the initial value of "
+            "'value', a vector(1)");
+  EXPECT_EQ(Refusal([](Problem& p, auto&) {
+              p.AddState("b", Constant<1>(1), {{"value", 0.0, 1.0}, {"value", 1.0, 1.0}});
+            }),
+            "state 'b' has two initial values of 'value'");
+  EXPECT_EQ(
+      Refusal([](Problem& p, auto&) {
+        p.AddState("b", Constant<3>(3),
+                   {InitialValue::WithCovariance(
+                       "value", {0.0, 0.0, 0.0},
+                       Eigen::Vector3d(1.0, -1.0, 1.0).asDiagonal().toDenseMatrix())});
+      }),
+      "state 'b' needs a symmetric, positive semi-definite covariance of 3 x 3 finite numbers "
+      "with the initial value of 'value', a vector(3)");
+  EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
+              p.AddSensor("s", stereo, {t["position"]}, {.loss = {LossKind::kHuber, -1.0}});
+            }),
+            "sensor 's' has a robust loss of scale -1; expected > 0");
+  EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
+              p.AddSensor("s", stereo, {t["position"]}, {.owned = {{0, OwnedState::Of({})}}});
+            }),
+            "sensor 's' brings no state in its role 0, which the option `owned` names");
   EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
             "state 'target' has no block 'depth'; its blocks are position, velocity");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) { p.AddSensor("s", stereo, {}); }),
@@ -171,15 +209,16 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
         const auto wide = p.AddState("wide", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 1.0}});
         p.AddSensor("b", Pseudorange(1.0), {wide["value"]}, {.stream = "camera"});
       }),
-      "sensor 'b' reads 1 values with 3 known numbers from stream 'camera', and another 1 "
-      "values with 0 known numbers");
-  EXPECT_EQ(Refusal([](Problem& p, auto&) {
-              p.AddState("b", Constant<3>(3),
-                         {InitialValue::WithCovariance("value", {0.0, 0.0, 0.0},
-                                                       Eigen::Matrix2d::Identity())});
-            }),
-            "state 'b' needs a symmetric covariance of 3 x 3 finite numbers with the initial value "
-            "of 'value', a vector(3)");
+      "sensor 'b' reads 1 and 3 known numbers from stream 'camera', and another 1 and 0 known "
+      "numbers");
+  EXPECT_EQ(
+      Refusal([](Problem& p, auto&) {
+        p.AddState(
+            "b", Constant<3>(3),
+            {InitialValue::WithCovariance("value", {0.0, 0.0, 0.0}, Eigen::Matrix2d::Identity())});
+      }),
+      "state 'b' needs a symmetric, positive semi-definite covariance of 3 x 3 finite numbers "
+      "with the initial value of 'value', a vector(3)");
 }
 
 TEST(Problem, AFilterRefusesABlockThatCannotStart) {
@@ -196,11 +235,11 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
   };
   EXPECT_EQ(refusal("position", "stereo"), "nothing");
   EXPECT_EQ(refusal("position", "stero"),
-            "Ekf: no sensor 'stero' here (block 'target.position'); expected a sensor of this "
-            "estimator; did you mean 'stereo'?");
+            "Ekf: from_measurement: no sensor 'stero' here (block 'target.position'); expected a "
+            "sensor of this estimator; did you mean 'stereo'?");
   EXPECT_EQ(refusal("velocity", "stereo"),
-            "Ekf: sensor 'stereo' does not determine this block (block 'target.velocity'); "
-            "expected a sensor whose inverse measurement model is this block");
+            "Ekf: from_measurement: sensor 'stereo' does not determine this block (block "
+            "'target.velocity'); expected a sensor whose inverse measurement model is this block");
 }
 
 TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
@@ -211,8 +250,8 @@ TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
   problem.AddSensor("a_by_b", Scale2d::FromPixels(300.0, 1.0), {b["value"], a["value"]});
   problem.AddSensor("b_by_a", Scale2d::FromPixels(300.0, 1.0), {a["value"], b["value"]});
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
-            "Ekf: cyclic: a.value <- b.value <- a.value (block 'a.value'); expected one block of "
-            "the cycle with a mean of its own");
+            "Ekf: from_measurement: cyclic: a.value <- b.value <- a.value (block 'a.value'); "
+            "expected one block of the cycle with a mean of its own");
 }
 
 TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {
@@ -226,8 +265,8 @@ TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {
   problem.AddSensor("scale", Scale2d::FromPixels(300.0, 1.0),
                     {measured(target["position"]), model["value"]});
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
-            "Ekf: jacobian_at: measurement of role 'depth', of which model 'scale' has no inverse "
-            "measurement model (sensor 'scale', role 'depth'); expected prediction");
+            "Ekf: jacobian_at: model 'scale' has no inverse measurement model of role 'depth' "
+            "(sensor 'scale', role 'depth'); expected prediction");
   problem.sensors[0].roles = {target["position"], measured(model["value"])};
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }), "nothing");
 }

@@ -261,7 +261,7 @@ std::string Unobservable(const Problem& problem) {
 std::string SupportText(const std::string& type) {
   const internal::EstimatorType* known = internal::FindEstimatorType(type);
   if (known == nullptr) return {};
-  const EstimatorCapabilities& can = known->support;
+  const EstimatorCapabilities& can = known->capabilities;
   const auto either = [](bool can_do, const char* with, const char* without) {
     return std::string(can_do ? with : without);
   };

@@ -80,7 +80,7 @@ std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
   if (const EstimatorType* const type = FindEstimatorType(spec.type)) {
     const auto [options, own] = type->describe(entry);
     rows = {{"gate", GateText(options, problem)}, {"fuse", FuseText(options.fuse, problem)}};
-    if (type->support.recovery)
+    if (type->capabilities.recovery)
       rows.push_back({"rejection_recovery", RejectionRecoveryText(options, problem)});
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                                 : "none: a gap is one step"});

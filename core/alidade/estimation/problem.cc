@@ -40,7 +40,7 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   if (initial.status == BlockStatus::kConstant) return prior;
   const int n = geometry.tangent;
   if (initial.covariance.size() > 0) {
-    constexpr double kRounding = 1e-12;
+    constexpr double kRounding = 1e-11;  // over the largest variance
     prior.covariance = initial.covariance;
     const bool fits = prior.covariance.rows() == n && prior.covariance.cols() == n &&
                       prior.covariance.allFinite() &&

@@ -78,7 +78,7 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
 /// Its P can be spoilt.
 struct Open : Ekf {
   using Ekf::Ekf;
-  using Ekf::loop;
+  using Ekf::engine;
 };
 
 // FAULTS 75: the budget.
@@ -92,7 +92,7 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
     EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
     EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
     // Spoilt again, from where it is.
-    ekf.loop().f.state.covariance().SetBlock(0, 0, Indefinite());
+    ekf.engine().f.state.covariance().SetBlock(0, 0, Indefinite());
   }
 }
 

@@ -59,9 +59,11 @@ inline constexpr std::array kOutcomes = {
     OutcomeInfo{"ended"},
 };
 static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
+/// The row of an outcome.
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];
 }
+/// Its name, as in files: `accepted`, `gated`.
 inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
 /// What a model's status means for the measurement; kOk is kAccepted.
 inline Outcome OutcomeOf(Status status) {

@@ -44,9 +44,11 @@ inline constexpr std::array kLosses = {
 };
 
 static_assert(kLosses.size() == static_cast<std::size_t>(LossKind::kCauchy) + 1);
+/// The row of a kind.
 inline const LossFunctions& FunctionsOf(LossKind kind) {
   return kLosses[static_cast<std::size_t>(kind)];
 }
+/// Its name: `none`, `huber`, `cauchy`.
 inline const char* ToString(LossKind kind) { return FunctionsOf(kind).name; }
 
 /// A loss with its scale.

@@ -12,24 +12,24 @@ namespace alidade {
 namespace {
 
 using GivenNoise = HostTest;
-using Numbers = std::vector<double>;
+using Values = std::vector<double>;
 
 const PluginHost& ShippedModels() {
   static const PluginHost host;
   return host;
 }
 
-Numbers RootOfR(const SharedSensor& sensor) {
+Values RootOfR(const SharedSensor& sensor) {
   const int m = sensor->measurement().geometry.tangent;
-  Numbers l(static_cast<std::size_t>(m) * static_cast<std::size_t>(m), std::nan(""));
+  Values l(static_cast<std::size_t>(m) * static_cast<std::size_t>(m), std::nan(""));
   // A given noise needs neither states nor a measurement.
   EXPECT_EQ(sensor->SqrtNoise(nullptr, nullptr, l.data()), Status::kOk);
   return l;
 }
 
-Numbers RootOfQ(const SharedMotion& motion, double dt_s) {
+Values RootOfQ(const SharedMotion& motion, double dt_s) {
   const int n = motion->noise_size();
-  Numbers l(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), std::nan(""));
+  Values l(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), std::nan(""));
   EXPECT_EQ(motion->SqrtQ(nullptr, nullptr, dt_s, l.data()), Status::kOk);
   return l;
 }
@@ -61,7 +61,7 @@ Problem PixelsWith(const std::string& keys) {
 
 // [1 0.6; 0.6 4] = L L', L = [1 0; 0.6 sqrt(4 - 0.36)], px
 TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
-  const Numbers expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
+  const Values expected = {1.0, 0.0, 0.6, std::sqrt(4.0 - 0.6 * 0.6)};
   const Problem problem = PixelsWith("covariance: [[1, 0.6], [0.6, 4]]");
   EXPECT_EQ(RootOfR(problem.sensors[0].model), expected);
   ASSERT_TRUE(problem.sensors[0].xyz != nullptr);
@@ -98,8 +98,8 @@ TEST_F(GivenNoise, TakesNothingButTheNoiseFromAModel) {
     config.root().RejectUnread();
     return RootOfR(model);
   };
-  EXPECT_EQ(scale("noise_model: constant"), Numbers{0.5});
-  EXPECT_EQ(scale("template_px: 300"), Numbers{0.5});
+  EXPECT_EQ(scale("noise_model: constant"), Values{0.5});
+  EXPECT_EQ(scale("template_px: 300"), Values{0.5});
   ExpectError(ExitCode::kBadConfig, {"template_px: missing"},
               [&] { scale("noise_model: propagated"); });
 }
@@ -116,7 +116,7 @@ TEST_F(GivenNoise, OfAMotionModelIsThatOfItsInputs) {
   const SharedMotion model = Motion(config, "constant_velocity");
   // m/s^2, held: whatever dt is
   for (const double dt_s : {0.1, 3.0}) {
-    EXPECT_EQ(RootOfQ(model, dt_s), (Numbers{2.0, 0.0, -0.5, std::sqrt(0.75)}));
+    EXPECT_EQ(RootOfQ(model, dt_s), (Values{2.0, 0.0, -0.5, std::sqrt(0.75)}));
   }
 }
 
@@ -127,7 +127,7 @@ TEST_F(GivenNoise, OfAMotionModelMayBeSingular) {
       "  kind: discrete\n"
       "  covariance: [[0.09, 0.09, 0, 0, 0, 0], [0.09, 0.09, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0],\n"
       "               [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0.04]]\n");
-  Numbers expected(36, 0.0);
+  Values expected(36, 0.0);
   expected[0] = expected[6] = 0.3;
   expected[35] = 0.2;
   EXPECT_EQ(RootOfQ(Motion(config, "quaternion_pose"), 0.1), expected);

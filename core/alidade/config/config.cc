@@ -25,35 +25,39 @@ namespace {
 
 bool NamesAnotherModel(const ConfigTree& old, const ConfigTree& next) {
   for (const char* key : {"model", "type"}) {
-    const ConfigTree* from = Child(old, key);
-    const ConfigTree* to = Child(next, key);
-    if (from != nullptr && to != nullptr && from->text != to->text) return true;
+    const ConfigTree* old_name = Child(old, key);
+    const ConfigTree* next_name = Child(next, key);
+    if (old_name != nullptr && next_name != nullptr && old_name->text != next_name->text) {
+      return true;
+    }
   }
   return false;
 }
 
-/// Fixes the key paths of `copy` and what is below it as those of `original`.
-void KeepPaths(const ConfigTree& original, const ConfigTree& copy) {
+/// Sets the key paths of `copy` and of all nodes below it to those of `original`.
+void CopyPaths(const ConfigTree& original, const ConfigTree& copy) {
   copy.path = PathOf(original);
   for (std::size_t i = 0; i < copy.children.size(); ++i) {
-    KeepPaths(*original.children[i], *copy.children[i]);
+    CopyPaths(*original.children[i], *copy.children[i]);
   }
 }
 
-/// Moves the children of `over` into `base`; both are maps.
-void Merge(ConfigTree* base, ConfigTree* over) {
-  std::unordered_map<std::string, std::size_t> at;
-  for (std::size_t i = 0; i < base->children.size(); ++i) at.emplace(base->children[i]->key, i);
-  for (auto& child : over->children) {
+/// Moves the children of the map `overrides` into the map `base`.
+void Merge(ConfigTree* base, ConfigTree* overrides) {
+  std::unordered_map<std::string, std::size_t> index_by_key;
+  for (std::size_t i = 0; i < base->children.size(); ++i) {
+    index_by_key.emplace(base->children[i]->key, i);
+  }
+  for (auto& child : overrides->children) {
     child->parent = base;
-    const auto found = at.find(child->key);
-    if (found == at.end()) {
+    const auto found = index_by_key.find(child->key);
+    if (found == index_by_key.end()) {
       base->children.push_back(std::move(child));
       continue;
     }
     auto& old = base->children[found->second];
-    const bool maps = old->kind == Node::Kind::kMap && child->kind == Node::Kind::kMap;
-    if (maps && !NamesAnotherModel(*old, *child)) {
+    const bool are_maps = old->kind == Node::Kind::kMap && child->kind == Node::Kind::kMap;
+    if (are_maps && !NamesAnotherModel(*old, *child)) {
       Merge(old.get(), child.get());
     } else {
       old = std::move(child);
@@ -61,7 +65,7 @@ void Merge(ConfigTree* base, ConfigTree* over) {
   }
 }
 
-/// The whole file, or just more of it than a config may have.
+/// Returns the content of the file, cut off one byte beyond the maximum size of a config.
 std::string ReadConfig(const fs::path& file, const Place& place, std::string_view key) {
   constexpr std::size_t kLimit = (1 << 20) + 1;
   const auto fail = [&](ExitCode code, int error) {
@@ -86,20 +90,20 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
-/// The keys of `source` that are a path to read from, as far as they are one value and not `-`.
-/// Another plugin may call something else by a name that is usual for files: what has no slash and
-/// is none in `folder` is left alone.
+/// Returns the values of `source` that are paths to read, without lists and `-`. Except for `path`,
+/// a plugin may use the same keys for other things. Such a value counts as a path if it has a slash
+/// or names a file in `folder`.
 std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& folder) {
   std::vector<ConfigTree*> paths;
   const ConfigTree* const source = Child(root, "source");
   if (source == nullptr) return paths;
-  const auto add = [&](const char* key, bool is_sure) {
+  const auto add = [&](const char* key, bool is_always_path) {
     ConfigTree* const node = Child(*source, key);
     if (node == nullptr || node->kind != Node::Kind::kScalar) return;
     std::error_code error;
     const std::string& text = node->text;
     if (text.empty() || text == "-") return;
-    if (is_sure || text.find('/') != text.npos || fs::exists(folder / text, error)) {
+    if (is_always_path || text.find('/') != text.npos || fs::exists(folder / text, error)) {
       paths.push_back(node);
     }
   };
@@ -110,8 +114,8 @@ std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& fol
   return paths;
 }
 
-/// Makes the relative paths of a config absolute, those of `source` and the items of `plugins`,
-/// without the `.` of a config that is named so. A `..` stays, as it may stand behind a link.
+/// Makes the relative paths of `source` and the items of `plugins` absolute. Removes each `.`, but
+/// keeps each `..`, as it may follow a symlink.
 void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   const auto anchor = [&](ConfigTree* node) {
     if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
@@ -128,8 +132,8 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   for (const auto& plugin : plugins->children) anchor(plugin.get());
 }
 
-/// Takes `include:` out of the map.
-std::unique_ptr<ConfigTree> TakeInclude(ConfigTree* root) {
+/// Removes `include:` from the map and returns it, or null.
+std::unique_ptr<ConfigTree> ExtractInclude(ConfigTree* root) {
   auto& children = root->children;
   const auto found = std::find_if(children.begin(), children.end(),
                                   [](const auto& child) { return child->key == "include"; });
@@ -139,6 +143,7 @@ std::unique_ptr<ConfigTree> TakeInclude(ConfigTree* root) {
   return include;
 }
 
+/// Reader of a config file and of the files that it includes.
 class Loader {
  public:
   explicit Loader(bool allow_outside) : allow_outside_(allow_outside) {}
@@ -147,20 +152,20 @@ class Loader {
     constexpr std::size_t kMaxFiles = 64;
     std::error_code ignored;
     const fs::path canonical = fs::weakly_canonical(file, ignored);
-    if (std::find(open_.begin(), open_.end(), canonical) != open_.end()) {
+    if (std::find(open_files_.begin(), open_files_.end(), canonical) != open_files_.end()) {
       FailAt(place, key, "includes itself: " + Quoted(file.string()));
     }
     files_.push_back(file.string());
     if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
-    auto own = ParseRoot(ReadConfig(file, place, key), file.string(), &budget_);
-    AnchorPaths(*own, file.parent_path());
-    const auto include = TakeInclude(own.get());
-    if (include == nullptr) return own;
-    open_.push_back(canonical);
+    auto root = ParseRoot(ReadConfig(file, place, key), file.string(), &budget_);
+    AnchorPaths(*root, file.parent_path());
+    const auto include = ExtractInclude(root.get());
+    if (include == nullptr) return root;
+    open_files_.push_back(canonical);
     auto merged = LoadIncludes(*include, file.parent_path());
-    open_.pop_back();
-    Merge(merged.get(), own.get());
-    merged->place = own->place;
+    open_files_.pop_back();
+    Merge(merged.get(), root.get());
+    merged->place = root->place;
     return merged;
   }
   const std::vector<std::string>& files() const { return files_; }
@@ -184,21 +189,23 @@ class Loader {
   bool allow_outside_;
   std::vector<std::string> files_;
   Budget budget_;
-  std::vector<fs::path> open_;
+  std::vector<fs::path> open_files_;
 };
 
-/// One step of a dotted key: the name of an entry, or the index of an item where it is empty.
+/// Step of a dotted key: the name of an entry of a map, or the index of an item of a list.
 struct Step {
-  std::string name;
+  std::string name;  ///< empty for an item of a list
   std::size_t index = 0;
 };
 
 std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
   std::vector<Step> steps;
-  const auto fail = [&] { FailAt(place, dotted, "not a key path", "one like 'a.b' or 'a.b[0]'"); };
-  for (std::string_view rest = dotted;;) {
-    const std::size_t end = std::min(rest.find('.'), rest.size());
-    std::string_view part = rest.substr(0, end);
+  const auto fail = [&] {
+    FailAt(place, dotted, "not a key path", "a path such as 'a.b' or 'a.b[0]'");
+  };
+  for (std::string_view remaining = dotted;;) {
+    const std::size_t end = std::min(remaining.find('.'), remaining.size());
+    std::string_view part = remaining.substr(0, end);
     const std::size_t name_end = std::min(part.find('['), part.size());
     if (name_end == 0) fail();
     steps.push_back({std::string(part.substr(0, name_end))});
@@ -212,27 +219,27 @@ std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
       part.remove_prefix(static_cast<std::size_t>(digits_end + 1 - part.data()));
       steps.push_back(step);
     }
-    if (end == rest.size()) return steps;
-    rest.remove_prefix(end + 1);
+    if (end == remaining.size()) return steps;
+    remaining.remove_prefix(end + 1);
   }
 }
 
-/// The place of one step below `at`, made where a map has none.
-std::unique_ptr<ConfigTree>* Descend(ConfigTree* at, const Step& step, const Place& place,
+/// Returns the child of `node` at `step`; adds it to a map that does not have it.
+std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const Place& place,
                                      std::string_view dotted) {
-  const bool wants_map = !step.name.empty();
-  if (wants_map && at->kind == Node::Kind::kNull) {
-    at->kind = Node::Kind::kMap;
-    at->place = place;
-    at->key_line = at->key_column = 0;
+  const bool is_map_key = !step.name.empty();
+  if (is_map_key && node->kind == Node::Kind::kNull) {
+    node->kind = Node::Kind::kMap;
+    node->place = place;
+    node->key_line = node->key_column = 0;
   }
-  const std::string& path = PathOf(*at);
-  if (at->kind != (wants_map ? Node::Kind::kMap : Node::Kind::kList)) {
-    FailAt(place, dotted, Quoted(path) + (wants_map ? " is not a map" : " is not a list"),
-           wants_map ? "the key of a map" : "the key of a list");
+  const std::string& path = PathOf(*node);
+  if (node->kind != (is_map_key ? Node::Kind::kMap : Node::Kind::kList)) {
+    FailAt(place, dotted, Quoted(path) + (is_map_key ? " is not a map" : " is not a list"),
+           is_map_key ? "the key of a map" : "the key of a list");
   }
-  auto& children = at->children;
-  if (!wants_map) {
+  auto& children = node->children;
+  if (!is_map_key) {
     if (step.index < children.size()) return &children[step.index];
     FailAt(place, dotted, Quoted(path) + " has " + std::to_string(children.size()) + " items");
   }
@@ -240,7 +247,7 @@ std::unique_ptr<ConfigTree>* Descend(ConfigTree* at, const Step& step, const Pla
                                   [&](const auto& child) { return child->key == step.name; });
   if (found != children.end()) return &*found;
   children.push_back(std::make_unique<ConfigTree>());
-  children.back()->parent = at;
+  children.back()->parent = node;
   children.back()->key = step.name;
   children.back()->place = place;
   return &children.back();
@@ -281,32 +288,32 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
     if (!defect.empty()) FailAt(place, {}, defect);
   }
   if (steps[0].name == "include") {
-    FailAt(place, dotted_key, "files are included before it is set", "a key of the file");
+    FailAt(place, dotted_key, "files are included before keys are set", "`include:` in the file");
   }
   const int depth = internal::kMaxDepth - static_cast<int>(steps.size());
   if (depth < 0) FailAt(place, dotted_key, "nested too deep", "at most 64 levels");
   Budget budget;
-  if (value == "-") value = "'-'";  // alone it would be a list of nothing
+  if (value == "-") value = "'-'";  // unquoted, YAML reads it as a list with an empty item
   auto next = internal::ParseYaml(value, Origin{place.file, std::string(dotted_key), false, depth},
                                   &budget);
   if (next == nullptr) FailAt(place, dotted_key, "no value", "a value, or \"\" for an empty text");
-  ConfigTree* at = tree_.get();
+  ConfigTree* node = tree_.get();
   std::unique_ptr<ConfigTree>* slot = nullptr;
   for (const Step& step : steps) {
-    slot = Descend(at, step, place, dotted_key);
-    at = slot->get();
+    slot = Descend(node, step, place, dotted_key);
+    node = slot->get();
   }
-  next->parent = at->parent;
-  next->key = at->key;
-  next->index = at->index;
+  next->parent = node->parent;
+  next->key = node->key;
+  next->index = node->index;
   *slot = std::move(next);
   AnchorPaths(*tree_, {});
 }
 
 std::vector<std::string> Config::inputs() const {
-  std::vector<std::string> all = files_;
-  for (const ConfigTree* const path : SourcePaths(*tree_, {})) all.push_back(path->text);
-  return all;
+  std::vector<std::string> inputs = files_;
+  for (const ConfigTree* const path : SourcePaths(*tree_, {})) inputs.push_back(path->text);
+  return inputs;
 }
 
 Config Config::Copy() const {
@@ -317,10 +324,10 @@ Config Config::Copy() const {
 
 Config Config::Merged(const Node& overrides) const {
   if (!overrides.is_map()) overrides.Fail("not a map", "a map of keys to override");
-  const auto over = Clone(overrides.tree());
-  KeepPaths(overrides.tree(), *over);
+  const auto copy = Clone(overrides.tree());
+  CopyPaths(overrides.tree(), *copy);
   Config config = Copy();
-  Merge(config.tree_.get(), over.get());
+  Merge(config.tree_.get(), copy.get());
   return config;
 }
 

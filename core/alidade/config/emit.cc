@@ -9,8 +9,8 @@ namespace {
 
 bool IsLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-/// Whether `text` may stand unquoted, inside brackets too, and mean just itself.
-bool PlainSafe(std::string_view text) {
+/// Returns whether `text` needs no quotes because of its characters, also inside brackets.
+bool IsSafeUnquoted(std::string_view text) {
   constexpr std::string_view kInner = "./+-$@ ";
   if (text.empty() || text.back() == ' ') return false;
   return std::all_of(text.begin(), text.end(), [&](char c) {
@@ -18,8 +18,8 @@ bool PlainSafe(std::string_view text) {
   });
 }
 
-/// Whether `text` unquoted could be read as a number, a flag or nothing, here or by other readers.
-bool HasMeaning(std::string_view text) {
+/// Returns whether a YAML reader may read an unquoted `text` as a number, a flag or a null.
+bool IsAmbiguous(std::string_view text) {
   constexpr std::array<std::string_view, 8> kWords = {"true", "false", "yes",  "no",
                                                       "on",   "off",   "null", "nan"};
   const std::string word = LowerCase(text);
@@ -47,17 +47,17 @@ std::string DoubleQuoted(std::string_view text) {
 }
 
 std::string KeyText(const std::string& key) {
-  return PlainSafe(key) && !HasMeaning(key) ? key : DoubleQuoted(key);
+  return IsSafeUnquoted(key) && !IsAmbiguous(key) ? key : DoubleQuoted(key);
 }
 
 std::string ScalarText(const ConfigTree& tree) {
   const std::string& text = tree.text;
-  if (!PlainSafe(text)) return DoubleQuoted(text);
-  if (tree.quoted) return HasMeaning(text) ? DoubleQuoted(text) : text;
+  if (!IsSafeUnquoted(text)) return DoubleQuoted(text);
+  if (tree.quoted) return IsAmbiguous(text) ? DoubleQuoted(text) : text;
   const char first = text[0];
-  const bool number = text.size() > 1 && (first == '-' || first == '+' || first == '.') &&
-                      (IsDigit(text[1]) || (text[1] == '.' && first != '.'));
-  return IsLetter(first) || IsDigit(first) || number ? text : DoubleQuoted(text);
+  const bool is_number = text.size() > 1 && (first == '-' || first == '+' || first == '.') &&
+                         (IsDigit(text[1]) || (text[1] == '.' && first != '.'));
+  return IsLetter(first) || IsDigit(first) || is_number ? text : DoubleQuoted(text);
 }
 
 bool FitsOneLine(const ConfigTree& tree) {
@@ -75,7 +75,7 @@ std::string OneLine(const ConfigTree& tree) {
   return '[' + text + ']';
 }
 
-/// The children of a map or list, one or more lines each.
+/// Appends the children of a map or list, each on one or more lines.
 void EmitBlock(const ConfigTree& tree, std::size_t indent, std::string* out) {
   for (const auto& child : tree.children) {
     const std::size_t start = out->size();

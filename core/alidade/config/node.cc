@@ -18,7 +18,7 @@ using internal::Quoted;
 
 namespace {
 
-std::string Found(const ConfigTree& tree) {
+std::string FoundText(const ConfigTree& tree) {
   switch (tree.kind) {
     case Node::Kind::kNull:
       return "no value";
@@ -33,11 +33,11 @@ std::string Found(const ConfigTree& tree) {
 }
 
 const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* expected) {
-  if (tree.kind != kind) FailAt(tree.place, PathOf(tree), Found(tree), expected);
+  if (tree.kind != kind) FailAt(tree.place, PathOf(tree), FoundText(tree), expected);
   return tree;
 }
 
-std::string Shape(std::size_t count) {
+std::string ItemCountText(std::size_t count) {
   return count == 1 ? "1 item" : std::to_string(count) + " items";
 }
 
@@ -48,9 +48,9 @@ const Place& Node::place() const { return tree_->place; }
 const std::string& Node::path() const { return PathOf(*tree_); }
 
 Node Node::Root() const {
-  const ConfigTree* at = tree_;
-  while (at->parent != nullptr) at = at->parent;
-  return Node(at);
+  const ConfigTree* node = tree_;
+  while (node->parent != nullptr) node = node->parent;
+  return Node(node);
 }
 
 std::optional<Node> Node::Find(std::string_view key) const {
@@ -67,7 +67,7 @@ Node Node::At(std::string_view key, std::string_view needed_by) const {
 std::vector<std::pair<std::string, Node>> Node::Entries() const {
   std::vector<std::pair<std::string, Node>> entries;
   for (const auto& child : Expect(*tree_, Kind::kMap, "a map").children) {
-    tree_->asked.insert(child->key);
+    tree_->known_keys.insert(child->key);
     entries.emplace_back(child->key, Node(child.get()));
   }
   return entries;
@@ -107,7 +107,7 @@ std::vector<double> Node::Numbers(int size) const {
   }
   if (size < 0 && numbers.empty()) Fail("an empty list", "at least one number");
   if (size >= 0 && numbers.size() != static_cast<std::size_t>(size)) {
-    Fail("has " + Shape(numbers.size()), std::to_string(size));
+    Fail("has " + ItemCountText(numbers.size()), std::to_string(size));
   }
   return numbers;
 }
@@ -117,12 +117,14 @@ bool Node::Flag() const {
   if (!tree.quoted && tree.text == "true") return true;
   if (!tree.quoted && tree.text == "false") return false;
   const std::string word = LowerCase(tree.text);
-  const bool yes = word == "true" || word == "yes" || word == "on" || word == "y" || word == "1";
-  const bool no = word == "false" || word == "no" || word == "off" || word == "n" || word == "0";
+  const bool means_true =
+      word == "true" || word == "yes" || word == "on" || word == "y" || word == "1";
+  const bool means_false =
+      word == "false" || word == "no" || word == "off" || word == "n" || word == "0";
   Fail((tree.quoted ? "the text " : "") + Quoted(tree.text), "true or false",
-       yes  ? "true"
-       : no ? "false"
-            : "");
+       means_true    ? "true"
+       : means_false ? "false"
+                     : "");
 }
 
 std::string Node::Text() const { return Expect(*tree_, Kind::kScalar, "text").text; }
@@ -143,27 +145,27 @@ void Node::RejectUnread() const {
 
 bool Node::HasUnread(std::string_view key) const {
   const ConfigTree& map = Expect(*tree_, Kind::kMap, "a map");
-  return Child(map, key) != nullptr && !map.asked.contains(std::string(key));
+  return Child(map, key) != nullptr && !map.known_keys.contains(std::string(key));
 }
 
 void Node::Declare(std::string_view key) const {
-  Expect(*tree_, Kind::kMap, "a map").asked.emplace(key);
+  Expect(*tree_, Kind::kMap, "a map").known_keys.emplace(key);
 }
 
-void Node::Fail(std::string_view what, std::string_view expected,
+void Node::Fail(std::string_view message, std::string_view expected,
                 std::string_view suggestion) const {
-  FailAt(tree_->place, PathOf(*tree_), what, expected, suggestion);
+  FailAt(tree_->place, PathOf(*tree_), message, expected, suggestion);
 }
 
 std::string Node::ToYaml() const { return internal::ToYaml(*tree_); }
 
-void internal::ExpectName(const std::string& name, const Node& at, const std::string& of) {
-  const auto fits = [](char c) {
+void internal::ExpectName(const std::string& name, const Node& node, const std::string& owner) {
+  const auto is_allowed = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
            c == '-';
   };
-  if (!name.empty() && std::all_of(name.begin(), name.end(), fits)) return;
-  at.Fail(Quoted(name) + " cannot name " + of, "letters, digits, _ and -");
+  if (!name.empty() && std::all_of(name.begin(), name.end(), is_allowed)) return;
+  node.Fail(Quoted(name) + " cannot name " + owner, "letters, digits, _ and -");
 }
 
 }  // namespace alidade

@@ -18,10 +18,12 @@ constexpr std::size_t kMaxSize = 1 << 20;
 constexpr int kMaxUnclosed = 4096;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
+/// Check of the characters and of the indentation of a YAML text.
 class TextCheck {
  public:
   explicit TextCheck(const Origin& origin) : origin_(origin) {}
 
+  /// Returns the text without carriage returns.
   std::string Run(std::string_view text) {
     std::string clean;
     clean.reserve(text.size());
@@ -56,23 +58,24 @@ class TextCheck {
     }
     if (in_indent_ && c == '\t') Fail("tab in the indentation", "spaces");
     if (column_ == 1) {
-      // yaml-cpp leaves such a line out.
-      if (c == '%' && begun_) Fail("'%' begins a line", "quotes around a text that begins so");
-      begun_ = begun_ || (c != '%' && c != '#' && c != ' ' && c != '\n');
+      // yaml-cpp ignores such a line.
+      if (c == '%' && has_begun_)
+        Fail("'%' begins a line", "quotes around a text that begins with '%'");
+      has_begun_ = has_begun_ || (c != '%' && c != '#' && c != ' ' && c != '\n');
     }
     if (c != ' ') in_indent_ = false;
     if (c == '[' || c == '{') ++unclosed_;
     if (c == ']' || c == '}') unclosed_ = std::max(0, unclosed_ - 1);
-    // The scanner of yaml-cpp would queue a token for each before the depth is known.
+    // The scanner of yaml-cpp would queue a token for each bracket before the depth is known.
     if (unclosed_ > kMaxUnclosed) {
       Fail("nested too deep", "at most " + std::to_string(kMaxDepth) + " levels");
     }
   }
 
-  [[noreturn]] void Fail(std::string_view what, std::string_view expected = {}) {
+  [[noreturn]] void Fail(std::string_view message, std::string_view expected = {}) {
     Place place{origin_.file};
     if (origin_.has_lines) place = Place{origin_.file, line_, column_};
-    FailAt(place, origin_.key_prefix, what, expected);
+    FailAt(place, origin_.key_prefix, message, expected);
   }
 
   const Origin& origin_;
@@ -80,10 +83,10 @@ class TextCheck {
   int column_ = 1;
   int unclosed_ = 0;
   bool in_indent_ = true;
-  bool begun_ = false;  ///< the document has, after which there are no directives
+  bool has_begun_ = false;  ///< the document has begun, so no directive may follow
 };
 
-/// Checks size, encoding and indentation; gives the text without BOM and carriage returns.
+/// Checks size, encoding and indentation. Returns the text without BOM and carriage returns.
 std::string CleanText(std::string_view text, const Origin& origin) {
   if (text.size() > kMaxSize) {
     FailAt(Place{origin.file}, origin.key_prefix, "larger than 1 MiB", "a config of at most 1 MiB");
@@ -92,6 +95,7 @@ std::string CleanText(std::string_view text, const Origin& origin) {
   return TextCheck(origin).Run(text);
 }
 
+/// Size of a tree.
 struct Extent {
   int depth = 0;
   int nodes = 0;
@@ -110,10 +114,10 @@ Extent Measure(const ConfigTree& tree) {
   return extent;
 }
 
-/// What the short messages of yaml-cpp mean to someone who wrote the file.
-std::string Reworded(const std::string& message) {
+/// Replaces a short message of yaml-cpp by one that the writer of the file understands.
+std::string RewordMessage(const std::string& message) {
   struct Phrase {
-    std::string_view from, to;
+    std::string_view original, replacement;
   };
   static constexpr Phrase kPhrases[] = {
       {"end of map not found", "wrong indentation, or text after a value"},
@@ -127,17 +131,18 @@ std::string Reworded(const std::string& message) {
       {"unknown token", "text that starts like this must be quoted"},
   };
   for (const Phrase& phrase : kPhrases) {
-    if (message == phrase.from) return std::string(phrase.to);
+    if (message == phrase.original) return std::string(phrase.replacement);
   }
   return message;
 }
 
+/// Handler of the events of yaml-cpp that builds the tree.
 class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(std::string_view text, const Origin& origin, Budget* budget)
       : text_(text), origin_(origin), budget_(budget) {}
 
-  std::unique_ptr<ConfigTree> Take() { return std::move(root_); }
+  std::unique_ptr<ConfigTree> ReleaseRoot() { return std::move(root_); }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
     if (++documents_ < 2) return;
@@ -149,31 +154,31 @@ class TreeBuilder : public YAML::EventHandler {
   void OnDocumentEnd() override {}
 
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    RefuseKey(mark, "empty key");
+    RejectAsKey(mark, "empty key");
     ConfigTree* node = Add(mark, anchor, Node::Kind::kNull);
     if (node->key_line > 0 && node->place.line != node->key_line) node->place = KeyPlace(*node);
   }
 
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    RefuseKey(mark, "an alias is used as a key");
+    RejectAsKey(mark, "an alias is used as a key");
     const auto target = anchors_.find(anchor);
     if (target == anchors_.end()) Fail(mark, "alias of a key is not supported");
     for (const Frame& frame : stack_) {
       if (frame.node == target->second) Fail(mark, "alias refers to itself");
     }
     const Extent extent = Measure(*target->second);
-    Spend(mark, extent.nodes, extent.bytes);
+    AddToBudget(mark, extent.nodes, extent.bytes);
     CheckDepth(mark, extent.depth);
     Attach(Clone(*target->second));
   }
 
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
-    RefuseTag(mark, tag);
+    RejectTag(mark, tag);
     if (value.find('\0') != std::string::npos) Fail(mark, "NUL character in a text");
-    // The escapes \N and \_ of yaml-cpp 0.7 give lone bytes.
+    // The escapes \N and \_ of yaml-cpp 0.7 yield single bytes, which are not UTF-8.
     if (!IsUtf8(value)) Fail(mark, "escape that is not a character");
-    if (WantsKey()) return SetKey(mark, tag, value);
+    if (ExpectsKey()) return SetKey(mark, tag, value);
     ConfigTree* node = Add(mark, anchor, Node::Kind::kScalar, value.size());
     node->quoted = tag != "?";
     node->text = value;
@@ -181,30 +186,30 @@ class TreeBuilder : public YAML::EventHandler {
 
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
-    RefuseKey(mark, "a list is used as a key, or '[' is not closed");
+    RejectAsKey(mark, "a list is used as a key, or '[' is not closed");
     Open(mark, tag, anchor, Node::Kind::kList);
   }
   void OnSequenceEnd() override { stack_.pop_back(); }
 
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
-    RefuseKey(mark, "a map is used as a key, or '{' is not closed");
+    RejectAsKey(mark, "a map is used as a key, or '{' is not closed");
     Open(mark, tag, anchor, Node::Kind::kMap);
   }
   void OnMapEnd() override { stack_.pop_back(); }
 
   [[noreturn]] void FailSyntax(const YAML::Exception& error) const {
-    const std::string what = "not valid YAML: " + Reworded(error.msg);
+    const std::string message = "not valid YAML: " + RewordMessage(error.msg);
     if (stack_.empty() || error.msg.find("flow not found") == std::string::npos) {
-      Fail(error.mark, what);
+      Fail(error.mark, message);
     }
     const ConfigTree& unclosed = *stack_.back().node;
-    FailAt(unclosed.place, FullPath({}), what);
+    FailAt(unclosed.place, FullPath({}), message);
   }
 
-  [[noreturn]] void Fail(const YAML::Mark& mark, std::string_view what,
+  [[noreturn]] void Fail(const YAML::Mark& mark, std::string_view message,
                          std::string_view expected = {}, std::string_view key = {}) const {
-    FailAt(PlaceOf(mark), FullPath(key), what, expected);
+    FailAt(PlaceOf(mark), FullPath(key), message, expected);
   }
 
  private:
@@ -221,7 +226,7 @@ class TreeBuilder : public YAML::EventHandler {
     return Place{origin_.file, mark.line + 1, mark.column + 1};
   }
 
-  /// The path of what is being read, or of `key` in it.
+  /// Returns the key path of the value being read, or of `key` in the map being read.
   std::string FullPath(std::string_view key) const {
     std::string path = origin_.key_prefix;
     const auto append = [&](std::string_view part) {
@@ -234,16 +239,16 @@ class TreeBuilder : public YAML::EventHandler {
     return path;
   }
 
-  bool WantsKey() const {
+  bool ExpectsKey() const {
     return !stack_.empty() && stack_.back().node->kind == Node::Kind::kMap &&
            !stack_.back().has_key;
   }
 
-  void RefuseKey(const YAML::Mark& mark, std::string_view what) const {
-    if (WantsKey()) Fail(mark, what, "text");
+  void RejectAsKey(const YAML::Mark& mark, std::string_view message) const {
+    if (ExpectsKey()) Fail(mark, message, "text");
   }
 
-  void RefuseTag(const YAML::Mark& mark, const std::string& tag) const {
+  void RejectTag(const YAML::Mark& mark, const std::string& tag) const {
     if (tag.empty() || tag == "?" || tag == "!") return;
     constexpr std::string_view kStandard = "tag:yaml.org,2002:";
     const std::string shown =
@@ -259,20 +264,20 @@ class TreeBuilder : public YAML::EventHandler {
     if (const std::string defect = KeyDefect(key); !defect.empty()) Fail(mark, defect);
     const auto [first, is_new] = frame.key_lines.emplace(key, mark.line + 1);
     if (!is_new) {
-      std::string what = "duplicate key";
-      if (origin_.has_lines) what += "; first at line " + std::to_string(first->second);
-      Fail(mark, what, {}, key);
+      std::string message = "duplicate key";
+      if (origin_.has_lines) message += "; first at line " + std::to_string(first->second);
+      Fail(mark, message, {}, key);
     }
-    Spend(mark, 0, key.size());
+    AddToBudget(mark, 0, key.size());
     frame.has_key = true;
     frame.key = key;
     frame.key_mark = mark;
   }
 
-  void Spend(const YAML::Mark& mark, int nodes, std::size_t bytes) {
+  void AddToBudget(const YAML::Mark& mark, int nodes, std::size_t bytes) {
     budget_->nodes += nodes;
     budget_->bytes += bytes;
-    if (budget_->within()) return;
+    if (budget_->is_within_limits()) return;
     Fail(mark, "too large with its aliases expanded",
          budget_->nodes > Budget::kMaxNodes ? "at most 100000 values" : "at most 8 MiB of text");
   }
@@ -285,7 +290,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   ConfigTree* Add(const YAML::Mark& mark, YAML::anchor_t anchor, Node::Kind kind,
                   std::size_t bytes = 0) {
-    Spend(mark, 1, bytes);
+    AddToBudget(mark, 1, bytes);
     auto node = std::make_unique<ConfigTree>();
     node->kind = kind;
     node->place = PlaceOf(mark);
@@ -320,7 +325,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   void Open(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
             Node::Kind kind) {
-    RefuseTag(mark, tag);
+    RejectTag(mark, tag);
     CheckDepth(mark, 1);
     stack_.push_back(Frame{Add(mark, anchor, kind)});
   }
@@ -340,8 +345,8 @@ std::string KeyDefect(const std::string& key) {
   constexpr std::size_t kMaxKeyLength = 256;
   if (!IsUtf8(key)) return "the key is not UTF-8";
   if (key.size() > kMaxKeyLength) return "key longer than 256 bytes: " + Quoted(key);
-  const auto control = [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; };
-  if (std::any_of(key.begin(), key.end(), control)) {
+  const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; };
+  if (std::any_of(key.begin(), key.end(), is_control)) {
     return "control character in the key " + Quoted(key);
   }
   return {};
@@ -358,7 +363,7 @@ std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origi
   } catch (const YAML::Exception& e) {
     builder.FailSyntax(e);
   }
-  return builder.Take();
+  return builder.ReleaseRoot();
 }
 
 }  // namespace alidade::internal

@@ -9,8 +9,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Each entry divided by the standard deviations of its row and column (1 where that is zero), so
-/// that tolerances do not depend on units.
+/// Divides each entry by the standard deviations of its row and column, so that tolerances do not
+/// depend on units. A standard deviation of zero counts as 1.
 Eigen::MatrixXd Correlation(const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd sigma = covariance.diagonal().unaryExpr(
       [](double variance) { return variance > 0 ? std::sqrt(variance) : 1.0; });
@@ -36,17 +36,19 @@ void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
 void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
   const Eigen::Index size = covariance.rows();
   const double tolerance = 1e-12 * static_cast<double>(size);
-  bool positive = EigenvaluesOf(Correlation(covariance))[0] >= -tolerance;
+  bool is_positive = EigenvaluesOf(Correlation(covariance))[0] >= -tolerance;
   for (Eigen::Index i = 0; i < size; ++i) {
     const double variance = covariance(i, i);
-    if (variance < 0 || (variance == 0 && !covariance.row(i).isZero(0))) positive = false;
+    if (variance < 0 || (variance == 0 && !covariance.row(i).isZero(0))) is_positive = false;
   }
-  if (positive) return;
+  if (is_positive) return;
   double smallest = EigenvaluesOf(covariance)[0];
-  const bool drowned = smallest >= 0;  // in the rounding of a much larger one
-  if (drowned) smallest = EigenvaluesOf(Correlation(covariance))[0];
-  node.Fail(std::string("not positive semi-definite: ") + (drowned ? "its correlation's" : "its") +
-                " smallest eigenvalue is " + RoundedText(smallest, 6),
+  // Rounding of a much larger eigenvalue may hide a negative one.
+  const bool is_hidden = smallest >= 0;
+  if (is_hidden) smallest = EigenvaluesOf(Correlation(covariance))[0];
+  node.Fail(std::string("not positive semi-definite: ") +
+                (is_hidden ? "its correlation's" : "its") + " smallest eigenvalue is " +
+                RoundedText(smallest, 6),
             "a covariance");
 }
 

@@ -7,9 +7,9 @@
 
 namespace alidade::internal {
 
-/// A square, symmetric, positive semi-definite matrix of `size`, row-major; given as a list of
-/// rows. Fails with the smallest eigenvalue if it is not PSD. Asymmetry up to 1e-9 of the standard
-/// deviations is rounding: the mean of both entries is returned.
+/// Returns a symmetric, positive semi-definite `size` x `size` matrix, row-major, from a list of
+/// rows. Fails with the smallest eigenvalue if the matrix is not positive semi-definite. Asymmetry
+/// up to 1e-9 of the standard deviations counts as rounding: both entries become their mean.
 std::vector<double> ReadCovariance(const Node& node, int size);
 
 }  // namespace alidade::internal

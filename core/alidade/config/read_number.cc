@@ -11,16 +11,17 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::size_t SkipDigits(std::string_view text, std::size_t at) {
-  while (at < text.size() && IsDigit(text[at])) ++at;
-  return at;
+/// Returns the offset after the digits that start at `offset`.
+std::size_t SkipDigits(std::string_view text, std::size_t offset) {
+  while (offset < text.size() && IsDigit(text[offset])) ++offset;
+  return offset;
 }
 
-/// The digits of a decimal number: [+-] digits [. digits] [e [+-] digits].
+/// Form of a decimal number: [+-] digits [. digits] [e [+-] digits].
 struct Decimal {
-  bool valid = false;
-  bool integer = false;
-  bool leading_zero = false;
+  bool is_valid = false;
+  bool is_integer = false;
+  bool has_leading_zero = false;
 };
 
 Decimal Scan(std::string_view text) {
@@ -40,9 +41,9 @@ Decimal Scan(std::string_view text) {
     end = SkipDigits(text, exponent);
     if (end == exponent) return decimal;
   }
-  decimal.valid = end == text.size();
-  decimal.integer = whole_end == text.size();
-  decimal.leading_zero = whole_end - begin > 1 && text[begin] == '0';
+  decimal.is_valid = end == text.size();
+  decimal.is_integer = whole_end == text.size();
+  decimal.has_leading_zero = whole_end - begin > 1 && text[begin] == '0';
   return decimal;
 }
 
@@ -55,7 +56,8 @@ std::string Interval(const char* kind, double low, double high, bool low_open, b
          (high_open ? ')' : ']');
 }
 
-/// The text of a plain scalar that is a decimal number as `expected` says, without a leading '+'.
+/// Returns the text of an unquoted scalar that is a decimal number, without a leading '+'.
+/// `expected` is part of the error message.
 std::string_view DecimalText(const ConfigTree& tree, const std::string& expected) {
   const Node node(&tree);
   if (tree.kind == Node::Kind::kNull) node.Fail("no value", expected);
@@ -64,8 +66,8 @@ std::string_view DecimalText(const ConfigTree& tree, const std::string& expected
   const std::string_view text = tree.text;
   if (tree.quoted) node.Fail("the quoted text " + Quoted(text), expected);
   const Decimal decimal = Scan(text);
-  if (!decimal.valid) node.Fail(Quoted(text) + " is not a finite number", expected);
-  if (decimal.leading_zero) node.Fail(Quoted(text) + " has a leading zero", expected);
+  if (!decimal.is_valid) node.Fail(Quoted(text) + " is not a finite number", expected);
+  if (decimal.has_leading_zero) node.Fail(Quoted(text) + " has a leading zero", expected);
   return text[0] == '+' ? text.substr(1) : text;
 }
 
@@ -102,7 +104,7 @@ std::int64_t ReadInteger(const ConfigTree& tree, std::int64_t low, std::int64_t 
     expected += " <= " + std::to_string(high);
   }
   const std::string_view text = DecimalText(tree, expected);
-  if (!Scan(text).integer) Node(&tree).Fail(Quoted(tree.text) + " is not an integer", expected);
+  if (!Scan(text).is_integer) Node(&tree).Fail(Quoted(tree.text) + " is not an integer", expected);
   std::int64_t value = 0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || value < low || value > high) {

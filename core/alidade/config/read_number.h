@@ -6,10 +6,10 @@
 
 #include "alidade/config/tree.h"
 
-/// Numbers of a config, read strictly: as Node::Number and Node::Integer say.
+/// Strict readers of numbers: the rules of Node::Number and Node::Integer.
 namespace alidade::internal {
 
-/// `expected` is the part of an error message.
+/// Returns the number. `expected` is the part of an error message after "expected".
 double ReadNumber(const ConfigTree& tree, const std::string& expected);
 double ReadNumber(const ConfigTree& tree, double low, double high, bool low_open, bool high_open);
 std::int64_t ReadInteger(const ConfigTree& tree, std::int64_t low, std::int64_t high);

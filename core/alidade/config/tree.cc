@@ -15,9 +15,9 @@ std::string Component(const ConfigTree& tree) {
 const std::string& PathOf(const ConfigTree& tree) {
   if (!tree.path.empty()) return tree.path;
   std::string path;
-  for (const ConfigTree* at = &tree; at->parent != nullptr; at = at->parent) {
-    const bool dot = at->index < 0 && at->parent->parent != nullptr;
-    path.insert(0, (dot ? "." : "") + Component(*at));
+  for (const ConfigTree* node = &tree; node->parent != nullptr; node = node->parent) {
+    const bool needs_dot = node->index < 0 && node->parent->parent != nullptr;
+    path.insert(0, (needs_dot ? "." : "") + Component(*node));
   }
   return tree.path = path;
 }
@@ -65,9 +65,9 @@ std::string LowerCase(std::string_view text) {
   return lower;
 }
 
-void FailAt(const Place& place, std::string_view key, std::string_view what,
+void FailAt(const Place& place, std::string_view key, std::string_view message,
             std::string_view expected, std::string_view suggestion) {
-  throw Error(ExitCode::kBadConfig, ErrorLine(place, key, what, expected, suggestion));
+  throw Error(ExitCode::kBadConfig, ErrorLine(place, key, message, expected, suggestion));
 }
 
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree) {

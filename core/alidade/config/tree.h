@@ -11,38 +11,39 @@
 
 namespace alidade {
 
+/// Node of a parsed config, with its children.
 struct ConfigTree {
   Node::Kind kind = Node::Kind::kNull;
-  bool quoted = false;  ///< a scalar written as 'text', "text" or a block
+  bool quoted = false;  ///< whether a scalar is written as 'text', "text" or a block
   Place place;
-  std::string text;  ///< a scalar as written
+  std::string text;  ///< of a scalar, as written
   std::vector<std::unique_ptr<ConfigTree>> children;
 
   const ConfigTree* parent = nullptr;
-  std::string key;  ///< in a map
-  int index = -1;   ///< in a list
+  std::string key;  ///< of an entry of a map
+  int index = -1;   ///< of an item of a list
   int key_line = 0;
   int key_column = 0;
 
-  mutable std::string path;  ///< made when first asked for
-  mutable std::set<std::string, std::less<>> asked;
+  mutable std::string path;                               ///< computed at its first use
+  mutable std::set<std::string, std::less<>> known_keys;  ///< of a map, read or declared
 };
 
 namespace internal {
 
-/// What the files of one config may still add, aliases expanded.
+/// Size of the files of one config, with aliases expanded, and its limits.
 struct Budget {
   static constexpr int kMaxNodes = 100'000;
   static constexpr int kMaxBytes = 8 << 20;
 
   int nodes = 0;
   std::size_t bytes = 0;
-  bool within() const { return nodes <= kMaxNodes && bytes <= kMaxBytes; }
+  bool is_within_limits() const { return nodes <= kMaxNodes && bytes <= kMaxBytes; }
 };
 
 constexpr int kMaxDepth = 64;
 
-/// Where the text of parse errors comes from.
+/// Source of a YAML text, for the messages about it.
 struct Origin {
   std::string file;
   std::string key_prefix = {};  ///< key path of the root of the text, for `--set`
@@ -50,34 +51,38 @@ struct Origin {
   int max_depth = kMaxDepth;
 };
 
-/// Reads one YAML document strictly; null where the text holds none.
+/// Reads one YAML document strictly. Returns null if the text has no document.
 std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget);
 
-/// What forbids `key` as one, or "".
+/// Returns the reason why `key` is not a valid key, or "".
 std::string KeyDefect(const std::string& key);
 
+/// Returns the key path of `tree`.
 const std::string& PathOf(const ConfigTree& tree);
-/// The key path of `key` in the map at `path`.
+/// Returns the key path of `key` in the map at `path`.
 std::string PathBelow(const std::string& path, std::string_view key);
-/// Where the key of `tree` is written, or its value where it has none.
+/// Returns the place of the key of `tree`, or of its value if it has no key.
 Place KeyPlace(const ConfigTree& tree);
+/// Returns the value of `key`, or null.
 ConfigTree* Child(const ConfigTree& map, std::string_view key);
+/// Returns a deep copy in which no key counts as read.
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
 std::string ToYaml(const ConfigTree& root);
 
 inline bool IsDigit(char c) { return c >= '0' && c <= '9'; }
-/// With its ASCII letters in lower case, whatever the locale.
+/// Returns `text` with its ASCII letters in lower case, in any locale.
 std::string LowerCase(std::string_view text);
 
-/// `text` in quotes, shortened and without control characters.
+/// Returns `text` in single quotes, shortened, with control characters escaped.
 std::string Quoted(std::string_view text);
 
-[[noreturn]] void FailAt(const Place& place, std::string_view key, std::string_view what,
+/// Throws an Error kBadConfig with ErrorLine of these arguments.
+[[noreturn]] void FailAt(const Place& place, std::string_view key, std::string_view message,
                          std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Refuses a name that is not one word in columns (`target.depth`), metric keys
-/// (`rmse:target.depth@near`) and tables. `of` says of what, as in `a sensor`.
-void ExpectName(const std::string& name, const Node& at, const std::string& of);
+/// Rejects a name that is not a single word. Names are parts of columns (`target.depth`), metric
+/// keys (`rmse:target.depth@near`) and tables. `owner` is the named thing, such as `a sensor`.
+void ExpectName(const std::string& name, const Node& node, const std::string& owner);
 
 }  // namespace internal
 }  // namespace alidade

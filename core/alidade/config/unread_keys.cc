@@ -13,7 +13,7 @@ struct Unit {
   int dimension;
 };
 
-// "min" is left out: in a key it is a minimum more often than a minute.
+// "min" is omitted: in a key it is a minimum more often than a minute.
 constexpr Unit kUnits[] = {
     {"m", 0},    {"mm", 0},    {"cm", 0},     {"km", 0},   {"um", 0},  {"nm", 0},  {"in", 0},
     {"inch", 0}, {"ft", 0},    {"s", 1},      {"sec", 1},  {"ms", 1},  {"us", 1},  {"ns", 1},
@@ -28,15 +28,15 @@ const Unit* FindUnit(std::string_view name) {
   return unit == std::end(kUnits) ? nullptr : unit;
 }
 
-/// `rate_deg_s` as the stem `rate` and the unit `deg_s`.
-struct UnitOfKey {
+/// Parts of a key: `rate_deg_s` has the stem `rate` and the unit `deg_s`.
+struct KeyParts {
   std::string_view stem;
   std::string_view unit;
   std::vector<int> dimensions;
 };
 
-UnitOfKey SplitUnit(std::string_view key) {
-  UnitOfKey split{key, {}, {}};
+KeyParts SplitUnit(std::string_view key) {
+  KeyParts split{key, {}, {}};
   for (;;) {
     const std::size_t cut = split.stem.rfind('_');
     if (cut == std::string_view::npos || cut == 0) return split;
@@ -48,11 +48,11 @@ UnitOfKey SplitUnit(std::string_view key) {
   }
 }
 
-/// The unit of `written` where it differs from `known` in its unit alone, as in `baseline_mm` for
-/// `baseline_m`; else "". `same_dimension`: only where one unit converts to the other.
-std::string UnitSlip(std::string_view written, std::string_view known, bool same_dimension) {
-  const UnitOfKey a = SplitUnit(written);
-  const UnitOfKey b = SplitUnit(known);
+/// Returns the unit of `written` if only its unit differs from that of `known`, as in `baseline_mm`
+/// for `baseline_m`; else "". With `same_dimension`, one unit must also convert to the other.
+std::string WrongUnit(std::string_view written, std::string_view known, bool same_dimension) {
+  const KeyParts a = SplitUnit(written);
+  const KeyParts b = SplitUnit(known);
   if (a.unit.empty() || b.unit.empty() || a.stem != b.stem || a.unit == b.unit) return {};
   if (same_dimension && a.dimensions != b.dimensions) return {};
   return std::string(a.unit);
@@ -60,15 +60,15 @@ std::string UnitSlip(std::string_view written, std::string_view known, bool same
 
 std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
   std::vector<std::string> absent;
-  for (const std::string& asked : map.asked) {
-    const std::string unit = UnitSlip(child.key, asked, false);
-    if (!unit.empty() && Child(map, asked) == nullptr) {
-      return ErrorLine(KeyPlace(child), PathOf(child), "wrong unit '" + unit + "'", asked);
+  for (const std::string& known : map.known_keys) {
+    const std::string unit = WrongUnit(child.key, known, false);
+    if (!unit.empty() && Child(map, known) == nullptr) {
+      return ErrorLine(KeyPlace(child), PathOf(child), "wrong unit '" + unit + "'", known);
     }
-    if (Child(map, asked) == nullptr) absent.push_back(asked);
+    if (Child(map, known) == nullptr) absent.push_back(known);
   }
   std::string near = Nearest(child.key, absent);
-  if (near.empty()) near = Nearest(child.key, map.asked);
+  if (near.empty()) near = Nearest(child.key, map.known_keys);
   constexpr std::size_t kListed = 8;
   std::string expected;
   if (near.empty() && !absent.empty() && absent.size() <= kListed) {
@@ -82,31 +82,31 @@ std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
 void FailMissing(const ConfigTree& map, std::string_view key, std::string_view needed_by) {
   std::vector<std::string> unread;
   for (const auto& child : map.children) {
-    if (map.asked.contains(child->key)) continue;
-    const std::string unit = UnitSlip(child->key, key, true);
+    if (map.known_keys.contains(child->key)) continue;
+    const std::string unit = WrongUnit(child->key, key, true);
     if (!unit.empty()) {
       FailAt(KeyPlace(*child), PathOf(*child), "wrong unit '" + unit + "'", key);
     }
     unread.push_back(child->key);
   }
-  std::string what = "missing key";
-  if (!needed_by.empty()) what.append(", needed by ").append(needed_by);
+  std::string message = "missing key";
+  if (!needed_by.empty()) message.append(", needed by ").append(needed_by);
   const std::string near = Nearest(key, unread);
   if (!near.empty()) {
-    what += "; found '" + near + "'";
+    message += "; found '" + near + "'";
     const int line = Child(map, near)->key_line;
-    if (line > 0) what += " at line " + std::to_string(line);
+    if (line > 0) message += " at line " + std::to_string(line);
   }
-  FailAt(KeyPlace(map), PathBelow(PathOf(map), key), what);
+  FailAt(KeyPlace(map), PathBelow(PathOf(map), key), message);
 }
 
 void ListUnread(const ConfigTree& map, std::vector<std::string>& lines) {
   constexpr std::size_t kMaxLines = 20;
   for (const auto& child : map.children) {
     if (lines.size() >= kMaxLines) return;
-    if (!map.asked.contains(child->key)) {
+    if (!map.known_keys.contains(child->key)) {
       lines.push_back(UnknownKey(map, *child));
-    } else if (child->kind == Node::Kind::kMap && !child->asked.empty()) {
+    } else if (child->kind == Node::Kind::kMap && !child->known_keys.empty()) {
       ListUnread(*child, lines);
     }
   }

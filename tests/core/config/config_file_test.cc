@@ -163,7 +163,7 @@ TEST(ConfigFile, RefusesOddEncodings) {
             "78 f:2:1: byte order mark inside the text");
   EXPECT_EQ(TextError("a: 1\rb: 1"), "78 f:1:5: carriage return without a line feed");
   EXPECT_EQ(TextError("a: 1\n%anything"),
-            "78 f:2:1: '%' begins a line; expected quotes around a text that begins so");
+            "78 f:2:1: '%' begins a line; expected quotes around a text that begins with '%'");
   EXPECT_EQ(TextError("# first\n%YAML 1.2\n---\na: 1"), "no error");
   EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07");
   EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: NUL character in a text");

@@ -141,7 +141,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
   record.covariances = true;
-  record.plugins = internal::HashesOf(internal::PluginsNamed({compared.config}, host));
+  record.plugins = internal::HashFiles(internal::FindUsedPlugins({compared.config}, host));
   Recorder recorder(record, compared.config);
   RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);

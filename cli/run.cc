@@ -128,7 +128,7 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
   Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
                            StopRequested};
   record.covariances = arguments.covariances;
-  record.plugins = internal::HashesOf(internal::PluginsNamed({config}, host));
+  record.plugins = internal::HashFiles(internal::FindUsedPlugins({config}, host));
   record.inputs =
       arguments.input.InputsText(config, ArgumentsOf(arguments), {config}, record.plugins);
   return record;

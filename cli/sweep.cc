@@ -105,9 +105,9 @@ ExitCode SweepValues(const Task& task, SweepOptions options) {
 bool IsFinished(const std::filesystem::path& folder, const Config& config,
                 const std::string& inputs) {
   if (!std::filesystem::exists(folder / internal::kInputsFile)) return false;
-  const std::string difference =
-      internal::DifferenceOf(internal::ReadMadeFrom(folder),
-                             (folder / internal::kInputsFile).string(), {config.ToYaml(), inputs});
+  const std::string difference = internal::DescribeDifferences(
+      internal::ReadInputTexts(folder), (folder / internal::kInputsFile).string(),
+      {config.ToYaml(), inputs});
   if (difference.empty()) return true;
   throw Error(ExitCode::kCannotCreate,
               ErrorLine(Place{folder.string()}, {}, "was made from other inputs: " + difference) +
@@ -154,7 +154,7 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   StopOnSignals();
   const std::string inputs =
       arguments.input.InputsText(config, ArgumentsOf(arguments), configs,
-                                 internal::HashesOf(internal::PluginsNamed(configs, host)));
+                                 internal::HashFiles(internal::FindUsedPlugins(configs, host)));
   if (arguments.resume && IsFinished(path, config, inputs)) {
     if (!arguments.quiet) PrintNote(path.string() + " is finished: nothing to resume");
     return std::filesystem::exists(path / "failures.csv") ? ExitCode::kFound : ExitCode::kOk;

@@ -157,7 +157,7 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   std::string stopped = summary;
   stopped.replace(stopped.find("\"ok\""), 4, "\"stopped\"");
   Write("s2/sweep.json", stopped);
-  ExpectRefused({"s1", "s2"}, "s2: was stopped before its end");
+  ExpectRefused({"s1", "s2"}, "s2: was stopped before it finished");
 }
 
 TEST_F(MergeCli, ReplacesItsFolderOnlyByForceAndNeverAShard) {
@@ -181,7 +181,7 @@ TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   ASSERT_TRUE(Eventually([&] { return Contains(Read(path), "\n"); }));
   ::kill(process, SIGTERM);
   ASSERT_EQ(Wait(process).code, 75) << Read("stderr");
-  ExpectRefused({"s1", "s3", "s4.partial"}, "s4.partial: was stopped before its end");
+  ExpectRefused({"s1", "s3", "s4.partial"}, "s4.partial: was stopped before it finished");
   ExpectRefused({"s1", "s3", "s4"}, "error: s4: is not finished: it is s4.partial");
   ASSERT_EQ(Call(again).code, 0) << Read("stderr");
   EXPECT_EQ(Merge({"s1", "s3", "s4"}).code, 0) << Read("stderr");

@@ -240,7 +240,7 @@ TEST(Recorder, TellsPluginsOfOneNameApart) {
         .append("\"\n    }");
   }
   Recorder::Options options = OptionsFor(folder / "out");
-  options.plugins = internal::HashesOf(plugins);
+  options.plugins = internal::HashFiles(plugins);
   Recorder recorder(options, MakeConfig());
   recorder.Begin(MakeExperiment());
   recorder.Finish({});

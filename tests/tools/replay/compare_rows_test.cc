@@ -41,14 +41,14 @@ TEST(CompareRows, KnowsAnEmptyCellAndWhatIsNoText) {
 TEST(CompareRows, SaysWhichGoesOn) {
   const RowComparison longer = Compare("1\n2\n", "1\n");
   EXPECT_FALSE(longer.difference);
-  EXPECT_TRUE(longer.before_goes_on);
-  EXPECT_FALSE(longer.now_goes_on);
+  EXPECT_TRUE(longer.recorded_has_more);
+  EXPECT_FALSE(longer.current_has_more);
   EXPECT_EQ(longer.rows, 1);
   const RowComparison shorter = Compare("", "1\n");
-  EXPECT_TRUE(shorter.now_goes_on);
-  EXPECT_FALSE(shorter.before_goes_on);
+  EXPECT_TRUE(shorter.current_has_more);
+  EXPECT_FALSE(shorter.recorded_has_more);
   const RowComparison same = Compare("1\n2", "1\n2");
-  EXPECT_FALSE(same.difference || same.before_goes_on || same.now_goes_on);
+  EXPECT_FALSE(same.difference || same.recorded_has_more || same.current_has_more);
 }
 
 TEST(CompareRows, ARowWithoutItsLineEndCounts) {
@@ -65,7 +65,7 @@ TEST(CompareRows, AFileThatIsNotThereHasNoRowsAndOneThatCannotBeReadIsAnError) {
   const std::filesystem::path file = folder / "a.csv";
   std::ofstream(file) << "1\n";
   const RowComparison missing = CompareRows(file, folder / "b.csv");
-  EXPECT_TRUE(missing.before_goes_on);
+  EXPECT_TRUE(missing.recorded_has_more);
   EXPECT_FALSE(missing.difference);
   try {
     CompareRows(folder.path(), file);

@@ -24,7 +24,7 @@ std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugi
                      const std::vector<std::string>& arguments = {"run"}) {
   const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
   const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
-  return InputsJson({arguments, {"/somewhere"}, {}}, config, {config}, HashesOf(plugins));
+  return InputsJson({arguments, {"/somewhere"}, {}}, config, {config}, HashFiles(plugins));
 }
 
 std::vector<std::string> Differences(const std::string& before, const std::string& now) {
@@ -95,15 +95,15 @@ TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
 TEST(RunInputs, AFileThatCannotBeReadIsAnError) {
   const testing::TemporaryFolder folder;
   std::string text;
-  EXPECT_EQ(testing::CodeOf([&] { HashesOf({folder / "none.so"}); }, &text), 74);
-  EXPECT_EQ(text, (folder / "none.so").string() + ": cannot be read for its hash");
+  EXPECT_EQ(testing::CodeOf([&] { HashFiles({folder / "none.so"}); }, &text), 74);
+  EXPECT_EQ(text, (folder / "none.so").string() + ": cannot be read to compute its hash");
 }
 
-TEST(PluginsNamed, AreThoseOfModelsAndTypesAtAnyDepth) {
+TEST(FindUsedPlugins, AreThoseOfModelsAndTypesAtAnyDepth) {
   const auto names = [](const std::string& yaml) {
     std::vector<std::string> files;
     const Config config = Config::FromText(yaml, "a.yaml");
-    for (const fs::path& file : PluginsNamed({config, config}, testing::Host()))
+    for (const fs::path& file : FindUsedPlugins({config, config}, testing::Host()))
       files.push_back(file.filename().string());
     std::ranges::sort(files);
     return files;

@@ -10,35 +10,39 @@
 namespace alidade::internal {
 namespace {
 
-/// The next row with its line end, where it has one.
-bool NextRow(std::istream& stream, std::string& row) {
+/// Reads the next row including its line end, if it has one. Returns false at the end.
+bool ReadRow(std::istream& stream, std::string& row) {
   if (!std::getline(stream, row)) return false;
   if (!stream.eof()) row += '\n';
   return true;
 }
 
-/// The cell of `row` that byte `at` is in, not too much of it; "" where it is no text.
-std::string CellAt(const std::string& row, std::size_t at) {
-  constexpr std::size_t kMost = 40, kBefore = 20;
-  const std::size_t comma = at == 0 ? row.npos : row.rfind(',', at - 1);
+/// Returns the cell of `row` that contains byte `offset`: at most kMaxBytes of it, of which at most
+/// kMaxBytesBefore precede the byte; "" if it is not printable text.
+std::string CellAt(const std::string& row, std::size_t offset) {
+  constexpr std::size_t kMaxBytes = 40, kMaxBytesBefore = 20;
+  const std::size_t comma = offset == 0 ? row.npos : row.rfind(',', offset - 1);
   std::size_t start = comma == row.npos ? 0 : comma + 1;
-  if (at - start > kBefore) start = at - kBefore;
-  start = std::min(row.find_first_not_of(' ', start), at);
-  const std::size_t end = std::min({row.find(',', at), row.find('\n', at), row.size()});
-  const std::string cell = row.substr(std::min(start, end), std::min(end - start, kMost));
-  const bool text = std::ranges::all_of(cell, [](char c) { return c >= ' ' && c <= '~'; });
-  return text ? cell : "";
+  if (offset - start > kMaxBytesBefore) start = offset - kMaxBytesBefore;
+  start = std::min(row.find_first_not_of(' ', start), offset);
+  const std::size_t end = std::min({row.find(',', offset), row.find('\n', offset), row.size()});
+  const std::string cell = row.substr(std::min(start, end), std::min(end - start, kMaxBytes));
+  const bool is_text = std::ranges::all_of(cell, [](char c) { return c >= ' ' && c <= '~'; });
+  return is_text ? cell : "";
 }
 
-RowDifference DifferenceOf(const std::string& before, const std::string& now, std::int64_t line) {
-  const auto at = static_cast<std::size_t>(std::ranges::mismatch(before, now).in1 - before.begin());
-  const bool only_line_end = before + '\n' == now || now + '\n' == before;
-  return {line, static_cast<std::int64_t>(at) + 1, CellAt(before, at), CellAt(now, at),
-          only_line_end};
+RowDifference DifferenceOf(const std::string& recorded, const std::string& current,
+                           std::int64_t line) {
+  const auto offset =
+      static_cast<std::size_t>(std::ranges::mismatch(recorded, current).in1 - recorded.begin());
+  const bool only_line_end = recorded + '\n' == current || current + '\n' == recorded;
+  return {line, static_cast<std::int64_t>(offset) + 1, CellAt(recorded, offset),
+          CellAt(current, offset), only_line_end};
 }
 
-/// A stream that fails where the file is not there. Error: kIo.
-std::ifstream Opened(const std::filesystem::path& file) {
+/// Opens a file. The stream is in the failed state if the file does not exist. Error: kIo if it
+/// cannot be read.
+std::ifstream OpenIfExists(const std::filesystem::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   if (!stream && errno != ENOENT && errno != ENOTDIR) FailIo(file.string(), "read", errno);
@@ -49,27 +53,28 @@ std::ifstream Opened(const std::filesystem::path& file) {
 
 std::string RowDifference::Text() const {
   if (only_line_end) return "line end";
-  if (before.empty() && now.empty()) return "other bytes";
-  return "now '" + now + "', was '" + before + '\'';
+  if (recorded.empty() && current.empty()) return "other bytes";
+  return "now '" + current + "', was '" + recorded + '\'';
 }
 
-RowComparison CompareRows(std::istream& before, std::istream& now) {
+RowComparison CompareRows(std::istream& recorded, std::istream& current) {
   RowComparison comparison;
-  for (std::string was, is;; ++comparison.rows) {
-    comparison.before_goes_on = NextRow(before, was);
-    comparison.now_goes_on = NextRow(now, is);
-    if (!comparison.before_goes_on || !comparison.now_goes_on) return comparison;
-    if (was == is) continue;
-    comparison.difference = DifferenceOf(was, is, comparison.rows + 1);
+  for (std::string recorded_row, current_row;; ++comparison.rows) {
+    comparison.recorded_has_more = ReadRow(recorded, recorded_row);
+    comparison.current_has_more = ReadRow(current, current_row);
+    if (!comparison.recorded_has_more || !comparison.current_has_more) return comparison;
+    if (recorded_row == current_row) continue;
+    comparison.difference = DifferenceOf(recorded_row, current_row, comparison.rows + 1);
     return comparison;
   }
 }
 
-RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now) {
-  std::ifstream was = Opened(before), is = Opened(now);
-  const RowComparison comparison = CompareRows(was, is);
-  if (was.bad()) FailIo(before.string(), "read", EIO);
-  if (is.bad()) FailIo(now.string(), "read", EIO);
+RowComparison CompareRows(const std::filesystem::path& recorded,
+                          const std::filesystem::path& current) {
+  std::ifstream recorded_file = OpenIfExists(recorded), current_file = OpenIfExists(current);
+  const RowComparison comparison = CompareRows(recorded_file, current_file);
+  if (recorded_file.bad()) FailIo(recorded.string(), "read", EIO);
+  if (current_file.bad()) FailIo(current.string(), "read", EIO);
   return comparison;
 }
 

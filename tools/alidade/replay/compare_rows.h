@@ -7,28 +7,31 @@
 #include <optional>
 #include <string>
 
-/// Files that ought to be the same, line by line.
+/// Line-by-line comparison of two files that are expected to be equal.
 namespace alidade::internal {
 
-/// The first place where two files differ.
+/// The first difference between two files.
 struct RowDifference {
-  std::int64_t line = 0, column = 0;  ///< from 1
-  std::string before, now;            ///< the cell there, or the start of it; "": no text
-  bool only_line_end = false;         ///< the last line end of one of them is all there is
+  std::int64_t line = 0, column = 0;  ///< both count from 1
+  /// The cell at that position, or the start of it; "" if it is not printable text.
+  std::string recorded, current;
+  bool only_line_end = false;  ///< the files differ only in their last line end
 
   /// `now '0.51', was '0.5'`, `other bytes`, or `line end`
   std::string Text() const;
 };
 
 struct RowComparison {
-  std::optional<RowDifference> difference;  ///< in the rows that both have
-  std::int64_t rows = 0;                    ///< that both have and are equal
-  bool before_goes_on = false;              ///< it has more rows, the same ones up to there
-  bool now_goes_on = false;
+  std::optional<RowDifference> difference;  ///< within the rows that both files have
+  std::int64_t rows = 0;                    ///< number of equal rows at the start of both files
+  bool recorded_has_more = false;           ///< the recorded file has rows after the equal ones
+  bool current_has_more = false;            ///< the current file has rows after the equal ones
 };
 
-RowComparison CompareRows(std::istream& before, std::istream& now);
-/// A file that is not there has no rows. Error: kIo where one cannot be read.
-RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now);
+/// Compares a recorded file with a current one, row by row, up to the first difference.
+RowComparison CompareRows(std::istream& recorded, std::istream& current);
+/// Compares two files by path. A missing file has no rows. Error: kIo if a file cannot be read.
+RowComparison CompareRows(const std::filesystem::path& recorded,
+                          const std::filesystem::path& current);
 
 }  // namespace alidade::internal

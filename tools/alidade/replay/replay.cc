@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// `status` of a file of JSON; "" if it cannot be read or has none.
+/// Returns `status` from a JSON file; "" if the file cannot be read or has no status.
 std::string StatusIn(const fs::path& file) {
   const std::string text = ReadFile(file, [](ExitCode, int) {});
   if (text.empty()) return "";
@@ -28,7 +28,7 @@ std::string StatusIn(const fs::path& file) {
   return status != json.end() && status->is_string() ? status->get<std::string>() : "";
 }
 
-/// What `files.txt` of a folder lists, as far as these are files.
+/// Returns the entries of `files.txt` in a folder, without those that are directories.
 std::set<std::string> ListedFiles(const fs::path& folder) {
   std::ifstream list(folder / "files.txt");
   std::set<std::string> names;
@@ -48,24 +48,25 @@ std::string RecordedStatus(const fs::path& folder) {
 
 RecordedInputs ReadReplayable(const fs::path& folder) {
   const fs::path file = folder / kInputsFile;
-  const RecordedInputs inputs = ReadInputs(ReadMadeFrom(folder).inputs, file.string());
+  const RecordedInputs inputs = ReadInputs(ReadInputTexts(folder).inputs, file.string());
   const std::vector<std::string>& arguments = inputs.command.arguments;
   if (arguments.empty() || (arguments[0] != "run" && arguments[0] != "sweep")) {
-    throw Error(ExitCode::kBadData, ErrorLine(Place{file.string()}, "arguments",
-                                              "no command that makes a folder", "run or sweep"));
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{file.string()}, "arguments", "the command does not create a folder",
+                          "run or sweep"));
   }
   if (!inputs.read_once.empty()) {
-    throw Error(ExitCode::kInputMissing,
-                ErrorLine(Place{folder.string()}, {},
-                          "its data came from '" + inputs.read_once + "', which could be read once",
-                          "a run on files"));
+    throw Error(ExitCode::kInputMissing, ErrorLine(Place{folder.string()}, {},
+                                                   "its data came from '" + inputs.read_once +
+                                                       "', which can be read only once",
+                                                   "a run whose data are regular files"));
   }
   const std::string status = RecordedStatus(folder);
   if (status.empty() || status == "running" || status == "stopped") {
-    throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
-                                              status == "stopped" ? "was stopped before its end"
-                                                                  : "was not written to its end",
-                                              "the folder of a run or sweep that is finished"));
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {},
+                          status == "stopped" ? "was stopped before it finished" : "is incomplete",
+                          "the folder of a finished run or sweep"));
   }
   return inputs;
 }
@@ -76,38 +77,39 @@ bool HasWallClock(std::string_view file) {
   return std::ranges::find(kFiles, file) != kFiles.end();
 }
 
-ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
+ReplayResult CompareReplay(const fs::path& recorded, const fs::path& current) {
   ReplayResult result;
-  result.inputs = InputDifferences(ReadMadeFrom(before).inputs, (before / kInputsFile).string(),
-                                   ReadMadeFrom(now).inputs);
-  std::set<std::string> made = ListedFiles(now);
+  result.inputs =
+      InputDifferences(ReadInputTexts(recorded).inputs, (recorded / kInputsFile).string(),
+                       ReadInputTexts(current).inputs);
+  std::set<std::string> new_files = ListedFiles(current);
   std::error_code ignored;
-  for (const std::string& name : ListedFiles(before)) {
-    const bool is_made = made.erase(name) > 0;
+  for (const std::string& name : ListedFiles(recorded)) {
+    const bool is_written = new_files.erase(name) > 0;
     if (HasWallClock(name)) {
-      result.left_out.push_back(name);
+      result.not_compared.push_back(name);
       continue;
     }
     ++result.files;
     if (name == kInputsFile && !result.inputs.empty()) continue;
-    if (!fs::exists(before / name, ignored)) {
+    if (!fs::exists(recorded / name, ignored)) {
       result.differences.push_back({name, 0, 0, "has been removed"});
       continue;
     }
-    if (!is_made) {
-      result.differences.push_back({name, 0, 0, "is not made now"});
+    if (!is_written) {
+      result.differences.push_back({name, 0, 0, "is not written now"});
       continue;
     }
-    const RowComparison rows = CompareRows(before / name, now / name);
+    const RowComparison rows = CompareRows(recorded / name, current / name);
     if (rows.difference) {
       result.differences.push_back(
           {name, rows.difference->line, rows.difference->column, rows.difference->Text()});
-    } else if (rows.before_goes_on || rows.now_goes_on) {
+    } else if (rows.recorded_has_more || rows.current_has_more) {
       result.differences.push_back(
-          {name, rows.rows + 1, 1, rows.now_goes_on ? "now there is more" : "ends here now"});
+          {name, rows.rows + 1, 1, rows.current_has_more ? "has more rows now" : "ends here now"});
     }
   }
-  for (const std::string& name : made) {
+  for (const std::string& name : new_files) {
     if (HasWallClock(name)) continue;
     ++result.files;
     result.differences.push_back({name, 0, 0, "is new"});
@@ -117,32 +119,32 @@ ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
 
 std::string ReplayJson(const ReplayResult& result) {
   Json json = {{"equal", result.equal()}, {"files", result.files}};
-  json["not_compared"] = result.left_out;
+  json["not_compared"] = result.not_compared;
   json["inputs"] = result.inputs;
   Json& differences = json["differences"] = Json::array();
-  for (const FileDifference& one : result.differences) {
-    Json& entry = differences.emplace_back(Json{{"file", one.file}});
-    if (one.line > 0) entry["line"] = one.line;
-    if (one.line > 0) entry["column"] = one.column;
-    entry["what"] = one.what;
+  for (const FileDifference& difference : result.differences) {
+    Json& entry = differences.emplace_back(Json{{"file", difference.file}});
+    if (difference.line > 0) entry["line"] = difference.line;
+    if (difference.line > 0) entry["column"] = difference.column;
+    entry["what"] = difference.description;
   }
   return JsonText(json);
 }
 
 std::string ReplayText(const ReplayResult& result, const std::string& folder) {
   std::string text;
-  for (const std::string& one : result.inputs) text += "input differs: " + one + '\n';
-  for (const FileDifference& one : result.differences) {
-    const Place place{(fs::path(folder) / one.file).string(), static_cast<int>(one.line),
-                      static_cast<int>(one.column)};
-    text += "differs: " + ToString(place) + ": " + one.what + '\n';
+  for (const std::string& input : result.inputs) text += "input differs: " + input + '\n';
+  for (const FileDifference& difference : result.differences) {
+    const Place place{(fs::path(folder) / difference.file).string(),
+                      static_cast<int>(difference.line), static_cast<int>(difference.column)};
+    text += "differs: " + ToString(place) + ": " + difference.description + '\n';
   }
-  const std::string left_out = Join(result.left_out);
+  const std::string not_compared = Join(result.not_compared);
   text += folder + ": " +
           (result.equal() ? "all " + std::to_string(result.files) + " files are equal"
                           : std::to_string(result.differences.size()) + " of " +
                                 std::to_string(result.files) + " files differ") +
-          (left_out.empty() ? "" : "; not compared: " + left_out) + '\n';
+          (not_compared.empty() ? "" : "; not compared: " + not_compared) + '\n';
   return text;
 }
 

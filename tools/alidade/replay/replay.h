@@ -9,39 +9,42 @@
 
 #include "alidade/replay/run_inputs.h"
 
-/// Whether a run folder and one that was made again from what it records are the same.
+/// Comparison of a run folder with a second folder that was computed from its recorded inputs.
 namespace alidade::internal {
 
 struct FileDifference {
   std::string file;                   ///< relative to the folder
-  std::int64_t line = 0, column = 0;  ///< of the first difference; 0: of the file as a whole
-  std::string what;                   ///< `now '0.51', was '0.5'`
+  std::int64_t line = 0, column = 0;  ///< of the first difference; 0 if the whole file is meant
+  std::string description;            ///< `now '0.51', was '0.5'`
 };
 
 struct ReplayResult {
-  std::int64_t files = 0;             ///< that were compared
-  std::vector<std::string> left_out;  ///< files with the wall clock in them
-  std::vector<std::string> inputs;    ///< as InputDifferences has them
+  std::int64_t files = 0;                 ///< number of compared files
+  std::vector<std::string> not_compared;  ///< files that contain wall-clock times
+  std::vector<std::string> inputs;        ///< the result of InputDifferences()
   std::vector<FileDifference> differences;
 
   bool equal() const { return inputs.empty() && differences.empty(); }
 };
 
-/// `status` in the run.json or sweep.json of a folder; "" if there is none. Error: kBadData.
+/// Returns `status` from the run.json or sweep.json of a folder; "" if not found. Error:
+/// kBadData.
 std::string RecordedStatus(const std::filesystem::path& folder);
 
-/// What `folder` was made from. Errors: kInputMissing where it has no inputs.json, or its data came
-/// from a pipe; kBadData where it is unfinished.
+/// Reads the inputs of `folder`. Errors: kInputMissing if it has no inputs.json, or if its data
+/// came from a pipe; kBadData if it is unfinished.
 RecordedInputs ReadReplayable(const std::filesystem::path& folder);
 
-/// Whether a file of a run folder has the wall clock in it, and so is another each time.
+/// Reports whether a file of a run folder contains wall-clock times and so differs in every run.
 bool HasWallClock(std::string_view file);
 
-/// Compares all files of the two but those that HasWallClock.
-ReplayResult CompareReplay(const std::filesystem::path& before, const std::filesystem::path& now);
+/// Compares all files of two folders, except those with wall-clock times (HasWallClock).
+ReplayResult CompareReplay(const std::filesystem::path& recorded,
+                           const std::filesystem::path& current);
 
-/// The result as JSON, and for a terminal, `folder` as it was named.
+/// Formats the result as JSON.
 std::string ReplayJson(const ReplayResult& result);
+/// Formats the result for a terminal. `folder` is the path as the user wrote it.
 std::string ReplayText(const ReplayResult& result, const std::string& folder);
 
 }  // namespace alidade::internal

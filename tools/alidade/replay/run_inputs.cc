@@ -22,17 +22,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// SHA-256 of a file. Error: kIo.
+/// Computes the SHA-256 of a file. Error: kIo.
 std::string HashOf(const fs::path& file) {
   std::string hash = Sha256OfFile(file);
   if (hash.empty()) {
-    throw Error(ExitCode::kIo, ErrorLine(Place{file.string()}, {}, "cannot be read for its hash"));
+    throw Error(ExitCode::kIo,
+                ErrorLine(Place{file.string()}, {}, "cannot be read to compute its hash"));
   }
   return hash;
 }
 
-/// `{"file": FILE, "bytes": N, "sha256": HASH}`
-std::string HashedFile(const fs::path& file) {
+/// Returns `{"file": FILE, "bytes": N, "sha256": HASH}`.
+std::string FileEntry(const fs::path& file) {
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file, error);
   return "{\"file\": " + JsonString(file.string()) +
@@ -40,14 +41,14 @@ std::string HashedFile(const fs::path& file) {
          ", \"sha256\": " + JsonString(HashOf(file)) + '}';
 }
 
-/// The texts between two brackets, a line each.
-std::string Bracketed(char open, const std::vector<std::string>& texts, char close) {
-  std::string all(1, open);
+/// Returns the texts between two brackets, one line each.
+std::string BracketedList(char open, const std::vector<std::string>& texts, char close) {
+  std::string list(1, open);
   for (const std::string& text : texts) {
-    all.append("\n    ").append(text);
-    if (&text != &texts.back()) all += ',';
+    list.append("\n    ").append(text);
+    if (&text != &texts.back()) list += ',';
   }
-  return all + (texts.empty() ? "" : "\n  ") + close;
+  return list + (texts.empty() ? "" : "\n  ") + close;
 }
 
 std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
@@ -56,19 +57,19 @@ std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
   return strings;
 }
 
-/// `source.path`; "" where there is none.
+/// Returns `source.path`; "" if the config has none.
 std::string SourcePath(const Config& config) {
-  const Config copy = config.Copy();  // nothing of the original counts as read
+  const Config copy = config.Copy();  // the keys of the original are not marked as read
   const auto source = copy.root().is_map() ? copy.root().Find("source") : std::nullopt;
   const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
   return path && path->kind() == Node::Kind::kScalar ? path->Text() : "";
 }
 
-/// What a source reads from `path`, as JSON.
-std::vector<std::string> DataAt(const std::string& path) {
+/// Returns a JSON entry for each file that a source reads from `path`.
+std::vector<std::string> DataEntriesAt(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  if (fs::is_regular_file(status)) return {HashedFile(path)};
+  if (fs::is_regular_file(status)) return {FileEntry(path)};
   std::vector<std::string> data;
   if (fs::is_directory(status)) {
     std::vector<fs::path> files;
@@ -79,91 +80,91 @@ std::vector<std::string> DataAt(const std::string& path) {
     }
     if (error) FailIo(path, "read", error.value());
     std::ranges::sort(files);
-    for (const fs::path& file : files) data.push_back(HashedFile(file));
+    for (const fs::path& file : files) data.push_back(FileEntry(file));
   } else if (path == "-" || fs::exists(status)) {
     data.push_back("{\"file\": " + JsonString(path) + ", \"read_once\": true}");
   }
   return data;
 }
 
-/// Likewise, of all these configs; each path once, in their order.
-std::vector<std::string> DataOf(const std::vector<Config>& configs) {
+/// Returns the JSON entries of the data of all configs, in their order; each path counts once.
+std::vector<std::string> DataEntriesOf(const std::vector<Config>& configs) {
   std::vector<std::string> data;
-  std::set<std::string> known = {""};
+  std::set<std::string> visited_paths = {""};
   for (const Config& config : configs) {
     const std::string path = SourcePath(config);
-    if (!known.insert(path).second) continue;
-    const std::vector<std::string> more = DataAt(path);
-    data.insert(data.end(), more.begin(), more.end());
+    if (!visited_paths.insert(path).second) continue;
+    const std::vector<std::string> entries = DataEntriesAt(path);
+    data.insert(data.end(), entries.begin(), entries.end());
   }
   return data;
 }
 
-/// The names of plugins in a config.
-struct Names {
+/// Names of models and types in a config.
+struct PluginNames {
   std::set<std::string> models, types;
 };
 
-/// Adds the values of the keys `model` and `type` at and below `node`, at any depth.
-void AddNames(const Node& node, Names& names) {
+/// Adds the values of the keys `model` and `type` at `node` and at any depth below it.
+void AddNames(const Node& node, PluginNames& names) {
   if (node.kind() == Node::Kind::kList) {
     for (const Node& item : node.Items()) AddNames(item, names);
   }
   if (!node.is_map()) return;
   for (const auto& [key, value] : node.Entries()) {
-    const bool scalar = value.kind() == Node::Kind::kScalar;
-    if (scalar && key == "model") names.models.insert(value.Text());
-    if (scalar && key == "type") names.types.insert(value.Text());
+    const bool is_scalar = value.kind() == Node::Kind::kScalar;
+    if (is_scalar && key == "model") names.models.insert(value.Text());
+    if (is_scalar && key == "type") names.types.insert(value.Text());
     AddNames(value, names);
   }
 }
 
-/// Calls `read` on the value that `text` is.
+/// Parses `text` as JSON and returns `read(json)`. Error: kBadData if either fails.
 template <class F>
-auto Reading(const std::string& text, const std::string& file, const F& read) {
+auto ReadJsonText(const std::string& text, const std::string& file, const F& read) {
   const Json json = ParseJson(text, file);
   try {
     return read(json);
   } catch (const Json::exception&) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{file}, {}, "is not what a run of this version records"));
+                ErrorLine(Place{file}, {}, "is not the inputs.json of a run of this version"));
   }
 }
 
-/// What the text says, a line for each name.
-using Facts = std::map<std::string, std::string>;
+/// The comparable values of an inputs.json, by name.
+using InputValues = std::map<std::string, std::string>;
 
-Facts FactsIn(const Json& json) {
-  Facts facts;
-  facts["command"] = Join(json.at("arguments").get<std::vector<std::string>>(), " ");
-  facts["plugin paths"] = Join(json.at("plugin_paths").get<std::vector<std::string>>(), ":");
-  facts["config"] = json.at("config").at("sha256").get<std::string>();
+InputValues InputValuesOf(const Json& json) {
+  InputValues values;
+  values["command"] = Join(json.at("arguments").get<std::vector<std::string>>(), " ");
+  values["plugin paths"] = Join(json.at("plugin_paths").get<std::vector<std::string>>(), ":");
+  values["config"] = json.at("config").at("sha256").get<std::string>();
   for (const auto& [name, id] : json.at("build").items()) {
-    const bool of_machine = name == "processor" || name == "kernels";
-    facts[(of_machine ? "" : "build of ") + name] = id.get<std::string>();
+    const bool is_machine_property = name == "processor" || name == "kernels";
+    values[(is_machine_property ? "" : "build of ") + name] = id.get<std::string>();
   }
   for (const char* const kind : {"plugin", "data"}) {
-    for (const Json& one : json.at(kind == std::string("data") ? "data" : "plugins")) {
-      facts[kind + (' ' + one.at("file").get<std::string>())] += one.value("sha256", "");
+    for (const Json& entry : json.at(kind == std::string("data") ? "data" : "plugins")) {
+      values[kind + (' ' + entry.at("file").get<std::string>())] += entry.value("sha256", "");
     }
   }
-  return facts;
+  return values;
 }
 
-/// A hash by its first digits, any other text as it is.
+/// Shortens a hash to its first digits; quotes any other text.
 std::string Shortened(const std::string& text) {
-  constexpr std::size_t kShortHash = 40, kShown = 12;
-  const bool hash =
-      text.size() >= kShortHash && text.find_first_not_of("0123456789abcdef") == text.npos;
-  return hash ? text.substr(0, kShown) + "..." : '\'' + text + '\'';
+  constexpr std::size_t kMinHashLength = 40, kShownDigits = 12;
+  const bool is_hash =
+      text.size() >= kMinHashLength && text.find_first_not_of("0123456789abcdef") == text.npos;
+  return is_hash ? text.substr(0, kShownDigits) + "..." : '\'' + text + '\'';
 }
 
 }  // namespace
 
-std::vector<fs::path> PluginsNamed(const std::vector<Config>& configs, const PluginHost& host) {
-  Names names;
+std::vector<fs::path> FindUsedPlugins(const std::vector<Config>& configs, const PluginHost& host) {
+  PluginNames names;
   for (const Config& config : configs) {
-    const Config copy = config.Copy();  // nothing of the original counts as read
+    const Config copy = config.Copy();  // the keys of the original are not marked as read
     AddNames(copy.root(), names);
   }
   std::vector<fs::path> files;
@@ -174,7 +175,7 @@ std::vector<fs::path> PluginsNamed(const std::vector<Config>& configs, const Plu
   return files;
 }
 
-PluginHashes HashesOf(const std::vector<fs::path>& files) {
+PluginHashes HashFiles(const std::vector<fs::path>& files) {
   PluginHashes hashes;
   for (const fs::path& file : files) hashes.emplace(file.filename().string(), HashOf(file));
   return hashes;
@@ -182,26 +183,27 @@ PluginHashes HashesOf(const std::vector<fs::path>& files) {
 
 std::string InputsJson(const CommandInputs& command, const Config& config,
                        const std::vector<Config>& runs, const PluginHashes& plugins) {
-  std::vector<std::string> paths, folders, build, used;
+  std::vector<std::string> paths, folders, build, plugin_entries;
   for (const fs::path& path : command.plugin_paths) paths.push_back(JsonString(path.string()));
   for (const fs::path& path : command.plugin_folders) folders.push_back(JsonString(path.string()));
   for (const auto& [name, id] : BuildIds())
     build.push_back(JsonString(name) + ": " + JsonString(id));
   for (const auto& [file, hash] : plugins) {
-    used.push_back("{\"file\": " + JsonString(file) + ", \"sha256\": " + JsonString(hash) + '}');
+    plugin_entries.push_back("{\"file\": " + JsonString(file) +
+                             ", \"sha256\": " + JsonString(hash) + '}');
   }
-  return "{\n  \"arguments\": " + Bracketed('[', JsonStrings(command.arguments), ']') +
+  return "{\n  \"arguments\": " + BracketedList('[', JsonStrings(command.arguments), ']') +
          ",\n  \"config\": {\"file\": " + JsonString(fs::path(config.name()).filename().string()) +
          ", \"sha256\": " + JsonString(Sha256(config.ToYaml())) +
-         "},\n  \"plugin_paths\": " + Bracketed('[', paths, ']') +
-         ",\n  \"plugin_folders\": " + Bracketed('[', folders, ']') +
-         ",\n  \"build\": " + Bracketed('{', build, '}') +
-         ",\n  \"plugins\": " + Bracketed('[', used, ']') +
-         ",\n  \"data\": " + Bracketed('[', DataOf(runs), ']') + "\n}\n";
+         "},\n  \"plugin_paths\": " + BracketedList('[', paths, ']') +
+         ",\n  \"plugin_folders\": " + BracketedList('[', folders, ']') +
+         ",\n  \"build\": " + BracketedList('{', build, '}') +
+         ",\n  \"plugins\": " + BracketedList('[', plugin_entries, ']') +
+         ",\n  \"data\": " + BracketedList('[', DataEntriesOf(runs), ']') + "\n}\n";
 }
 
 RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
-  return Reading(text, file, [](const Json& json) {
+  return ReadJsonText(text, file, [](const Json& json) {
     RecordedInputs inputs;
     inputs.command.arguments = json.at("arguments").get<std::vector<std::string>>();
     for (const Json& path : json.at("plugin_paths"))
@@ -209,8 +211,8 @@ RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
     for (const Json& path : json.at("plugin_folders"))
       inputs.command.plugin_folders.emplace_back(path.get<std::string>());
     inputs.config = json.at("config").at("file").get<std::string>();
-    for (const Json& one : json.at("data")) {
-      if (one.value("read_once", false)) inputs.read_once = one.at("file").get<std::string>();
+    for (const Json& entry : json.at("data")) {
+      if (entry.value("read_once", false)) inputs.read_once = entry.at("file").get<std::string>();
     }
     return inputs;
   });
@@ -222,49 +224,50 @@ std::string WithoutOption(std::string text, const std::string& option, const std
   return place == text.npos ? text : text.erase(place, words.size());
 }
 
-std::vector<std::string> InputDifferences(const std::string& before, const std::string& file,
-                                          const std::string& now) {
-  Facts was = Reading(before, file, FactsIn);
-  const Facts is = Reading(now, kInputsFile, FactsIn);
+std::vector<std::string> InputDifferences(const std::string& recorded, const std::string& file,
+                                          const std::string& current) {
+  InputValues recorded_values = ReadJsonText(recorded, file, InputValuesOf);
+  const InputValues current_values = ReadJsonText(current, kInputsFile, InputValuesOf);
   std::vector<std::string> differences;
-  for (const auto& [name, value] : is) {
-    const auto recorded = was.find(name);
-    if (recorded == was.end()) {
+  for (const auto& [name, value] : current_values) {
+    const auto found = recorded_values.find(name);
+    if (found == recorded_values.end()) {
       differences.push_back(name + ": new");
-    } else if (recorded->second != value) {
+    } else if (found->second != value) {
       differences.push_back(name + ": now " + Shortened(value) + ", was " +
-                            Shortened(recorded->second));
+                            Shortened(found->second));
     }
-    was.erase(name);
+    recorded_values.erase(name);
   }
-  for (const auto& [name, value] : was) differences.push_back(name + ": missing now");
+  for (const auto& [name, value] : recorded_values) differences.push_back(name + ": missing now");
   return differences;
 }
 
-MadeFrom ReadMadeFrom(const fs::path& folder) {
+InputTexts ReadInputTexts(const fs::path& folder) {
   const auto read = [&folder](const char* name) {
     const fs::path file = folder / name;
     return ReadFile(file, [&](ExitCode code, int error) {
       throw Error(code, ErrorLine(Place{file.string()}, {},
                                   "cannot be read: " + std::generic_category().message(error),
-                                  "the folder of an `alidade run` or `alidade sweep`"));
+                                  "a folder written by `alidade run` or `alidade sweep`"));
     });
   };
-  MadeFrom made;
-  made.inputs = read(kInputsFile);
-  made.config = read(kResolvedConfig);
-  return made;
+  InputTexts texts;
+  texts.inputs = read(kInputsFile);
+  texts.config = read(kResolvedConfig);
+  return texts;
 }
 
-std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now) {
+std::string DescribeDifferences(const InputTexts& recorded, const std::string& file,
+                                const InputTexts& current) {
   std::vector<std::string> differences;
-  std::istringstream config_before(before.config), config_now(now.config);
-  if (const auto one = CompareRows(config_before, config_now).difference) {
-    differences.push_back(std::string(kResolvedConfig) + ':' + std::to_string(one->line) + ": " +
-                          one->Text());
+  std::istringstream recorded_config(recorded.config), current_config(current.config);
+  if (const auto row = CompareRows(recorded_config, current_config).difference) {
+    differences.push_back(std::string(kResolvedConfig) + ':' + std::to_string(row->line) + ": " +
+                          row->Text());
   }
-  for (const std::string& one : InputDifferences(before.inputs, file, now.inputs)) {
-    if (differences.empty() || !one.starts_with("config: ")) differences.push_back(one);
+  for (const std::string& input : InputDifferences(recorded.inputs, file, current.inputs)) {
+    if (differences.empty() || !input.starts_with("config: ")) differences.push_back(input);
   }
   return Join(differences, "; ");
 }

@@ -9,65 +9,67 @@
 #include "alidade/config/config.h"
 #include "alidade/plugin/plugin_host.h"
 
-/// What a run folder was made from: `inputs.json`. Next to `config.resolved.yaml` it has all that
-/// it takes to make the same bytes again.
+/// `inputs.json`, the record of a run's inputs. Together with `config.resolved.yaml` it suffices
+/// to compute the same bytes again.
 namespace alidade::internal {
 
 constexpr const char* kInputsFile = "inputs.json";
 constexpr const char* kResolvedConfig = "config.resolved.yaml";
 
-/// The part that the command line gives.
+/// Inputs from the command line and the environment.
 struct CommandInputs {
-  /// The command and those of its options that a byte depends on, but for the config and what is in
-  /// its resolved text: {"run", "--covariances"}.
+  /// The command and those of its options that affect the output: {"run", "--covariances"}. The
+  /// config, and options that its resolved text contains, are omitted.
   std::vector<std::string> arguments;
   std::vector<std::filesystem::path> plugin_paths;  ///< of --plugin-path
-  /// Of the environment. What is refused there is no error, and so they are no difference either.
+  /// From the environment. A rejected plugin in them is not an error. They are therefore not
+  /// compared.
   std::vector<std::filesystem::path> plugin_folders;
 };
 
-/// The files of the plugins that runs of these configs use, each once: of those that `host` offers,
-/// every model, source and estimator that a `model` or `type` of a config names, overrides too.
-std::vector<std::filesystem::path> PluginsNamed(const std::vector<Config>& configs,
-                                                const PluginHost& host);
+/// Returns the plugin files that runs of these configs use, each once. A plugin is used if any
+/// `model` or `type` in a config, overrides included, names one of its models, sources or
+/// estimators.
+std::vector<std::filesystem::path> FindUsedPlugins(const std::vector<Config>& configs,
+                                                   const PluginHost& host);
 
-/// File name -> SHA-256, for each file, wherever it lies.
+/// SHA-256 of each file by its name without the folder.
 using PluginHashes = std::multimap<std::string, std::string>;
-/// Error: kIo.
-PluginHashes HashesOf(const std::vector<std::filesystem::path>& files);
+/// Computes the hashes of files. Error: kIo.
+PluginHashes HashFiles(const std::vector<std::filesystem::path>& files);
 
-/// The text of `inputs.json`. `config` is that of `config.resolved.yaml`, `runs` the configs of the
-/// runs. Reads what the sources of these name for its hashes; a folder stands for the files in it,
-/// a pipe has no hash. Error: kIo.
+/// Composes the text of `inputs.json`. `config` is the one that `config.resolved.yaml` contains,
+/// `runs` are the configs of the runs. Reads the data files of their sources for the hashes. A
+/// folder stands for the files in it; a pipe has no hash. Error: kIo.
 std::string InputsJson(const CommandInputs& command, const Config& config,
                        const std::vector<Config>& runs, const PluginHashes& plugins);
 
-/// What is recorded in such a text.
+/// The parts of an `inputs.json` that a replay needs.
 struct RecordedInputs {
   CommandInputs command;
   std::string config;     ///< name of the file, without its folder
-  std::string read_once;  ///< what of the data was a pipe; "": nothing
+  std::string read_once;  ///< path of the data source that was a pipe; "": none was
 };
-/// Error: kBadData where `text`, the contents of `file`, is none.
+/// Parses the text of an `inputs.json`. Error: kBadData if it is invalid; the message names `file`.
 RecordedInputs ReadInputs(const std::string& text, const std::string& file);
 
-/// The text of inputs.json without an option of the command and its value, as if the command had
-/// not had them.
+/// Returns the text of an `inputs.json` without one option of the command and its value.
 std::string WithoutOption(std::string text, const std::string& option, const std::string& value);
 
-/// What differs between two texts of `inputs.json`, one of them in `file`, a line each: `plugin
-/// ratio.so: now 1f0c..., was 9a3b...`. Error: kBadData.
-std::vector<std::string> InputDifferences(const std::string& before, const std::string& file,
-                                          const std::string& now);
+/// Lists the differences between two texts of `inputs.json`, one line each: `plugin ratio.so: now
+/// 1f0c..., was 9a3b...`. `file` is the path of the recorded one, for messages. Error: kBadData.
+std::vector<std::string> InputDifferences(const std::string& recorded, const std::string& file,
+                                          const std::string& current);
 
-/// The texts of the two files that say what a folder was made from.
-struct MadeFrom {
+/// The texts of the two files that record the inputs of a folder.
+struct InputTexts {
   std::string config, inputs;
 };
-/// Those of `folder`. Errors: kInputMissing, kIo.
-MadeFrom ReadMadeFrom(const std::filesystem::path& folder);
-/// What differs between the two, on one line; "" if nothing does. `file` is the inputs.json of
-/// `before`. Error: kBadData.
-std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now);
+/// Reads the two files of `folder`. Errors: kInputMissing, kIo.
+InputTexts ReadInputTexts(const std::filesystem::path& folder);
+/// Describes the differences between recorded and current inputs on one line; "" if they are
+/// equal. `file` is the recorded inputs.json. Error: kBadData.
+std::string DescribeDifferences(const InputTexts& recorded, const std::string& file,
+                                const InputTexts& current);
 
 }  // namespace alidade::internal

@@ -208,9 +208,9 @@ void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
 }
 
 /// Refuses to continue a sweep of another config or other inputs than `now`.
-void CheckInputs(const fs::path& partial, const internal::MadeFrom& now) {
-  const std::string difference = internal::DifferenceOf(
-      internal::ReadMadeFrom(partial), (partial / internal::kInputsFile).string(), now);
+void CheckInputs(const fs::path& partial, const internal::InputTexts& current) {
+  const std::string difference = internal::DescribeDifferences(
+      internal::ReadInputTexts(partial), (partial / internal::kInputsFile).string(), current);
   if (difference.empty()) return;
   throw Error(ExitCode::kCannotCreate,
               ErrorLine(Place{partial.string()}, {}, "was made from other inputs: " + difference) +

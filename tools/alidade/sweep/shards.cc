@@ -27,7 +27,7 @@ struct ShardFolder {
   fs::path folder;
   Shard shard;
   std::vector<std::string> arguments;
-  MadeFrom made_from;  ///< of the whole sweep
+  InputTexts input_texts;  ///< of the whole sweep
 };
 
 [[noreturn]] void FailData(const fs::path& file, const std::string& what,
@@ -80,8 +80,8 @@ ShardFolder ReadShardFolder(const fs::path& folder) {
     FailData(inputs, "has the shard '" + text + "' of " + std::to_string(runs) + " runs",
              "i/n with 1 <= i <= n, and a run for each shard");
   }
-  one.made_from = ReadMadeFrom(folder);
-  one.made_from.inputs = WithoutOption(one.made_from.inputs, "--shard", text);
+  one.input_texts = ReadInputTexts(folder);
+  one.input_texts.inputs = WithoutOption(one.input_texts.inputs, "--shard", text);
   return one;
 }
 
@@ -93,8 +93,8 @@ void CheckSameSweep(const ShardFolder& first, const ShardFolder& one) {
                  TextOf(first.shard),
              "the shards of one sweep");
   }
-  const std::string difference =
-      DifferenceOf(first.made_from, (first.folder / kInputsFile).string(), one.made_from);
+  const std::string difference = DescribeDifferences(
+      first.input_texts, (first.folder / kInputsFile).string(), one.input_texts);
   if (difference.empty()) return;
   FailData(one.folder, "is not of the same sweep as " + first.folder.string() + ": " + difference,
            "the shards of one sweep");
@@ -205,8 +205,8 @@ MergedSweep MergeShards(const std::vector<fs::path>& folders) {
   if (!varied.empty()) variation = Variation::FromText(varied);
   std::vector<SweepResult> results =
       ReadResults(shards, variation ? variation->values : std::vector<std::string>{""});
-  return {Config::FromText(first.made_from.config, (first.folder / kResolvedConfig).string()),
-          first.made_from.inputs, std::move(variation), std::move(results)};
+  return {Config::FromText(first.input_texts.config, (first.folder / kResolvedConfig).string()),
+          first.input_texts.inputs, std::move(variation), std::move(results)};
 }
 
 }  // namespace alidade::internal

@@ -109,14 +109,14 @@ std::string Describe(const BundleFile& file, int left_out) {
             (IsProjective(file.format) ? "defined or not finite at the start: in the camera's plane"
                                        : "defined or not finite at the start: behind the camera");
   }
-  if (file.invalid > 0)
-    text += "; " + std::to_string(file.invalid) + " not valid, as outside the image";
+  if (file.invalid_observations > 0)
+    text += "; " + std::to_string(file.invalid_observations) + " not valid, as outside the image";
   if (file.frames_left_out > 0)
     text += "; " + std::to_string(file.frames_left_out) + " frames without a pose left out";
   if (file.points_left_out > 0)
     text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
-  if (file.unplaced > 0)
-    text += "; " + std::to_string(file.unplaced) + " observations of these left out";
+  if (file.unplaced_observations > 0)
+    text += "; " + std::to_string(file.unplaced_observations) + " observations of these left out";
   return text;
 }
 
@@ -143,7 +143,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);
   BundleFile file = Read(arguments, host);
   const SharedSensor sensor = BundleSensor(host, file.problem);
-  const int left_out = LeaveOutUndefined(*sensor, file.problem);
+  const int left_out = ExcludeUndefined(*sensor, file.problem);
   if (left_out == std::ssize(file.problem.observations)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
@@ -171,7 +171,8 @@ ExitCode RunBundle(const BundleArguments& arguments) {
           " after " + std::to_string(result.iterations) + " iterations, " +
           std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
           " unknowns\n";
-  for (const std::string& line : Undetermined(file.problem, *sensor, result)) text += line + '\n';
+  for (const std::string& line : DescribeUndetermined(file.problem, *sensor, result))
+    text += line + '\n';
   if (folder && result.end != BundleEnd::kFailed) {
     const std::vector<std::string> names = folder->Save(file, result, before, after);
     text += "wrote " + arguments.folder + '\n';

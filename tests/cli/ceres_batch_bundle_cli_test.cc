@@ -64,7 +64,7 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   const Outcome fix = Call({"bundle", "p.txt", "--fix", "k1,k22"});
   EXPECT_EQ(fix.code, 2);
   EXPECT_TRUE(Contains(fix.err,
-                       "'k22' cannot be fixed; expected intrinsics, or of focal_px, k1, "
+                       "'k22' cannot be fixed; expected intrinsics, or focal_px, k1, "
                        "k2; did you mean 'k2'?"))
       << fix.err;
   BundleFile file = testing::TrueBundle();
@@ -168,7 +168,7 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
     EXPECT_NEAR(depth, was.at(id), 0.07 * was.at(id)) << "point " << id;
   const Outcome made = Bundle("data/tracks.csv", "data/truth.tum", {"-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_TRUE(Contains(made.out, "unknowns: all is determined")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "unknowns: all are determined")) << made.out;
   EXPECT_LT(Json("out/bundle.json").root().At("rms_after_px").Number(),
             Json("start/bundle.json").root().At("rms_after_px").Number());
 }
@@ -205,7 +205,7 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   Write("start.tum", Start(5, 100.0, 0.0));
   const Outcome none = Bundle("data/tracks.csv", "start.tum");
   EXPECT_EQ(none.code, 65);
-  EXPECT_TRUE(Contains(none.err, "start.tum: no pose at the time of any frame")) << none.err;
+  EXPECT_TRUE(Contains(none.err, "start.tum: no pose has the time of a frame")) << none.err;
 }
 
 /// Without timestamps the k-th pose is that of frame k, whatever its time; so from standard input

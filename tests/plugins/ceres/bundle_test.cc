@@ -21,7 +21,7 @@ using testing::Wave;
 
 BundleResult Adjusted(BundleProblem& problem, const BundleOptions& options = {}) {
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
-  LeaveOutUndefined(*sensor, problem);
+  ExcludeUndefined(*sensor, problem);
   return AdjustBundle(*sensor, problem, options);
 }
 
@@ -64,11 +64,11 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   // 6 cameras of 9, the first of 3, and 40 points
   EXPECT_EQ(result.unknowns, 5 * 9 + 3 + 120);
   EXPECT_EQ(result.rank, result.unknowns - 1);
-  const std::vector<std::string> words = Undetermined(problem, *sensor, result);
+  const std::vector<std::string> words = DescribeUndetermined(problem, *sensor, result);
   ASSERT_EQ(words.size(), 3u);
   EXPECT_EQ(words[0], "gauge: the pose of the first camera and the scale are constant");
   EXPECT_EQ(words[1].find("extent: "), 0u) << words[1];
-  EXPECT_EQ(words[2], "rank: 167 of 168 unknowns: all but the scale is determined");
+  EXPECT_EQ(words[2], "rank: 167 of 168 unknowns: all but the scale are determined");
 }
 
 TEST(CeresBundle, LeavesFixedIntrinsicsAsTheyAre) {
@@ -203,7 +203,7 @@ TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   BundleProblem& problem = file.problem;
   Disturb(problem);
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
-  EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 0);
+  EXPECT_EQ(ExcludeUndefined(*sensor, problem), 0);
   const auto formula = [&] {
     std::istringstream text(BundleText(file));
     return testing::BalFormula(text);
@@ -278,12 +278,12 @@ TEST(CeresBundle, LeavesOutWhatIsBehindItsCamera) {
   problem.points.push_back({0.0, 0.0, -50.0});
   problem.observations.push_back({0, static_cast<int>(problem.points.size()) - 1, {3, 4}, true});
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
-  EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 1);
+  EXPECT_EQ(ExcludeUndefined(*sensor, problem), 1);
   const BundleResult result = AdjustBundle(*sensor, problem, {});
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_EQ(result.residuals, static_cast<int>(2 * seen_before));
-  const std::vector<std::string> words = Undetermined(problem, *sensor, result);
-  EXPECT_EQ(words[2], "1 point is seen by no camera, and left as read");
+  const std::vector<std::string> words = DescribeUndetermined(problem, *sensor, result);
+  EXPECT_EQ(words[2], "1 point is not seen by any camera and unchanged");
 }
 
 TEST(CeresBundle, SaysWhatIsNotDetermined) {
@@ -295,12 +295,10 @@ TEST(CeresBundle, SaysWhatIsNotDetermined) {
   const SharedSensor sensor = BundleSensor(Shipped(), problem);
   const BundleResult result = Adjusted(problem);
   std::string all;
-  for (const std::string& line : Undetermined(problem, *sensor, result)) all += line + '\n';
-  EXPECT_NE(all.find("2 parts share no observation"), std::string::npos) << all;
-  EXPECT_NE(all.find("seen once: no depth"), std::string::npos) << all;
-  EXPECT_NE(all.find("directions besides the scale are determined by no observation"),
-            std::string::npos)
-      << all;
+  for (const std::string& line : DescribeUndetermined(problem, *sensor, result)) all += line + '\n';
+  EXPECT_NE(all.find("2 components share no observation"), std::string::npos) << all;
+  EXPECT_NE(all.find("seen only once: the depth is undetermined"), std::string::npos) << all;
+  EXPECT_NE(all.find("directions besides the scale are undetermined"), std::string::npos) << all;
 }
 
 /// Of a problem of 579 unknowns, the scale among them, and 7200 residuals.
@@ -329,8 +327,8 @@ TEST(CeresBundle, SolvesALargeProblem) {
   EXPECT_EQ(result.unknowns, 119 * 9 + 3 + 1200);
   EXPECT_LT(BundleRms(*sensor, problem), 1e-6);
   EXPECT_EQ(result.rank, -1);
-  EXPECT_EQ(Undetermined(problem, *sensor, result).back(),
-            "rank: not computed of more than 600 unknowns");
+  EXPECT_EQ(DescribeUndetermined(problem, *sensor, result).back(),
+            "rank: not computed (more than 600 unknowns)");
 }
 
 TEST(CeresBundle, CountsDirectionsThatNothingTells) {
@@ -340,16 +338,12 @@ TEST(CeresBundle, CountsDirectionsThatNothingTells) {
   result.unknowns = 10;
   const auto last = [&](int rank) {
     result.rank = rank;
-    return Undetermined(problem, *sensor, result).back();
+    return DescribeUndetermined(problem, *sensor, result).back();
   };
-  EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale is determined");
-  EXPECT_EQ(
-      last(8),
-      "rank: 8 of 10 unknowns; 1 direction besides the scale is determined by no observation");
-  EXPECT_EQ(
-      last(7),
-      "rank: 7 of 10 unknowns; 2 directions besides the scale are determined by no observation");
-  EXPECT_EQ(last(-1), "rank: not computed, the Jacobian is not finite");
+  EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale are determined");
+  EXPECT_EQ(last(8), "rank: 8 of 10 unknowns; 1 direction besides the scale is undetermined");
+  EXPECT_EQ(last(7), "rank: 7 of 10 unknowns; 2 directions besides the scale are undetermined");
+  EXPECT_EQ(last(-1), "rank: not computed (the Jacobian is not finite)");
 }
 
 TEST(CeresBundle, RefusesAProblemWithoutObservations) {
@@ -373,9 +367,10 @@ TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kPlugin);
     const std::string text = e.what();
-    EXPECT_EQ(text.find("this build of alidade adjusts no bundles; expected one that found the "
-                        "Ceres solver: apt-get install libceres-dev"),
-              0u)
+    EXPECT_EQ(
+        text.find("this build of alidade does not include bundle adjustment; expected a build "
+                  "with the Ceres solver: apt-get install libceres-dev"),
+        0u)
         << text;
   }
 }
@@ -394,7 +389,7 @@ class CeresBundleData : public ::testing::Test {
     BundleFile file = ReadBundle(folder_ / name);
     BundleProblem& problem = file.problem;
     const SharedSensor sensor = BundleSensor(Shipped(), problem);
-    EXPECT_EQ(LeaveOutUndefined(*sensor, problem), 0);
+    EXPECT_EQ(ExcludeUndefined(*sensor, problem), 0);
     const double before = BundleRms(*sensor, problem);
     result_ = AdjustBundle(*sensor, problem, options);
     EXPECT_EQ(result_.end, BundleEnd::kConverged) << name << ": " << result_.message;

@@ -160,7 +160,7 @@ TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
 }
 
 TEST_F(BundleFiles, RefusesBadBal) {
-  ExpectBad("", {":1:1: nothing in it"});
+  ExpectBad("", {":1:1: the file is empty"});
   ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is out of range; expected the point", "from 0 to 0"});
   ExpectBad("1 1 1\n-1 0 2 3\n", {":2:1: '-1' is out of range", "from 0 to 0"});
   ExpectBad("1 1 1\n0 0 nan 3\n", {":2:5: 'nan' is not finite", "u of an observation"});
@@ -171,14 +171,16 @@ TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad(kBal.substr(0, kBal.size() - 4), {"the file ends here; expected a point"});
   std::string text = kBal;
   ExpectBad(text.replace(text.find("100"), 3, "-10"),
-            {":9:1: this focal length is not positive", "px above 0"});
+            {":9:1: the focal length is not positive", "px above 0"});
   ExpectBad(kBal + "5\n", {":15:1: more numbers than the file announces"});
   for (const char* magic : {"\x1F\x8B\x08", "BZh9",
                             "\xFD"
                             "7zXZ",
                             "\x28\xB5\x2F\xFD"})
-    ExpectBad(magic, {":1:1: compressed; expected the text: zcat, bzcat, xzcat or zstdcat FILE"});
-  ExpectBad(std::string("1 1 1\0", 6), {":1:1: bytes that are no text; expected a problem of BAL"});
+    ExpectBad(
+        magic,
+        {":1:1: the file is compressed; expected text, as from zcat, bzcat, xzcat or zstdcat"});
+  ExpectBad(std::string("1 1 1\0", 6), {":1:1: the file is not text; expected a problem of BAL"});
   ExpectBad("frame,feature,dim,value\n", {":1:1: columns with commas", "--camera FILE"});
 }
 
@@ -186,11 +188,11 @@ TEST_F(BundleFiles, RefusesBadBundler) {
   ExpectBad("# Bundle file v0.4\n1 1\n",
             {":1:1: '# Bundle file v0.4'; expected # Bundle file v0.3"});
   std::string text = kBundler;
-  ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are no rotation"});
+  ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are not a rotation"});
   text = kBundler;
   ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"this camera is not registered"});
   text = kBundler;
-  ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: this focal length is not positive"});
+  ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: the focal length is not positive"});
   text = kBundler;
   ExpectBad(text.replace(text.find("1 0 42"), 6, "1 2 42"),
             {"'2' is out of range; expected a camera"});
@@ -206,7 +208,7 @@ TEST_F(BundleFiles, RefusesBadLibmv) {
   bad[1] = 'N';
   ExpectBad(bad, {"byte 1: markers in normalised coordinates"});
   ExpectBad(good.substr(0, good.size() - 2), {"byte 128: the file ends before a marker"});
-  ExpectBad(good + "x", {"byte 130: bytes behind the last marker"});
+  ExpectBad(good + "x", {"byte 130: data after the last marker"});
   bad = good;
   bad[bad.size() - 16] = 8;
   ExpectBad(bad, {"byte 114: a marker in an image that has no camera"});

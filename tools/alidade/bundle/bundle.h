@@ -11,107 +11,107 @@
 #include "alidade/plugin/cpp_plugin.h"
 #include "alidade/plugin/plugin_host.h"
 
-/// Bundle adjustment: cameras and the points that they see, estimated together from the pixels.
+/// Bundle adjustment: joint estimation of cameras, intrinsics and points from pixels.
 ///
 ///   argmin  sum_i rho(|r_i|),   r_i = L^-1 (z_i (-) h(camera_i, point_i)),   R = L L'
 ///
-/// h is a sensor model: its roles `position`, `orientation`, where it has one `intrinsics`, and one
-/// more, the point. rho(d) = d^2 / 2, or the robust loss.
+/// h is a sensor model with the roles `position`, `orientation`, optionally `intrinsics`, and one
+/// more role, the point. rho(d) = d^2 / 2, or the robust loss.
 namespace alidade {
 
-/// Where a camera stands, and which intrinsics it has.
+/// Pose of a camera and the index of its intrinsics.
 struct BundleCamera {
   std::array<double, 3> position{};               ///< in the world
   std::array<double, 4> orientation{1, 0, 0, 0};  ///< world_from_cam, w x y z
   int intrinsics = 0;                             ///< index into BundleProblem::intrinsics
 };
 
-/// Camera `camera` sees point `point` at `z`, of which the sensor's measurement says the size.
+/// Measurement `z` of point `point` by camera `camera`. The sensor model determines the size of z.
 struct BundleObservation {
   int camera = 0, point = 0;
   std::array<double, 4> z{};
-  bool used = true;  ///< false: left out, see LeaveOutUndefined
+  bool used = true;  ///< false: excluded by ExcludeUndefined
 };
 
 struct BundleProblem {
-  /// The sensor as a config writes it, YAML: `model` and its parameters.
+  /// Sensor in YAML, as in a config: `model` and its parameters.
   std::string sensor;
   std::vector<BundleCamera> cameras;
-  std::vector<std::vector<double>> intrinsics;  ///< empty where the sensor has no such role
+  std::vector<std::vector<double>> intrinsics;  ///< empty if the sensor has no such role
   std::vector<std::array<double, 3>> points;    ///< in the world
   std::vector<BundleObservation> observations;
 };
 
-/// The scales of a robust loss that an adjustment accepts, in standard deviations. Below them all
-/// residuals lie beyond the scale and the gradient vanishes; above them none does.
+/// Bounds of the scale of a robust loss, in standard deviations. Below the lower bound all
+/// residuals exceed the scale and the gradient vanishes; above the upper bound no residual does.
 inline constexpr double kBundleLossScaleMin = 1e-3, kBundleLossScaleMax = 1e6;
 
 struct BundleOptions {
   int max_iterations = 500;
-  /// Converged where a step changes the cost by no more than this fraction. A change within the
-  /// rounding of the cost counts as none, whatever the tolerance.
+  /// The solution has converged if a step changes the cost by at most this fraction. A change
+  /// within the rounding error of the cost counts as no change, whatever the tolerance.
   double function_tolerance = 1e-8;
   RobustLoss loss;
-  std::vector<std::string> fixed;     ///< elements of the intrinsics, or `intrinsics`: all of them
-  std::function<bool()> stop;         ///< true: end after the iteration
-  std::function<void(int)> progress;  ///< iterations done
+  std::vector<std::string> fixed;     ///< constant elements of the intrinsics; `intrinsics`: all
+  std::function<bool()> stop;         ///< returns true to end after the current iteration
+  std::function<void(int)> progress;  ///< receives the number of completed iterations
 };
 
 enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
-/// `converged`, `out_of_iterations`, `stopped`, `failed`.
+/// Returns `converged`, `out_of_iterations`, `stopped` or `failed`.
 const char* ToString(BundleEnd end);
 
-/// What became of an adjustment.
+/// Result of a bundle adjustment.
 struct BundleResult {
   BundleEnd end = BundleEnd::kFailed;
   std::string message;  ///< of the solver
   int iterations = 0;   ///< steps tried
   double cost_before = 0.0, cost_after = 0.0;
   int residuals = 0;  ///< scalars
-  int unknowns = 0;   ///< tangent elements that were estimated, the constant first pose left out
-  /// Median distance from the first camera to the other cameras, or where these stand at one place
-  /// to the points, of those used; 0: there is none.
+  int unknowns = 0;   ///< estimated tangent elements, without the constant first pose
+  /// Median distance from the first used camera to the other used cameras. If these are all at one
+  /// position, the median distance to the used points. 0 if there are no distances.
   double extent_before = 0.0, extent_after = 0.0;
-  /// Of the Jacobian at the solution; -1: of more than kBundleRankUnknowns, or where that has no
-  /// finite one.
+  /// Rank of the Jacobian at the solution. -1 if it was not computed: more unknowns than
+  /// kBundleRankUnknowns, or a Jacobian that is not finite.
   int rank = -1;
 };
 inline constexpr int kBundleRankUnknowns = 600;
 
-/// Which of a sensor's roles is what.
+/// Indices of a camera's roles among the roles of its sensor model.
 struct BundleRoles {
   std::size_t position, orientation, point;
-  int intrinsics = -1;  ///< -1: it has none
+  int intrinsics = -1;  ///< -1: the sensor has no such role
 };
-/// Roles by their names; the point is the one that is called otherwise. Error: kInternal where a
-/// sensor is no camera, or measures other than 1 to 4 numbers.
+/// Finds the roles by name; the point is the role with any other name. Error: kInternal if the
+/// sensor is not a camera, or does not measure 1 to 4 numbers.
 BundleRoles RolesOf(const SensorModel& sensor);
-/// The values of an observation's roles, in the order of the sensor; they live in `problem`.
+/// Returns pointers into `problem` to the values of an observation's roles, in the sensor's order.
 std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,
-                                      const BundleObservation& seen);
+                                      const BundleObservation& observation);
 
-/// Whether each element of the intrinsics is fixed; empty where the sensor has no such role. Error:
-/// kUsage where `fixed` names another.
+/// Returns for each element of the intrinsics whether it is fixed; empty if the sensor has no such
+/// role. Error: kUsage if `fixed` names an unknown element.
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
 
-/// The sensor that `problem` names. Errors: kPlugin, kBadConfig.
+/// Creates the sensor of `problem`. Errors: kPlugin, kBadConfig.
 SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
-/// Leaves out, by BundleObservation::used, the observations for which the sensor is not defined at
-/// the problem's values (a point behind its camera; for a projective camera, in its plane), and
-/// those whose |z (-) h|^2 is not finite. Returns how many.
-int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
+/// Clears BundleObservation::used for observations whose h is undefined at the problem's values (a
+/// point behind its camera; for a projective camera, a point in the camera's plane), and for those
+/// whose |z (-) h|^2 is not finite. Returns the number of excluded observations.
+int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
 
-/// Errors of the observations used, all measured values alike:
+/// Computes the unweighted RMS reprojection error of the used observations:
 ///
 ///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n the number of observations
 ///
-/// in the unit of z, px; 0 where none is used.
+/// in the unit of z, px; 0 if no observation is used.
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
 inline constexpr const char* kBundleAdjusterKind = "bundle adjuster";
 
-/// The factory of a bundle adjustment: the adjustment itself.
+/// Factory that a bundle adjustment plugin exports: the adjustment function itself.
 struct BundleAdjusterEntry {
   BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
                          const BundleOptions& options);
@@ -120,20 +120,21 @@ constexpr CppEntry EntryOf(const BundleAdjusterEntry& adjuster) {
   return {kBundleAdjusterKind, "bundle", "", "", "", &adjuster};
 }
 
-/// Moves cameras, points and, but for what is fixed, intrinsics of `problem` to the minimum. The
-/// pose of the first camera that is used stays. If the sensor measures two numbers, which cannot
-/// determine the scale, cameras and points are scaled about the first camera after the solution, so
-/// that the extent (BundleResult) is that of the start. Done by the plugin of the Ceres solver,
-/// loaded when it is first asked for, from `folder`, or if that is "" from next to the library.
-/// Errors: kPlugin where there is none, kNotTrusted; kBadData where no observation is used; kUsage
-/// as FixedElements, and for a scale of the loss out of its bounds.
+/// Adjusts cameras, points and the free intrinsics of `problem` to minimise the cost. The pose of
+/// the first used camera is constant. Two measured numbers do not determine the scale: cameras and
+/// points are then scaled about the first camera after the solution, to restore the initial extent
+/// (BundleResult). The plugin of the Ceres solver computes the solution. It is loaded at the first
+/// use, from `folder`, or if that is "" from the folder of the library.
+/// Errors: kPlugin if the plugin is missing; kNotTrusted; kBadData if no observation is used;
+/// kUsage as FixedElements, and if the scale of the loss is out of bounds.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 
-/// What the observations used do not determine, in words, a line each: the gauge, parts that share
-/// no observation, points seen once, directions without any information.
-std::vector<std::string> Undetermined(const BundleProblem& problem, const SensorModel& sensor,
-                                      const BundleResult& result);
+/// Describes the quantities that the used observations do not determine, in one line each: the
+/// gauge, separate components, points observed once, directions without information.
+std::vector<std::string> DescribeUndetermined(const BundleProblem& problem,
+                                              const SensorModel& sensor,
+                                              const BundleResult& result);
 
 }  // namespace alidade
 

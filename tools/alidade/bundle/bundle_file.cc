@@ -13,9 +13,9 @@
 namespace alidade {
 namespace {
 
-[[noreturn]] void FailFormat(const std::string& name, const std::string& what,
+[[noreturn]] void FailFormat(const std::string& name, const std::string& problem,
                              const std::string& expected) {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, what, expected));
+  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, problem, expected));
 }
 
 bool IsLibmv(std::string_view bytes) {
@@ -23,22 +23,22 @@ bool IsLibmv(std::string_view bytes) {
          (bytes[1] == 'P' || bytes[1] == 'N');
 }
 
-/// Refuses what is no text.
-void RefuseBytes(const std::string& name, std::string_view beginning) {
+/// Throws kBadData if the file is compressed or binary.
+void RejectBinary(const std::string& name, std::string_view beginning) {
   constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
                                               "\xFD"
                                               "7zXZ",
                                               "\x28\xB5\x2F\xFD"};
   if (std::ranges::any_of(kCompressed, [&](auto magic) { return beginning.starts_with(magic); })) {
-    FailFormat(name, "compressed",
-               "the text: zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
+    FailFormat(name, "the file is compressed",
+               "text, as from zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
   }
   if (beginning.find('\0') != beginning.npos)
-    FailFormat(name, "bytes that are no text", "a problem of BAL, Bundler or libmv");
+    FailFormat(name, "the file is not text", "a problem of BAL, Bundler or libmv");
 }
 
-/// All of a file, of a pipe, or of standard input where it is `-`. Errors: kInputMissing, kIo for a
-/// read that fails, kStopped where a signal ends the wait for more.
+/// Reads a whole file or pipe, or standard input if `file` is `-`. Errors: kInputMissing; kIo if a
+/// read fails; kStopped if a signal ends the wait for data.
 std::string ReadAll(const std::filesystem::path& file) {
   const bool standard_input = file == "-";
   const Place place{standard_input ? "<stdin>" : file.string()};
@@ -50,11 +50,12 @@ std::string ReadAll(const std::filesystem::path& file) {
     const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
     throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
   };
-  const auto look = [&](std::string_view beginning) {
-    if (!IsLibmv(beginning)) RefuseBytes(place.file, beginning);
+  const auto check_beginning = [&](std::string_view beginning) {
+    if (!IsLibmv(beginning)) RejectBinary(place.file, beginning);
   };
-  return standard_input ? internal::ReadDescriptor(STDIN_FILENO, fail, std::string::npos, look)
-                        : internal::ReadFile(file, fail, std::string::npos, look);
+  return standard_input
+             ? internal::ReadDescriptor(STDIN_FILENO, fail, std::string::npos, check_beginning)
+             : internal::ReadFile(file, fail, std::string::npos, check_beginning);
 }
 
 }  // namespace
@@ -69,7 +70,7 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   const std::string text = ReadAll(file);
   const std::string_view view = text;
   if (view.find_first_not_of(" \t\r\n") == view.npos)
-    FailFormat(name, "nothing in it", "a problem");
+    FailFormat(name, "the file is empty", "a problem of BAL, Bundler or libmv");
   if (IsLibmv(view)) return internal::ReadLibmv(view, name);
   if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
   if (view.starts_with("# Bundle")) {
@@ -78,8 +79,8 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   }
   const std::size_t first = std::min(view.find('\n'), view.size());
   if (view.substr(0, first).find(',') != view.npos) {
-    FailFormat(name, "columns with commas: tracks",
-               "their calibration and start next to them, --camera FILE and --start FILE");
+    FailFormat(name, "columns with commas: tracks need a calibration and initial poses",
+               "--camera FILE and --start FILE");
   }
   return internal::ReadBal(view, name);
 }

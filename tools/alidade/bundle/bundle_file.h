@@ -11,47 +11,48 @@
 
 /// Files of bundle adjustment problems.
 ///
-///   format   what it is                                           camera looks along
+///   format   content                                              viewing direction
 ///   bal      text: counts, `camera point u v` each, then 9 numbers a camera (angle-axis and t of
 ///            cam_from_world, f, k1, k2), 3 a point                -z, y up
 ///   bundler  text: `# Bundle file v0.3`                           -z, y up
 ///   libmv    binary, of 32-bit numbers; one camera f, c, k, p for all                +z, y down
-///   tracks   `frame,feature,dim,value`; calibration and start from files of their own    +z
+///   tracks   `frame,feature,dim,value`; calibration and start in separate files          +z
 ///
-/// Whatever the file's, in the problem a camera looks along +z, y down, v grows downwards.
+/// In the problem, a camera always looks along +z with y down, and v grows downwards.
 namespace alidade {
 enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
-/// `bal`, `bundler`, `libmv`, `tracks`.
+/// Returns `bal`, `bundler`, `libmv` or `tracks`.
 const char* ToString(BundleFormat format);
 
-/// A problem, and what its file has besides, so that it can be written again.
+/// A problem and the other contents of its file, which are needed to write the file again.
 struct BundleFile {
   BundleFormat format = BundleFormat::kBal;
   BundleProblem problem;
 
-  /// A pose in the numbers of the file. They are written again where the camera has not moved.
+  /// A pose as the numbers of the file. They are written again if the camera has not moved.
   struct Pose {
     BundleCamera camera;
     std::vector<double> numbers;
     bool registered = true;  ///< false: bundler has no pose of this camera
   };
   std::vector<Pose> poses;
-  std::vector<std::string> colours;      ///< bundler: of the points
-  std::vector<std::int64_t> keys;        ///< bundler: of the observations
-  std::vector<std::int64_t> camera_ids;  ///< libmv, tracks: image, frame; else empty
-  std::vector<std::int64_t> point_ids;   ///< libmv, tracks: track, feature; else empty
-  std::vector<Timestamp> timestamps;     ///< tracks: of the cameras; else empty
-  int points_left_out = 0;               ///< tracks: without a place that their rays agree on
-  int frames_left_out = 0;               ///< tracks: frames without a pose
-  int unplaced = 0;  ///< tracks: observations of these points and frames, left out
-  int invalid = 0;   ///< tracks: observations that the sensor finds invalid, left out
+  std::vector<std::string> colours;      ///< bundler: colour of each point
+  std::vector<std::int64_t> keys;        ///< bundler: key of each observation
+  std::vector<std::int64_t> camera_ids;  ///< libmv: image; tracks: frame; else empty
+  std::vector<std::int64_t> point_ids;   ///< libmv: track; tracks: feature; else empty
+  std::vector<Timestamp> timestamps;     ///< tracks: timestamp of each camera; else empty
+  // Numbers of excluded items, for tracks only.
+  int points_left_out = 0;        ///< points that could not be triangulated
+  int frames_left_out = 0;        ///< frames without a pose
+  int unplaced_observations = 0;  ///< observations of these points and frames
+  int invalid_observations = 0;   ///< observations that the sensor model finds invalid
 };
 
-/// Reads a problem in the format that the file's beginning shows: bal, bundler or libmv; `-` is
-/// standard input. Errors: kInputMissing; kBadData with the place.
+/// Reads a problem. The beginning of the file determines the format: bal, bundler or libmv. `-` is
+/// standard input. Errors: kInputMissing; kBadData with the position in the file.
 BundleFile ReadBundle(const std::filesystem::path& file);
 
-/// What else a problem of tracks is made from.
+/// Input files of a problem of tracks.
 struct BundleTracks {
   std::filesystem::path tracks;  ///< `frame,feature,dim,value`
   std::filesystem::path camera;  ///< YAML with `camera`; a stereo pair has `camera.baseline_m`
@@ -59,15 +60,15 @@ struct BundleTracks {
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the
-/// timestamps of `timestamps.csv` next to the tracks, and a pose to 1 us; where it is not there, as
-/// from standard input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
-/// Points are placed by triangulation from the start, by the inverse measurement models of the
-/// sensor that `host` gives; those that it cannot place are left out. Errors: kInputMissing,
-/// kBadData, kBadConfig, kPlugin.
-BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host);
+/// timestamps of `timestamps.csv` in the folder of the tracks; a pose belongs to a frame if their
+/// times differ by at most 1 us. Without that file, or from standard input (`-`), pose k belongs to
+/// frame k. Frames without a pose are excluded. Points are triangulated from the initial poses by
+/// the inverse measurement model of the sensor, which `host` creates. Points that cannot be
+/// triangulated are excluded. Errors: kInputMissing, kBadData, kBadConfig, kPlugin.
+BundleFile ReadBundleTracks(const BundleTracks& sources, const PluginHost& host);
 
-/// The problem as a file of its own format; numbers in the shortest form that reads back (libmv: to
-/// the nearest 32-bit number). Not of tracks, which hold no poses.
+/// Returns the problem in its own file format. Numbers have the shortest form that reads back
+/// exactly (libmv: the nearest 32-bit number). Tracks are not supported: they contain no poses.
 std::string BundleText(const BundleFile& file);
 
 }  // namespace alidade

@@ -49,24 +49,24 @@ std::string PointsCsv(const BundleFile& file) {
   return text;
 }
 
-/// How much of what was read has no part in the solution.
-void AddLeftOut(const BundleFile& file, internal::Json& json) {
+/// Adds the numbers of items that were read but not used in the solution.
+void AddExclusions(const BundleFile& file, internal::Json& json) {
   const BundleProblem& problem = file.problem;
   std::vector<bool> camera_used(problem.cameras.size()), point_used(problem.points.size());
-  for (const BundleObservation& seen : problem.observations) {
-    if (!seen.used) continue;
-    camera_used[static_cast<std::size_t>(seen.camera)] = true;
-    point_used[static_cast<std::size_t>(seen.point)] = true;
+  for (const BundleObservation& observation : problem.observations) {
+    if (!observation.used) continue;
+    camera_used[static_cast<std::size_t>(observation.camera)] = true;
+    point_used[static_cast<std::size_t>(observation.point)] = true;
   }
   json["observations_undefined"] =
       std::ranges::count(problem.observations, false, &BundleObservation::used);
   json["cameras_unused"] = std::ranges::count(camera_used, false);
   json["points_unused"] = std::ranges::count(point_used, false);
   if (file.format != BundleFormat::kTracks) return;
-  json["observations_invalid"] = file.invalid;
+  json["observations_invalid"] = file.invalid_observations;
   json["frames_without_pose"] = file.frames_left_out;
   json["points_without_parallax"] = file.points_left_out;
-  json["observations_of_these"] = file.unplaced;
+  json["observations_of_these"] = file.unplaced_observations;
 }
 
 std::string ResultJson(const BundleFile& file, const BundleResult& result, double rms_before,
@@ -77,7 +77,7 @@ std::string ResultJson(const BundleFile& file, const BundleResult& result, doubl
                          {"cameras", file.problem.cameras.size()},
                          {"points", file.problem.points.size()},
                          {"observations", file.problem.observations.size()}};
-  AddLeftOut(file, json);
+  AddExclusions(file, json);
   json["rms_before_px"] = rms_before;
   json["rms_after_px"] = rms_after;
   json["cost_before"] = result.cost_before;

@@ -13,24 +13,24 @@ namespace internal {
 class OutputFolder;
 }
 
-/// The folder that a solution goes to.
+/// Output folder of a solution.
 ///
 ///   file         rows
-///   problem.EXT  the problem, adjusted, in its own format: .txt, .out or .bin; not of tracks
-///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera; not of
-///                cameras that are not registered
+///   problem.EXT  adjusted problem in its own format: .txt, .out or .bin; omitted for tracks
+///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera;
+///                registered cameras only
 ///   points.csv   point,x,y,z
-///   bundle.json  the result of AdjustBundle, and how much was left out of what was read
+///   bundle.json  result of AdjustBundle, and the numbers of excluded items
 ///
-/// It appears when all is written; one that is there is replaced where `force`. Made before the
-/// problem is solved, it tells in time what is in its way, and keeps others from its place.
+/// The folder appears when all files are written. `force` replaces an existing folder. The
+/// constructor reserves the path, so a conflict is reported before the problem is solved.
 class BundleFolder {
  public:
   /// Errors: kCannotCreate, kIo.
   BundleFolder(const std::filesystem::path& folder, bool force);
   ~BundleFolder();
 
-  /// Returns the names of the files; once. Errors: kCannotCreate, kIo.
+  /// Writes the files and returns their names. Call it once. Errors: kCannotCreate, kIo.
   std::vector<std::string> Save(const BundleFile& file, const BundleResult& result,
                                 double rms_before, double rms_after);
 

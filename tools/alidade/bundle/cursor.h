@@ -11,79 +11,82 @@
 
 namespace alidade::internal {
 
-/// Numbers between blanks and line ends, one after the other. Errors: kBadData with the place.
+/// Reader of numbers separated by white space. A parameter `quantity` names the expected value in
+/// error messages, as in `a focal length`. Errors: kBadData with the position in the file.
 class BundleCursor {
  public:
   BundleCursor(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
 
-  /// The next number; `what` says of what, as in `a focal length`.
-  double Number(const char* what) {
-    const std::string_view word = Word(what);
+  /// Reads the next number.
+  double Number(const char* quantity) {
+    const std::string_view word = Word(quantity);
     double value = 0.0;
-    const char* const wrong = cell::ParseNumber(word, value);
-    if (wrong != nullptr) FailWord(word, wrong, std::string(what) + ", a finite number");
+    const char* const problem = cell::ParseNumber(word, value);
+    if (problem != nullptr) FailWord(word, problem, std::string(quantity) + ", a finite number");
     return value;
   }
-  void Numbers(const char* what, std::size_t count, double* values) {
-    for (std::size_t i = 0; i < count; ++i) values[i] = Number(what);
+  void Numbers(const char* quantity, std::size_t count, double* values) {
+    for (std::size_t i = 0; i < count; ++i) values[i] = Number(quantity);
   }
-  /// A whole number in [0, limit).
-  int Index(const char* what, std::int64_t limit) {
-    const std::string_view word = Word(what);
+  /// Reads an integer in [0, limit).
+  int Index(const char* quantity, std::int64_t limit) {
+    const std::string_view word = Word(quantity);
     std::int64_t value = -1;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    const bool whole = error != std::errc::invalid_argument && end == word.data() + word.size();
-    if (!whole || error != std::errc() || value < 0 || value >= limit) {
-      FailWord(word, whole ? "is out of range" : "is not a whole number",
-               std::string(what) + ", from 0 to " + std::to_string(limit - 1));
+    const bool is_integer =
+        error != std::errc::invalid_argument && end == word.data() + word.size();
+    if (!is_integer || error != std::errc() || value < 0 || value >= limit) {
+      FailWord(word, is_integer ? "is out of range" : "is not a whole number",
+               std::string(quantity) + ", from 0 to " + std::to_string(limit - 1));
     }
     return static_cast<int>(value);
   }
-  /// The next word as it is.
-  std::string_view Word(const char* what) {
+  /// Reads the next word.
+  std::string_view Word(const char* quantity) {
     SkipBlanks();
-    if (at_ == text_.size()) Fail("the file ends here", what);
-    start_ = at_;
-    while (at_ < text_.size() && !IsBlank(text_[at_])) ++at_;
-    return text_.substr(start_, at_ - start_);
+    if (offset_ == text_.size()) Fail("the file ends here", quantity);
+    word_start_ = offset_;
+    while (offset_ < text_.size() && !IsBlank(text_[offset_])) ++offset_;
+    return text_.substr(word_start_, offset_ - word_start_);
   }
-  /// Fails unless there is nothing but blanks.
-  void ExpectEnd(const char* what) {
+  /// Fails if anything but white space follows.
+  void ExpectEnd(const char* quantity) {
     SkipBlanks();
-    start_ = at_;
-    if (at_ < text_.size()) Fail("more numbers than the file announces", what);
+    word_start_ = offset_;
+    if (offset_ < text_.size()) Fail("more numbers than the file announces", quantity);
   }
-  /// Leaves out the rest of the line.
+  /// Skips the remainder of the line.
   void SkipLine() {
-    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+    while (offset_ < text_.size() && text_[offset_] != '\n') ++offset_;
   }
-  /// At the word that was read last.
-  [[noreturn]] void Fail(const std::string& what, const std::string& expected) const {
-    const int column = static_cast<int>((at_ == text_.size() ? at_ : start_) - line_start_) + 1;
-    throw Error(ExitCode::kBadData, ErrorLine(Place{name_, line_, column}, {}, what, expected));
+  /// Reports an error at the word that was read last.
+  [[noreturn]] void Fail(const std::string& problem, const std::string& expected) const {
+    const int column =
+        static_cast<int>((offset_ == text_.size() ? offset_ : word_start_) - line_start_) + 1;
+    throw Error(ExitCode::kBadData, ErrorLine(Place{name_, line_, column}, {}, problem, expected));
   }
 
  private:
   static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
   void SkipBlanks() {
-    for (; at_ < text_.size() && IsBlank(text_[at_]); ++at_) {
-      if (text_[at_] != '\n') continue;
+    for (; offset_ < text_.size() && IsBlank(text_[offset_]); ++offset_) {
+      if (text_[offset_] != '\n') continue;
       ++line_;
-      line_start_ = at_ + 1;
+      line_start_ = offset_ + 1;
     }
-    start_ = at_;
+    word_start_ = offset_;
   }
-  [[noreturn]] void FailWord(std::string_view word, const char* wrong,
+  [[noreturn]] void FailWord(std::string_view word, const char* problem,
                              const std::string& expected) const {
-    const int column = static_cast<int>(start_ - line_start_) + 1;
+    const int column = static_cast<int>(word_start_ - line_start_) + 1;
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{name_, line_, column}, {},
-                          '\'' + cell::Harmless(word) + "' " + wrong, expected));
+                          '\'' + cell::Harmless(word) + "' " + problem, expected));
   }
 
   std::string_view text_;
   std::string name_;
-  std::size_t at_ = 0, start_ = 0, line_start_ = 0;
+  std::size_t offset_ = 0, word_start_ = 0, line_start_ = 0;
   int line_ = 1;
 };
 

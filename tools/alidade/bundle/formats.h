@@ -6,7 +6,7 @@
 
 #include "alidade/bundle/bundle_file.h"
 
-/// The formats one by one: `text` is the whole file, `name` the file in messages.
+/// Readers and writers of the formats. `text` is the whole file; `name` names it in messages.
 namespace alidade::internal {
 
 BundleFile ReadBal(std::string_view text, const std::string& name);
@@ -19,13 +19,13 @@ std::string LibmvBytes(const BundleFile& file);
 
 inline constexpr std::string_view kBundlerHeader = "# Bundle file v0.3";
 
-/// The camera that stands where x_cam = R(q) x_world + t. `looks_back`: x_cam has y up and looks
-/// along -z.
-BundleCamera CameraFrom(const double* q, const double* t, bool looks_back);
-/// q and t of a camera: the inverse.
-void CameraTo(const BundleCamera& camera, bool looks_back, double* q, double* t);
+/// Converts x_cam = R(q) x_world + t to a camera. `looks_back`: the camera frame of q and t has y
+/// up and the camera looks along -z.
+BundleCamera CameraFromTransform(const double* q, const double* t, bool looks_back);
+/// Computes q and t of a camera: the inverse of CameraFromTransform.
+void TransformFromCamera(const BundleCamera& camera, bool looks_back, double* q, double* t);
 
-/// The numbers of camera i in the file, where it stands as it was read; else null.
+/// Returns the numbers of camera i in the file if its pose has not changed since; else null.
 const double* UnmovedNumbers(const BundleFile& file, std::size_t i);
 
 }  // namespace alidade::internal

@@ -13,77 +13,80 @@ namespace {
 
 constexpr std::size_t kLens = 8;  // f, cx, cy, k1, k2, k3, p1, p2
 
-/// 32-bit numbers one after the other, of either byte order.
-class Bytes {
+/// Reader of 32-bit numbers in either byte order. A parameter `quantity` names the value in error
+/// messages.
+class BinaryReader {
  public:
-  Bytes(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {
+  BinaryReader(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {
     const bool little = bytes_[0] == 'v';
     swap_ = little != (std::endian::native == std::endian::little);
-    at_ = 2;
+    offset_ = 2;
   }
-  std::int32_t Integer(const char* what) { return std::bit_cast<std::int32_t>(Word(what)); }
-  double Number(const char* what) {
-    const float value = std::bit_cast<float>(Word(what));
-    if (!std::isfinite(value)) Fail(at_ - 4, std::string(what) + " is not finite");
+  std::int32_t Integer(const char* quantity) { return std::bit_cast<std::int32_t>(Word(quantity)); }
+  double Number(const char* quantity) {
+    const float value = std::bit_cast<float>(Word(quantity));
+    if (!std::isfinite(value)) Fail(offset_ - 4, std::string(quantity) + " is not finite");
     return value;
   }
-  void Numbers(const char* what, std::size_t count, double* values) {
-    for (std::size_t i = 0; i < count; ++i) values[i] = Number(what);
+  void Numbers(const char* quantity, std::size_t count, double* values) {
+    for (std::size_t i = 0; i < count; ++i) values[i] = Number(quantity);
   }
-  int Count(const char* what) {
-    const std::int32_t count = Integer(what);
-    if (count < 0) Fail(at_ - 4, std::string(what) + " is negative: " + std::to_string(count));
+  int Count(const char* quantity) {
+    const std::int32_t count = Integer(quantity);
+    if (count < 0)
+      Fail(offset_ - 4, std::string(quantity) + " is negative: " + std::to_string(count));
     return count;
   }
   void ExpectEnd() const {
-    if (at_ != bytes_.size()) Fail(at_, "bytes behind the last marker");
+    if (offset_ != bytes_.size()) Fail(offset_, "data after the last marker");
   }
-  std::size_t at() const { return at_; }
-  [[noreturn]] void Fail(std::size_t at, const std::string& what) const {
+  std::size_t offset() const { return offset_; }
+  [[noreturn]] void Fail(std::size_t offset, const std::string& problem) const {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{name_}, {}, "byte " + std::to_string(at) + ": " + what));
+                ErrorLine(Place{name_}, {}, "byte " + std::to_string(offset) + ": " + problem));
   }
 
  private:
-  std::uint32_t Word(const char* what) {
-    if (bytes_.size() - at_ < 4) Fail(bytes_.size(), std::string("the file ends before ") + what);
+  std::uint32_t Word(const char* quantity) {
+    if (bytes_.size() - offset_ < 4)
+      Fail(bytes_.size(), std::string("the file ends before ") + quantity);
     std::uint32_t word = 0;
-    std::memcpy(&word, bytes_.data() + at_, 4);
-    at_ += 4;
+    std::memcpy(&word, bytes_.data() + offset_, 4);
+    offset_ += 4;
     return swap_ ? __builtin_bswap32(word) : word;
   }
 
   std::string_view bytes_;
   std::string name_;
-  std::size_t at_ = 0;
+  std::size_t offset_ = 0;
   bool swap_ = false;
 };
 
-void ReadCamera(Bytes& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
-  const std::size_t at = bytes.at();
+void ReadCamera(BinaryReader& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
+  const std::size_t offset = bytes.offset();
   const std::int32_t image = bytes.Integer("the image of a camera");
   const auto number = static_cast<int>(file.problem.cameras.size());
   if (!index.emplace(image, number).second)
-    bytes.Fail(at, "a second camera of image " + std::to_string(image));
+    bytes.Fail(offset, "a second camera for image " + std::to_string(image));
   std::vector<double> pose(12);
   bytes.Numbers("rotation and translation of a camera", 12, pose.data());
   const Eigen::Map<const Eigen::Matrix3d> r(pose.data());  // column-major
   constexpr double kRounding = 1e-3;
   if (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0))
-    bytes.Fail(at + 4, "no rotation");
+    bytes.Fail(offset + 4, "the 9 numbers are not a rotation");
   const Eigen::Quaterniond q{Eigen::Matrix3d(r)};
   const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
-  file.problem.cameras.push_back(CameraFrom(wxyz, pose.data() + 9, false));
+  file.problem.cameras.push_back(CameraFromTransform(wxyz, pose.data() + 9, false));
   file.poses.push_back({file.problem.cameras.back(), pose});
   file.camera_ids.push_back(image);
 }
 
-void ReadPoint(Bytes& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
-  const std::size_t at = bytes.at();
+void ReadPoint(BinaryReader& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
+  const std::size_t offset = bytes.offset();
   const std::int32_t track = bytes.Integer("the track of a point");
   const auto number = static_cast<int>(file.problem.points.size());
   if (!index.emplace(track, number).second)
-    bytes.Fail(at, "a second point of track " + std::to_string(track));
+    bytes.Fail(offset, "a second point for track " + std::to_string(track));
   bytes.Numbers("a point", 3, file.problem.points.emplace_back().data());
   file.point_ids.push_back(track);
 }
@@ -105,7 +108,7 @@ void AppendFloats(std::string& bytes, const double* values, std::size_t count) {
 }  // namespace
 
 BundleFile ReadLibmv(std::string_view text, const std::string& name) {
-  Bytes bytes(text, name);
+  BinaryReader bytes(text, name);
   if (text[1] != 'P')
     bytes.Fail(1, "markers in normalised coordinates ('N'); expected markers in pixels ('P')");
   BundleFile file;
@@ -122,15 +125,15 @@ BundleFile ReadLibmv(std::string_view text, const std::string& name) {
   for (int i = 0; i < point_count; ++i) ReadPoint(bytes, file, points);
   const int marker_count = bytes.Count("the number of markers");
   for (int i = 0; i < marker_count; ++i) {
-    const std::size_t at = bytes.at();
+    const std::size_t offset = bytes.offset();
     const auto camera = cameras.find(bytes.Integer("the image of a marker"));
     const auto point = points.find(bytes.Integer("the track of a marker"));
-    if (camera == cameras.end()) bytes.Fail(at, "a marker in an image that has no camera");
-    if (point == points.end()) bytes.Fail(at + 4, "a marker of a track that has no point");
-    BundleObservation& seen = problem.observations.emplace_back();
-    seen.camera = camera->second;
-    seen.point = point->second;
-    bytes.Numbers("a marker", 2, seen.z.data());
+    if (camera == cameras.end()) bytes.Fail(offset, "a marker in an image that has no camera");
+    if (point == points.end()) bytes.Fail(offset + 4, "a marker of a track that has no point");
+    BundleObservation& observation = problem.observations.emplace_back();
+    observation.camera = camera->second;
+    observation.point = point->second;
+    bytes.Numbers("a marker", 2, observation.z.data());
   }
   bytes.ExpectEnd();
   return file;
@@ -147,7 +150,7 @@ std::string LibmvBytes(const BundleFile& file) {
     if (const double* const numbers = UnmovedNumbers(file, i)) {
       std::copy_n(numbers, 12, pose);
     } else {
-      CameraTo(problem.cameras[i], false, q, pose + 9);
+      TransformFromCamera(problem.cameras[i], false, q, pose + 9);
       Eigen::Map<Eigen::Matrix3d>{pose} =
           Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
     }
@@ -159,10 +162,10 @@ std::string LibmvBytes(const BundleFile& file) {
     AppendFloats(bytes, problem.points[i].data(), 3);
   }
   AppendInteger(bytes, std::ssize(problem.observations));
-  for (const BundleObservation& seen : problem.observations) {
-    AppendInteger(bytes, file.camera_ids[static_cast<std::size_t>(seen.camera)]);
-    AppendInteger(bytes, file.point_ids[static_cast<std::size_t>(seen.point)]);
-    AppendFloats(bytes, seen.z.data(), 2);
+  for (const BundleObservation& observation : problem.observations) {
+    AppendInteger(bytes, file.camera_ids[static_cast<std::size_t>(observation.camera)]);
+    AppendInteger(bytes, file.point_ids[static_cast<std::size_t>(observation.point)]);
+    AppendFloats(bytes, observation.z.data(), 2);
   }
   return bytes;
 }

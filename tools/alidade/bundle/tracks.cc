@@ -12,7 +12,8 @@
 namespace alidade {
 namespace {
 
-/// The next row behind a header `frame,...`, of `count` columns `names`; false at the end.
+/// Reads the next row of `count` columns `names`, after an optional header `frame,...`. Returns
+/// false at the end.
 bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
   const bool first = rows.line() == 0;
   if (!rows.Next() || (first && rows.text(0) == "frame" && !rows.Next())) return false;
@@ -20,12 +21,12 @@ bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
   return true;
 }
 
-/// What one frame sees of one feature: values by dim, and the lines that they stand in.
-struct Seen {
+/// Measurement of one feature in one frame: values by dim, and their line numbers in the file.
+struct TrackEntry {
   std::array<double, 4> z{};
-  std::array<int, 4> lines{};
+  std::array<int, 4> lines{};  ///< 0: no value
 };
-using Tracks = std::map<std::int64_t, std::map<std::int64_t, Seen>>;  // frame, feature
+using Tracks = std::map<std::int64_t, std::map<std::int64_t, TrackEntry>>;  // frame, feature
 
 Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
   Tracks tracks;
@@ -33,33 +34,34 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
   while (NextRow(rows, 4, "frame,feature,dim,value")) {
     const std::int64_t dim = rows.Index(2, "dim");
     if (dim > 3) rows.FailCell(2, "dim", "is unknown", "0 u, 1 v, 2 u_right, 3 v_right");
-    Seen& seen = tracks[rows.Index(0, "frame")][rows.Index(1, "feature")];
+    TrackEntry& entry = tracks[rows.Index(0, "frame")][rows.Index(1, "feature")];
     const auto d = static_cast<std::size_t>(dim);
-    if (seen.lines[d] != 0) {
-      rows.FailLine("the same frame, feature and dim as line " + std::to_string(seen.lines[d]),
-                    "each once");
+    if (entry.lines[d] != 0) {
+      rows.FailLine("the same frame, feature and dim as line " + std::to_string(entry.lines[d]),
+                    "one row each");
     }
-    seen.z[d] = rows.Number(3, "value");
-    seen.lines[d] = rows.line();
+    entry.z[d] = rows.Number(3, "value");
+    entry.lines[d] = rows.line();
     dims = std::max(dims, dim > 1 ? 4 : 2);
   }
   if (tracks.empty()) rows.FailLine("no rows", "frame,feature,dim,value");
   for (const auto& [frame, features] : tracks) {
-    for (const auto& [feature, seen] : features) {
+    for (const auto& [feature, entry] : features) {
       for (int d = 0; d < dims; ++d) {
-        if (seen.lines[static_cast<std::size_t>(d)] != 0) continue;
-        const Place place{rows.name(), *std::ranges::max_element(seen.lines)};
+        if (entry.lines[static_cast<std::size_t>(d)] != 0) continue;
+        const Place place{rows.name(), *std::ranges::max_element(entry.lines)};
         throw Error(ExitCode::kBadData,
                     ErrorLine(place, {},
                               "frame " + std::to_string(frame) + " has no dim " +
                                   std::to_string(d) + " of feature " + std::to_string(feature),
-                              "all of 0 to " + std::to_string(dims - 1)));
+                              "dims 0 to " + std::to_string(dims - 1)));
       }
     }
   }
   return tracks;
 }
 
+/// Initial poses.
 struct Start {
   std::vector<Timestamp> timestamps;
   std::vector<BundleCamera> cameras;
@@ -78,7 +80,7 @@ Start ReadStart(const std::filesystem::path& path) {
   return start;
 }
 
-/// Of each frame the index of its pose. `times` "": there are none.
+/// Finds the index of the pose of each frame. `times`: the file of timestamps, "" for none.
 std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& start,
                                             const std::filesystem::path& times) {
   std::map<std::int64_t, std::size_t> poses;
@@ -88,21 +90,22 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
     }
     return poses;
   }
-  std::map<Timestamp, std::size_t> at;
-  for (std::size_t i = 0; i < start.timestamps.size(); ++i) at.emplace(start.timestamps[i], i);
-  constexpr Timestamp kSame = 1000;  // ns
+  std::map<Timestamp, std::size_t> pose_at;
+  for (std::size_t i = 0; i < start.timestamps.size(); ++i) pose_at.emplace(start.timestamps[i], i);
+  constexpr Timestamp kTolerance = 1000;  // ns
   NumberRows rows(times, {}, {});
   while (NextRow(rows, 2, "frame,t_s")) {
     const Timestamp t = rows.Time(1, "t_s");
-    const auto found = at.lower_bound(t - kSame);
-    if (found != at.end() && found->first <= t + kSame)
+    const auto found = pose_at.lower_bound(t - kTolerance);
+    if (found != pose_at.end() && found->first <= t + kTolerance)
       poses[rows.Index(0, "frame")] = found->second;
   }
   if (rows.line() < 2) rows.FailLine("no rows", "frame,t_s");
   return poses;
 }
 
-/// A^+ of a symmetric A >= 0: eigenvalues up to `tolerance` of the largest count as zero.
+/// Computes A^+ of a symmetric A >= 0. Eigenvalues up to `tolerance` times the largest count as
+/// zero.
 Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
   const auto [values, vectors] = internal::EigenOf(a);
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
@@ -113,46 +116,48 @@ Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
   return inverse;
 }
 
-/// Where the points meet that the sensor tells of each observation: y, with J = dy/dz,
+/// Triangulates a point from the inverse measurement y of each observation, with J = dy/dz:
 ///
 ///   point = (sum W)^-1 sum W y,   W = (J J')^+
 ///
-/// so that one camera counts across its ray alone, and a pair the less along it the farther y is.
-/// None where all of this leaves a direction all but open: rays that are almost parallel.
-std::optional<std::array<double, 3>> Triangulate(const SensorModel& sensor,
-                                                 const BundleProblem& problem,
-                                                 const std::vector<BundleObservation>& seen) {
-  constexpr double kParallel = 1e-6;  // of the squared sine of an angle, 0.06 degrees
+/// A single camera contributes only across its ray. The weight of a stereo pair along the ray
+/// decreases with the distance of y. Returns nullopt if the rays are almost parallel.
+std::optional<std::array<double, 3>> Triangulate(
+    const SensorModel& sensor, const BundleProblem& problem,
+    const std::vector<BundleObservation>& observations) {
+  constexpr double kParallel = 1e-6;  // squared sine of an angle of 0.06 degrees
   constexpr double kAlongRay = 1e-12;
   const BundleRoles roles = RolesOf(sensor);
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> j(
       3, sensor.measurement().geometry.tangent);
-  for (const BundleObservation& one : seen) {
+  for (const BundleObservation& observation : observations) {
     std::vector<const double*> values(3);
-    const BundleCamera& camera = problem.cameras[static_cast<std::size_t>(one.camera)];
+    const BundleCamera& camera = problem.cameras[static_cast<std::size_t>(observation.camera)];
     values[roles.position] = camera.position.data();
     values[roles.orientation] = camera.orientation.data();
     Eigen::Vector3d y;
     const double prior = 1.0;
     const SensorModel::InverseOutput out{.y = y.data(), .jz = j.data()};
-    if (sensor.Initialise(values.data(), {one.z.data()}, &prior, out) != Status::kOk) continue;
+    if (sensor.Initialise(values.data(), {observation.z.data()}, &prior, out) != Status::kOk)
+      continue;
     const Eigen::Matrix3d w = PseudoInverse(j * j.transpose(), kAlongRay);
     a += w;
     b += w * y;
   }
-  const Eigen::VectorXd told = internal::EigenvaluesOf(a);
-  if (!(told[0] > kParallel * told[2])) return std::nullopt;
+  const Eigen::VectorXd eigenvalues = internal::EigenvaluesOf(a);
+  if (!(eigenvalues[0] > kParallel * eigenvalues[2])) return std::nullopt;
   std::array<double, 3> point;
   Eigen::Map<Eigen::Vector3d>{point.data()} = PseudoInverse(a, 0.0) * b;
   return point;
 }
 
-/// The sensor of tracks, checked while its file is known.
-SharedSensor TrackSensor(const BundleTracks& from, int dims, const PluginHost& host,
+/// Creates the sensor of tracks from the camera file, so that errors name that file. Sets `text` to
+/// its YAML.
+SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
-  Config config = Config::FromFile(from.camera);
+  Config config = Config::FromFile(sources.camera);
   const char* const model = dims == 4 ? "stereo_feature" : "inverse_depth_feature";
   config.Set("model", model, "bundle");
   const bool has_noise =
@@ -167,55 +172,55 @@ SharedSensor TrackSensor(const BundleTracks& from, int dims, const PluginHost& h
 
 }  // namespace
 
-BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
+BundleFile ReadBundleTracks(const BundleTracks& sources, const PluginHost& host) {
   BundleFile file;
   file.format = BundleFormat::kTracks;
   BundleProblem& problem = file.problem;
   int dims = 2;
-  const Tracks tracks = ReadTracks(from.tracks, dims);
-  const Start start = ReadStart(from.start);
+  const Tracks tracks = ReadTracks(sources.tracks, dims);
+  const Start start = ReadStart(sources.start);
   const auto poses = PosesOf(
-      tracks, start, from.tracks == "-" ? "" : from.tracks.parent_path() / "timestamps.csv");
-  const SharedSensor sensor = TrackSensor(from, dims, host, problem.sensor);
+      tracks, start, sources.tracks == "-" ? "" : sources.tracks.parent_path() / "timestamps.csv");
+  const SharedSensor sensor = TrackSensor(sources, dims, host, problem.sensor);
 
   std::map<std::int64_t, std::vector<BundleObservation>> features;
-  for (const auto& [frame, all] : tracks) {
+  for (const auto& [frame, entries] : tracks) {
     const auto pose = poses.find(frame);
     if (pose == poses.end()) {
       ++file.frames_left_out;
-      file.unplaced += static_cast<int>(all.size());
+      file.unplaced_observations += static_cast<int>(entries.size());
       continue;
     }
     const int camera = static_cast<int>(problem.cameras.size());
     problem.cameras.push_back(start.cameras[pose->second]);
     file.camera_ids.push_back(frame);
     file.timestamps.push_back(start.timestamps[pose->second]);
-    for (const auto& [feature, seen] : all) {
-      if (sensor->Valid({seen.z.data()}) == Status::kOk) {
-        features[feature].push_back({camera, 0, seen.z, true});
+    for (const auto& [feature, entry] : entries) {
+      if (sensor->Valid({entry.z.data()}) == Status::kOk) {
+        features[feature].push_back({camera, 0, entry.z, true});
       } else {
-        ++file.invalid;
+        ++file.invalid_observations;
       }
     }
   }
-  for (auto& [feature, seen] : features) {
-    const auto place = Triangulate(*sensor, problem, seen);
-    if (!place) {
+  for (auto& [feature, observations] : features) {
+    const auto point = Triangulate(*sensor, problem, observations);
+    if (!point) {
       ++file.points_left_out;
-      file.unplaced += static_cast<int>(seen.size());
+      file.unplaced_observations += static_cast<int>(observations.size());
       continue;
     }
-    for (BundleObservation& one : seen) {
-      one.point = static_cast<int>(problem.points.size());
-      problem.observations.push_back(one);
+    for (BundleObservation& observation : observations) {
+      observation.point = static_cast<int>(problem.points.size());
+      problem.observations.push_back(observation);
     }
-    problem.points.push_back(*place);
+    problem.points.push_back(*point);
     file.point_ids.push_back(feature);
   }
   if (problem.cameras.empty()) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{from.start.string()}, {}, "no pose at the time of any frame",
-                          "the times of timestamps.csv next to the tracks"));
+                ErrorLine(Place{sources.start.string()}, {}, "no pose has the time of a frame",
+                          "the times of timestamps.csv in the folder of the tracks"));
   }
   return file;
 }

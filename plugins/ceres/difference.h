@@ -13,7 +13,7 @@ template <class G>
 void Difference(const double* z, const double* h, double* d, double* j) {
   using Jet = alidade::Jet<double, G::kTangent>;
   Jet moved[G::kAmbient], difference[G::kTangent];
-  alidade::detail::LiftOne<G>(h, 0, moved);
+  alidade::detail::LiftBlock<G>(h, 0, moved);
   G::Minus(z, moved, difference);
   for (int i = 0; i < G::kTangent; ++i) {
     d[i] = difference[i].a;

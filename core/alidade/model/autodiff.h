@@ -9,21 +9,21 @@
 #include "alidade/model/model_members.h"
 #include "alidade/model/status.h"
 
-/// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
-/// through (+) and (-), or by the author's analytic Jacobian where there is one. Plugins, the
-/// static filter, costs of a batch and tests share it. Matrices are row-major with a row stride;
-/// outputs are untouched unless the result is kOk.
+/// Evaluates models and their Jacobians in the tangent. The Jacobians are the author's analytic
+/// ones if the model has them, else they come from forward-mode automatic differentiation through
+/// (+) and (-). Plugins, the static filter, costs of a batch and tests share this code. Matrices
+/// are row-major with a row stride. Outputs are untouched unless the result is kOk.
 
-/// Of a function whose loops are not vectorised: what a model has just written number by number
-/// would be read as vectors, which waits for the stores.
+/// Disables vectorised loops in a function. A model has just written its outputs as single numbers.
+/// Reading them as vectors would wait for those stores.
 #if defined(__GNUC__) && !defined(__clang__)
 #define ALIDADE_SCALAR_LOOPS __attribute__((optimize("no-tree-loop-vectorize")))
 #else
 #define ALIDADE_SCALAR_LOOPS
 #endif
 
-/// Of a function into which all that it calls is inlined, down to the arithmetic of the model. With
-/// the checks of a sanitizer in it, that would take minutes and gigabytes to compile.
+/// Inlines all callees into a function, down to the arithmetic of the model. Disabled under
+/// sanitizers: with their checks the compiler would need minutes and gigabytes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ALIDADE_FLATTEN
 #else
@@ -33,12 +33,12 @@
 namespace alidade {
 namespace detail {
 
-/// No block.
-constexpr bool None(int) { return false; }
+/// Skips no block.
+constexpr bool SkipNone(int) { return false; }
 
-/// x (+) d at d = 0 as dual numbers, d being the seeds from `seed` on.
+/// Computes x (+) d at d = 0 as dual numbers. The elements of d are the variables from `seed` on.
 template <class G, class Jet>
-void LiftOne(const double* x, int seed, Jet* lifted) {
+void LiftBlock(const double* x, int seed, Jet* lifted) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
     for (int k = 0; k < G::kTangent; ++k) lifted[k] = Jet(x[k], seed + k);
   } else if constexpr (G::kGeometry == ALIDADE_UNIT_QUATERNION) {  // x Exp(d) = x (1, d/2)
@@ -55,9 +55,9 @@ void LiftOne(const double* x, int seed, Jet* lifted) {
   }
 }
 
-/// All blocks x (+) 0 as dual numbers, seeded in order; those that kSkip names get neither value
-/// nor seed.
-template <class Model, bool (*kSkip)(int) = None, class Jet>
+/// Computes x (+) 0 of all blocks as dual numbers, seeded in order. A block for which kSkip is true
+/// is assigned neither a value nor a seed.
+template <class Model, bool (*kSkip)(int) = SkipNone, class Jet>
 void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   int seed = 0, offset = 0;
   const auto lift = [&](auto index) {
@@ -65,7 +65,7 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
     using G = SpaceAt<i, Model>;
     pointers[i] = nullptr;
     if (!kSkip(i) && x[i] != nullptr) {
-      LiftOne<G>(x[i], seed, lifted + offset);
+      LiftBlock<G>(x[i], seed, lifted + offset);
       pointers[i] = lifted + offset;
     }
     if (!kSkip(i)) seed += G::kTangent;
@@ -74,7 +74,7 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   ForEach(lift, typename Blocks<Model>::Indices{});
 }
 
-/// d value / d seeds [first, first + count), in the tangent of G at the value itself.
+/// Reads d value / d seeds [first, first + count), in the tangent of G at the value itself.
 template <class G, class Jet>
 void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
@@ -96,24 +96,25 @@ inline void Zero(MatrixRef m, int rows, int columns) {
   for (int r = 0; r < rows && columns > 0; ++r) std::fill_n(&m(r, 0), columns, 0.0);
 }
 
-inline void Copy(MatrixRef from, int rows, int columns, MatrixRef to) {
-  for (int r = 0; r < rows && columns > 0; ++r) std::copy_n(&from(r, 0), columns, &to(r, 0));
+inline void Copy(MatrixRef source, int rows, int columns, MatrixRef destination) {
+  for (int r = 0; r < rows && columns > 0; ++r)
+    std::copy_n(&source(r, 0), columns, &destination(r, 0));
 }
 
 template <int kColumns, std::size_t... I>
-void CopyUnrolled(MatrixRef from, MatrixRef to, std::index_sequence<I...>) {
-  ((to(I / kColumns, I % kColumns) = from(I / kColumns, I % kColumns)), ...);
+void CopyUnrolled(MatrixRef source, MatrixRef destination, std::index_sequence<I...>) {
+  ((destination(I / kColumns, I % kColumns) = source(I / kColumns, I % kColumns)), ...);
 }
 
-/// The same of a size known to the compiler, number by number where it is small: what has been
-/// written so is then never in memory. A load of two numbers at once cannot be forwarded from two
-/// stores of one: it waits until they have left the store buffer.
+/// Copies a matrix whose size is known to the compiler. A small one is copied number by number, so
+/// that it can stay in registers. A load of two numbers cannot be forwarded from two stores of one
+/// number: it waits until they have left the store buffer.
 template <int kRows, int kColumns>
-void CopyFixed(MatrixRef from, MatrixRef to) {
+void CopyFixed(MatrixRef source, MatrixRef destination) {
   if constexpr (kRows * kColumns <= 64) {
-    CopyUnrolled<kColumns>(from, to, std::make_index_sequence<kRows * kColumns>());
+    CopyUnrolled<kColumns>(source, destination, std::make_index_sequence<kRows * kColumns>());
   } else {
-    Copy(from, kRows, kColumns, to);
+    Copy(source, kRows, kColumns, destination);
   }
 }
 
@@ -124,7 +125,8 @@ bool CallPredict(const Model& model, const T* const* x, const double* known, T* 
   return WithRoles<Model>(predict, x, known, indices, z);
 }
 
-/// By way of a buffer, so that a Jacobian that throws leaves `jacobians` untouched.
+/// Computes analytic Jacobians in a buffer, so that a Jacobian that throws leaves `jacobians`
+/// untouched.
 template <class Model, std::size_t... I>
 void AnalyticJacobians(const Model& model, const double* const* x, const double* known,
                        double* const* jacobians, const int* strides,
@@ -153,9 +155,9 @@ void AnalyticJacobians(const Model& model, const double* const* x, const double*
 
 }  // namespace detail
 
-/// z = h(roles); where `jacobians` is not null, jacobians[i] = d z / d role_i. A null entry, or a
-/// role that is not bound, is skipped. `known`: the numbers that come with the measurement, of a
-/// model with such.
+/// Computes z = h(roles) and, unless `jacobians` is null, jacobians[i] = d z / d role_i. Null
+/// entries and unbound roles are skipped. `known`: numbers that come with the measurement, used
+/// only by a model with kKnown.
 template <class Model>
 Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
                 const int* strides, const double* known = nullptr) {
@@ -199,10 +201,10 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
 
 namespace detail {
 
-/// step(next). Static blocks go through a buffer, so that a step that fails or throws leaves
-/// `next` untouched; models with dynamic blocks see to that themselves.
+/// Calls step(next) and returns its result. Static blocks are buffered, so that a step that fails
+/// or throws leaves `next` untouched. Models with dynamic blocks ensure that themselves.
 template <class Model, class F>
-bool Buffered(double* const* next, const F& step) {
+bool CallBuffered(double* const* next, const F& step) {
   using Blocks = detail::Blocks<Model>;
   if constexpr (Blocks::kStatic) {
     constexpr typename Blocks::Indices indices{};
@@ -227,7 +229,7 @@ bool Buffered(double* const* next, const F& step) {
   }
 }
 
-/// Analytic F and G, buffered as `next` is.
+/// Computes F and G by the model's StepJacobian, buffered like `next`.
 template <class Model, std::size_t... I>
 void AnalyticStep(const Model& model, const double* const* x, const double* w, double dt_s,
                   MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
@@ -237,7 +239,7 @@ void AnalyticStep(const Model& model, const double* const* x, const double* w, d
     const MatrixRef f_new{f_buffer, n}, g_new{g_buffer, n_w};
     model.StepJacobian(x[I]..., w, dt_s, f_new, g_new);
     Copy(f_new, n, n, f);
-    Copy(g_new, n, NoiseSizeOf(model), g);  // a model may use less noise than it has room for
+    Copy(g_new, n, NoiseSizeOf(model), g);  // a model may use fewer noise elements than kNoise
   } else {
     const int n = TangentSizeOf(model);
     Zero(f, n, n);
@@ -246,20 +248,20 @@ void AnalyticStep(const Model& model, const double* const* x, const double* w, d
   }
 }
 
-/// x', F and G by dual numbers.
+/// Computes x', F and G by dual numbers.
 template <class Model>
 Status StepJets(const Model& model, const double* const* x, const double* u, const double* w,
                 double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
-  using All = Blocks<Model>;
-  constexpr typename All::Indices indices{};
-  using Jet = alidade::Jet<double, All::kTangent + Model::kNoise>;
-  Jet lifted[All::kAmbient], value[All::kAmbient];
+  using BlocksOfModel = Blocks<Model>;
+  constexpr typename BlocksOfModel::Indices indices{};
+  using Jet = alidade::Jet<double, BlocksOfModel::kTangent + Model::kNoise>;
+  Jet lifted[BlocksOfModel::kAmbient], value[BlocksOfModel::kAmbient];
   Jet lifted_w[Model::kNoise + 1], lifted_u[Model::Input::kAmbient + 1];
-  const Jet* block[All::kCount];
-  Jet* result[All::kCount];
+  const Jet* block[BlocksOfModel::kCount];
+  Jet* result[BlocksOfModel::kCount];
   Lift<Model>(x, lifted, block);
-  for (int i = 0; i < All::kCount; ++i) result[i] = value + (block[i] - lifted);
-  for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i], All::kTangent + i);
+  for (int i = 0; i < BlocksOfModel::kCount; ++i) result[i] = value + (block[i] - lifted);
+  for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i], BlocksOfModel::kTangent + i);
   for (int i = 0; i < Model::Input::kAmbient; ++i) lifted_u[i] = Jet(u[i]);
   const Jet *const_w = lifted_w, *const_u = lifted_u;
   if (!CallStep(model, block, const_u, const_w, dt_s, result, indices)) {
@@ -270,28 +272,28 @@ Status StepJets(const Model& model, const double* const* x, const double* u, con
     constexpr int i = decltype(index)::value;
     using B = SpaceAt<i, Model>;
     for (int k = 0; k < B::kAmbient; ++k) next[i][k] = result[i][k].a;
-    ReadTangent<B>(result[i], 0, All::kTangent, f.Row(row));
-    ReadTangent<B>(result[i], All::kTangent, Model::kNoise, g.Row(row));
+    ReadTangent<B>(result[i], 0, BlocksOfModel::kTangent, f.Row(row));
+    ReadTangent<B>(result[i], BlocksOfModel::kTangent, Model::kNoise, g.Row(row));
     row += B::kTangent;
   };
   ForEach(read, indices);
   return Status::kOk;
 }
 
-/// B by dual numbers.
+/// Computes B by dual numbers.
 template <class Model>
 Status InputJets(const Model& model, const double* const* x, const double* u, const double* w,
                  double dt_s, MatrixRef b) {
-  using All = Blocks<Model>;
+  using BlocksOfModel = Blocks<Model>;
   using U = typename Model::Input;
-  static_assert(All::kStatic && Model::kNoise != kDynamic,
+  static_assert(BlocksOfModel::kStatic && Model::kNoise != kDynamic,
                 "a model of dynamic size has no control input");
-  constexpr typename All::Indices indices{};
+  constexpr typename BlocksOfModel::Indices indices{};
   using Jet = alidade::Jet<double, U::kTangent>;
-  Jet lifted[All::kAmbient], value[All::kAmbient], lifted_w[Model::kNoise + 1];
+  Jet lifted[BlocksOfModel::kAmbient], value[BlocksOfModel::kAmbient], lifted_w[Model::kNoise + 1];
   Jet lifted_u[U::kAmbient];
-  const Jet* block[All::kCount];
-  Jet* result[All::kCount];
+  const Jet* block[BlocksOfModel::kCount];
+  Jet* result[BlocksOfModel::kCount];
   int offset = 0;
   const auto lift = [&](auto index) {
     constexpr int i = decltype(index)::value;
@@ -301,7 +303,7 @@ Status InputJets(const Model& model, const double* const* x, const double* u, co
   };
   ForEach(lift, indices);
   for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i]);
-  LiftOne<U>(u, 0, lifted_u);
+  LiftBlock<U>(u, 0, lifted_u);
   const Jet *const_w = lifted_w, *const_u = lifted_u;
   if (!CallStep(model, block, const_u, const_w, dt_s, result, indices)) {
     return Status::kOutOfDomain;
@@ -317,7 +319,7 @@ Status InputJets(const Model& model, const double* const* x, const double* u, co
   return Status::kOk;
 }
 
-/// Calls f(w) with zeros of the size of the model's noise.
+/// Calls f(w) with zeros that have the size of the model's noise.
 template <class Model, class F>
 Status WithZeroNoise(const Model& model, const F& f) {
   if constexpr (Model::kNoise == kDynamic) {
@@ -330,24 +332,24 @@ Status WithZeroNoise(const Model& model, const F& f) {
   }
 }
 
-/// Step for a `w` that is given.
+/// Computes a step for a non-null `w`.
 template <class Model>
 Status StepWithNoise(const Model& model, const double* const* x, const double* u, const double* w,
                      double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   constexpr typename Blocks<Model>::Indices indices{};
   if (!f && !g) {
-    const auto step = [&](double* const* to) {
-      return CallStep(model, x, u, w, dt_s, to, indices);
+    const auto step = [&](double* const* destination) {
+      return CallStep(model, x, u, w, dt_s, destination, indices);
     };
-    return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
+    return CallBuffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
   }
   if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
-    const auto step = [&](double* const* to) {
-      if (!CallStep(model, x, u, w, dt_s, to, indices)) return false;
+    const auto step = [&](double* const* destination) {
+      if (!CallStep(model, x, u, w, dt_s, destination, indices)) return false;
       AnalyticStep(model, x, w, dt_s, f, g, indices);
       return true;
     };
-    return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
+    return CallBuffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
   } else {
     return StepJets(model, x, u, w, dt_s, next, f, g);
   }
@@ -355,17 +357,17 @@ Status StepWithNoise(const Model& model, const double* const* x, const double* u
 
 }  // namespace detail
 
-/// x' = f(x, u, w, dt), F = d x' / d x (n x n), G = d x' / d w (n x n_w); w may be null (zero), F
-/// and G may be empty.
+/// Computes x' = f(x, u, w, dt), F = d x' / d x (n x n) and G = d x' / d w (n x n_w). w may be null
+/// (zero); F and G may be empty.
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   static_assert(detail::CheckMotionMembers<Model>());
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
-  std::vector<double> unwanted;  // where one of the two is asked for: rare
+  std::vector<double> unused;  // the caller rarely requests only F or only G
   if (static_cast<bool>(f) != static_cast<bool>(g) && n_w > 0) {
-    unwanted.resize(static_cast<std::size_t>(n) * std::max(n, n_w));
-    (f ? g : f) = MatrixRef{unwanted.data(), f ? n_w : n};
+    unused.resize(static_cast<std::size_t>(n) * std::max(n, n_w));
+    (f ? g : f) = MatrixRef{unused.data(), f ? n_w : n};
   }
   const auto step = [&](const double* noise) {
     return detail::StepWithNoise(model, x, u, noise, dt_s, next, f, n_w > 0 ? g : MatrixRef{});
@@ -373,23 +375,23 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
   return w != nullptr ? step(w) : detail::WithZeroNoise(model, step);
 }
 
-/// The same with B = d x' / d u (n x n_u), of a model with a control input.
+/// Also computes B = d x' / d u (n x n_u) of a model with a control input.
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g, MatrixRef b) {
   constexpr int n_u = Model::Input::kTangent;
   const int n = detail::TangentSizeOf(model);
-  std::vector<double> by_input(static_cast<std::size_t>(n) * n_u);
-  const MatrixRef fresh{by_input.data(), n_u};
+  std::vector<double> buffer(static_cast<std::size_t>(n) * n_u);
+  const MatrixRef new_b{buffer.data(), n_u};
   const auto differentiate = [&](const double* noise) {
-    return detail::InputJets(model, x, u, noise, dt_s, fresh);
+    return detail::InputJets(model, x, u, noise, dt_s, new_b);
   };
   const Status status =
       w != nullptr ? differentiate(w) : detail::WithZeroNoise(model, differentiate);
   if (status != Status::kOk) return status;
-  const Status stepped = Step(model, x, u, w, dt_s, next, f, g);
-  if (stepped == Status::kOk) detail::Copy(fresh, n, n_u, b);
-  return stepped;
+  const Status step_status = Step(model, x, u, w, dt_s, next, f, g);
+  if (step_status == Status::kOk) detail::Copy(new_b, n, n_u, b);
+  return step_status;
 }
 
 }  // namespace alidade

@@ -3,13 +3,13 @@
 
 #include "alidade/model/autodiff.h"
 
-/// Inverse measurement models with their Jacobians, as autodiff.h has models.
+/// Evaluates inverse measurement models and their Jacobians.
 namespace alidade {
 namespace detail {
 
 /// Sizes of y, the roles that Initialise computes.
 template <class Model>
-struct Initialised {
+struct InitialisedSizes {
   static constexpr int Sum(bool ambient) {
     int sum = 0, i = 0;
     const auto add = [&](int a, int t) {
@@ -25,7 +25,7 @@ struct Initialised {
   static constexpr int kAmbient = Sum(true), kTangent = Sum(false);
 };
 
-/// Index of the k-th role that Initialise does not compute.
+/// Returns the index of the k-th role that Initialise does not compute.
 template <class Model>
 constexpr std::size_t OtherRole(std::size_t k) {
   std::size_t i = 0;
@@ -38,17 +38,17 @@ constexpr std::size_t OtherRole(std::size_t k) {
 template <class Model, class T, std::size_t... I>
 bool CallInitialise(const Model& model, const T* const* x, const double* known, const T* z,
                     const T* prior, T* y, std::index_sequence<I...>) {
-  constexpr std::index_sequence<OtherRole<Model>(I)...> others{};
+  constexpr std::index_sequence<OtherRole<Model>(I)...> other_roles{};
   const auto initialise = [&](auto... arguments) { return model.Initialise(arguments...); };
   if constexpr (Model::kPrior > 0) {
-    return WithRoles<Model>(initialise, x, known, others, z, prior, y);
+    return WithRoles<Model>(initialise, x, known, other_roles, z, prior, y);
   } else {
     static_cast<void>(prior);
-    return WithRoles<Model>(initialise, x, known, others, z, y);
+    return WithRoles<Model>(initialise, x, known, other_roles, z, y);
   }
 }
 
-/// d y / d seeds [first, first + count), role by role.
+/// Reads d y / d seeds [first, first + count), role by role.
 template <class Model, class Jet>
 void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
   int offset = 0, row = 0;
@@ -65,18 +65,18 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 
 }  // namespace detail
 
-/// y, the role Model::kInitialises (of a landmark: its roles one after the other), from the other
-/// roles, z and prior (inverse measurement model), with Jacobians jx[i] = d y / d role_i, jz = d y
-/// / d z, jp = d y / d prior; each may be null. kInvalid where the model needs a prior and has
-/// none. `known` as Evaluate has it.
+/// Computes y from the other roles, z and prior (inverse measurement model), with the Jacobians
+/// jx[i] = d y / d role_i, jz = d y / d z and jp = d y / d prior, each of which may be null. y is
+/// the role Model::kInitialises; for a landmark, y is its roles one after the other. Returns
+/// kInvalid if the model needs a prior and `prior` is null. `known`: see Evaluate.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,
                       MatrixRef jz, MatrixRef jp, const double* known = nullptr) {
   using Z = typename Model::Measurement;
-  using Y = detail::Initialised<Model>;
+  using Y = detail::InitialisedSizes<Model>;
   using Blocks = detail::Blocks<Model>;
-  constexpr std::make_index_sequence<detail::OtherCount<Model>()> others{};
+  constexpr std::make_index_sequence<detail::OtherCount<Model>()> other_roles{};
   constexpr int kRoles = Blocks::kTangent - Y::kTangent;
   using Jet = alidade::Jet<double, kRoles + Z::kTangent + Model::kPrior>;
   if (Model::kPrior > 0 && prior == nullptr) return Status::kInvalid;
@@ -90,7 +90,7 @@ Status InitialiseRole(const Model& model, const double* const* roles, const doub
     lifted_prior[i] = Jet(prior[i], kRoles + Z::kTangent + i);
   }
   const Jet *const_z = lifted_z, *const_prior = lifted_prior;
-  if (!detail::CallInitialise(model, x, known, const_z, const_prior, value, others)) {
+  if (!detail::CallInitialise(model, x, known, const_z, const_prior, value, other_roles)) {
     return Status::kOutOfDomain;
   }
   for (int i = 0; i < Y::kAmbient; ++i) y[i] = value[i].a;

@@ -6,16 +6,17 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// What a binary says of how it was built, readable from its file without opening it as a library.
+/// Build tag of a binary: how it was built. It can be read from the file without loading the
+/// library.
 namespace alidade::detail {
 
 template <std::size_t N>
-constexpr void CopyText(const char* text, char (&to)[N]) {
-  for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) to[i] = text[i];
+constexpr void CopyText(const char* text, char (&destination)[N]) {
+  for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) destination[i] = text[i];
 }
 
-/// ALIDADE_ISA_* of all that the compiler may use by itself in this translation unit, as far as
-/// registers of 256 bits.
+/// Returns ALIDADE_ISA_* of the instruction sets that the compiler may use by itself in this
+/// translation unit, with registers of up to 256 bits.
 constexpr std::uint32_t InstructionSetsTo256() {
   std::uint32_t isa = 0;
 #if defined(__SSE3__)
@@ -60,7 +61,7 @@ constexpr std::uint32_t InstructionSetsTo256() {
   return isa;
 }
 
-/// The rest of them.
+/// Returns ALIDADE_ISA_* of the remaining instruction sets.
 constexpr std::uint32_t InstructionSetsBeyond256() {
   std::uint32_t isa = 0;
 #if defined(__AVX512F__)
@@ -129,7 +130,7 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
   return f;
 }
 
-/// The names of a plugin's entries, each with the zero that ends it.
+/// Names of a plugin's entries, each followed by a zero.
 template <std::size_t kSize>
 struct EntryNames {
   char text[kSize] = {};
@@ -138,7 +139,7 @@ template <class Entry, std::size_t N>
 constexpr std::size_t SizeOfNames(const Entry (&entries)[N]) {
   std::size_t size = 0;
   for (const Entry& entry : entries) {
-    for (const char* at = entry.name; *at != '\0'; ++at) ++size;
+    for (const char* character = entry.name; *character != '\0'; ++character) ++size;
     ++size;
   }
   return size;
@@ -148,7 +149,8 @@ constexpr EntryNames<kSize> NamesOf(const Entry (&entries)[N]) {
   EntryNames<kSize> names;
   std::size_t size = 0;
   for (const Entry& entry : entries) {
-    for (const char* at = entry.name; *at != '\0'; ++at) names.text[size++] = *at;
+    for (const char* character = entry.name; *character != '\0'; ++character)
+      names.text[size++] = *character;
     ++size;
   }
   return names;
@@ -170,7 +172,8 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
 
 }  // namespace alidade::detail
 
-/// Lays the build tag into its section: `kind` ALIDADE_PLUGIN_*, `build` to equal the host's.
+/// Defines the build tag in its section. `kind`: ALIDADE_PLUGIN_*; `build`: text that must equal
+/// the host's.
 #define ALIDADE_BUILD_TAG(kind, build)                                                    \
   extern "C" {                                                                            \
   __attribute__((section(ALIDADE_BUILD_TAG_SECTION), used,                                \
@@ -178,7 +181,7 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
       alidade::detail::MakeBuildTag(kind, build);                                         \
   }
 
-/// Lays the names of `entries`, a constexpr array of them, into their section.
+/// Defines the names of `entries`, a constexpr array, in their section.
 #define ALIDADE_ENTRY_NAMES(entries)                                                          \
   __attribute__((section(ALIDADE_NAMES_SECTION), used)) static constexpr auto alidade_names = \
       alidade::detail::NamesOf<alidade::detail::SizeOfNames(entries)>(entries);

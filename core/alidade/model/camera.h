@@ -7,8 +7,8 @@
 #include "alidade/model/params.h"
 #include "alidade/model/radial_polynomial.h"
 
-/// How cameras map rays to pixels and back. Scalars are templates: double or a dual number, which
-/// then carries derivatives also through what is solved by iteration.
+/// Camera models: they map rays to pixels and back. The scalar is a template parameter, double or a
+/// dual number. Derivatives are also correct for equations that are solved by iteration.
 namespace alidade {
 
 /// Projections. All but the pinhole have radial coefficients k.
@@ -33,13 +33,12 @@ enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 ///                                     photogrammetric k1, k2
 ///   p1, p2        1      -     -      tangential: radtan
 ///
-/// radtan and equidistant are those of OpenCV and Kalibr. photogrammetric is the 2-parameter form
-/// of MonoSLAM, whose closed form is the other way round: from the image to the ray. There k1 is
-/// often given per mm^2 of the sensor; times the squared focal length in mm it is the one here (k2:
-/// times its fourth power).
+/// radtan and equidistant agree with OpenCV and Kalibr. photogrammetric is the 2-parameter model of
+/// MonoSLAM, whose closed form is the inverse: from the image to the ray. Its k1 is often stated
+/// per mm^2 of the sensor. Multiply it by the squared focal length in mm (k2: by the fourth power).
 ///
 /// Defined for  hz > 0 (equidistant: h not on the negative z axis), within the radius up to which
-///              the distortion grows, so that the lens maps no two rays to one pixel.
+///              the distorted radius increases, so that no two rays share a pixel.
 /// Source       [Brown1971], [Kannala2006]; photogrammetric [Civera2008].
 struct Camera {
   CameraModel model;
@@ -58,14 +57,14 @@ struct Camera {
         fy(focal_y),
         cx(centre_x),
         cy(centre_y),
-        radial(k, type == CameraModel::kEquidistant ? kPi * kPi : kWidest),
+        radial(k, type == CameraModel::kEquidistant ? kPi * kPi : kMaxSquaredRadius),
         p(tangential) {}
   explicit Camera(Params& params)
       : Camera(params, static_cast<CameraModel>(params.Choice(
                            "camera.model", {"pinhole", "radtan", "equidistant", "photogrammetric"},
                            "projection and lens distortion", 0))) {}
 
-  /// z = (u, v) of h; false where h is out of the domain.
+  /// Computes the pixel z = (u, v) of h. Returns false if h is out of the domain.
   template <class T>
   bool Project(const T* h, T* z) const {
     T x[2];
@@ -80,7 +79,8 @@ struct Camera {
     z[1] = cy + fy * x[1];
     return true;
   }
-  /// h that is seen at z = (u, v), of some positive length; false where there is none.
+  /// Computes a vector h, of any positive length, that is seen at z = (u, v). Returns false if no
+  /// such vector exists.
   template <class T>
   bool Unproject(const T* z, T* h) const {
     const T x[2] = {(z[0] - cx) / fx, (z[1] - cy) / fy};
@@ -88,15 +88,15 @@ struct Camera {
     h[2] = T(1.0);
     return Undistort(x, h);
   }
-  /// Whether z = (u, v) lies on the image.
+  /// Returns true if z = (u, v) lies on the image.
   bool Contains(const double* z) const {
     return z[0] >= -0.5 && z[0] <= width - 0.5 && z[1] >= -0.5 && z[1] <= height - 0.5;
   }
 
  private:
   static constexpr double kPi = 3.14159265358979323846;
-  static constexpr double kWidest = 1e4;  ///< of x0^2 + y0^2: 89.4 degrees
-  static constexpr double kSmall = 1e-6;  ///< of a squared angle, below which series are exact
+  static constexpr double kMaxSquaredRadius = 1e4;    ///< of x0^2 + y0^2: 89.4 degrees
+  static constexpr double kSmallSquaredAngle = 1e-6;  ///< rad^2; below, the series are exact
 
   Camera(Params& params, CameraModel type)
       : Camera(params.Integer("camera.width", "image width in px", 1, 1 << 20),
@@ -140,9 +140,9 @@ struct Camera {
   bool Undistort(const T* x, T* x0) const {
     if (model == CameraModel::kRadtan) return UndistortRadtan(x, x0);
     const T q = x[0] * x[0] + x[1] * x[1];
-    const bool lens = model == CameraModel::kPhotogrammetric;
-    if (lens && !(detail::ValueOf(q) <= radial.q_max)) return false;
-    for (int i = 0; i < 2; ++i) x0[i] = lens ? T(x[i] * radial.Factor(q)) : x[i];
+    const bool has_lens = model == CameraModel::kPhotogrammetric;
+    if (has_lens && !(detail::ValueOf(q) <= radial.q_max)) return false;
+    for (int i = 0; i < 2; ++i) x0[i] = has_lens ? T(x[i] * radial.Factor(q)) : x[i];
     return true;
   }
   template <class T>
@@ -154,44 +154,47 @@ struct Camera {
     x[1] = x0[1] * s + p[0] * (q + 2.0 * x0[1] * x0[1]) + 2.0 * p[1] * xy;
     return true;
   }
-  /// Newton from the solution without tangential part, the last step with the derivatives of x.
+  /// Solves by Newton's method, from the solution without tangential distortion. The last step adds
+  /// the derivatives of x.
   template <class T>
   bool UndistortRadtan(const T* x, T* x0) const {
-    const double wanted[2] = {detail::ValueOf(x[0]), detail::ValueOf(x[1])};
-    double q, at[2], now[2];
-    if (!radial.Invert(wanted[0] * wanted[0] + wanted[1] * wanted[1], &q)) return false;
-    for (int i = 0; i < 2; ++i) at[i] = wanted[i] / radial.Factor(q);
-    constexpr int kSteps = 20;  // it takes about 5
+    const double target[2] = {detail::ValueOf(x[0]), detail::ValueOf(x[1])};
+    double q, solution[2], distorted[2];
+    if (!radial.Invert(target[0] * target[0] + target[1] * target[1], &q)) return false;
+    for (int i = 0; i < 2; ++i) solution[i] = target[i] / radial.Factor(q);
+    constexpr int kSteps = 20;  // about 5 suffice
     for (int k = 0; k < kSteps; ++k) {
-      if (!DistortRadtan(at, now)) return false;
-      SolveRadtan(at, wanted, now, at);
+      if (!DistortRadtan(solution, distorted)) return false;
+      SolveRadtan(solution, target, distorted, solution);
     }
     constexpr double kRounding = 1e-12;
-    if (!DistortRadtan(at, now)) return false;
-    if (!(std::hypot(wanted[0] - now[0], wanted[1] - now[1]) < kRounding)) return false;
-    SolveRadtan(at, x, now, x0);
+    if (!DistortRadtan(solution, distorted)) return false;
+    if (!(std::hypot(target[0] - distorted[0], target[1] - distorted[1]) < kRounding)) return false;
+    SolveRadtan(solution, x, distorted, x0);
     return true;
   }
-  /// to = at + J^-1 (wanted - now), J the Jacobian of DistortRadtan at `at`.
+  /// Computes next = solution + J^-1 (target - distorted), one Newton step. J is the Jacobian of
+  /// DistortRadtan at `solution`.
   template <class T>
-  void SolveRadtan(const double* at, const T* wanted, const double* now, T* to) const {
-    const double x = at[0], y = at[1], q = x * x + y * y;
+  void SolveRadtan(const double* solution, const T* target, const double* distorted,
+                   T* next) const {
+    const double x = solution[0], y = solution[1], q = x * x + y * y;
     const double s = radial.Factor(q), ds = radial.FactorSlope(q);
     const double a = s + 2.0 * x * x * ds + 2.0 * p[0] * y + 6.0 * p[1] * x;
     const double b = 2.0 * x * y * ds + 2.0 * p[0] * x + 2.0 * p[1] * y;
     const double d = s + 2.0 * y * y * ds + 6.0 * p[0] * y + 2.0 * p[1] * x;
     const double determinant = a * d - b * b;
-    const T left[2] = {wanted[0] - now[0], wanted[1] - now[1]};
-    to[0] = x + (d * left[0] - b * left[1]) / determinant;
-    to[1] = y + (a * left[1] - b * left[0]) / determinant;
+    const T residual[2] = {target[0] - distorted[0], target[1] - distorted[1]};
+    next[0] = x + (d * residual[0] - b * residual[1]) / determinant;
+    next[1] = y + (a * residual[1] - b * residual[0]) / determinant;
   }
   template <class T>
   bool FromAngle(const T* h, T* x) const {
     using std::atan2;
     using std::sqrt;
     const T r2 = h[0] * h[0] + h[1] * h[1];
-    T scale;  // t / r
-    if (h[2] > T(0.0) && r2 < kSmall * h[2] * h[2]) {
+    T scale;  // t / r of the equidistant model
+    if (h[2] > T(0.0) && r2 < kSmallSquaredAngle * h[2] * h[2]) {
       const T tan2 = r2 / (h[2] * h[2]);
       scale = (1.0 - tan2 * (1.0 / 3.0 - tan2 / 5.0)) / h[2];
     } else {
@@ -213,7 +216,7 @@ struct Camera {
     if (!radial.Invert(T(x[0] * x[0] + x[1] * x[1]), &q)) return false;
     T sine = 1.0 - q / 6.0 * (1.0 - q / 20.0);  // sin t / t
     h[2] = 1.0 - q / 2.0 * (1.0 - q / 12.0);
-    if (q > T(kSmall)) {
+    if (q > T(kSmallSquaredAngle)) {
       const T t = sqrt(q);
       sine = sin(t) / t;
       h[2] = cos(t);

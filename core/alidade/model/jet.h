@@ -7,15 +7,15 @@
 
 namespace alidade {
 
-/// Dual number: a value with its derivatives with respect to N variables. Models are templates of
-/// the scalar, so a model that is called with dual numbers differentiates itself.
+/// Dual number: a value with its derivatives with respect to N variables. A model is a template of
+/// the scalar, so a call with dual numbers also returns its derivatives.
 ///
 ///   f(x)     = (f(a), f'(a) v)                          a: value, v: derivatives
 ///   f(x, y)  = (f(a_x, a_y), df/da_x v_x + df/da_y v_y)
 ///
-/// A constant becomes a dual number by itself, with derivatives of zero. Comparisons, isfinite,
-/// isnan and isinf look at the value alone. Functions are found by their argument, as in
-/// `using std::sin; sin(x)`. Eigen's matrices may have such elements. If a function has no finite
+/// A constant converts implicitly to a dual number with derivatives of zero. Comparisons, isfinite,
+/// isnan and isinf use only the value. Call functions by argument-dependent lookup, as in
+/// `using std::sin; sin(x)`. Eigen matrices may have such elements. If a function has no finite
 /// slope, as sqrt, hypot and atan2 at 0 and asin at 1, the derivatives are infinite or NaN.
 template <class T, int N>
 struct Jet {
@@ -26,7 +26,7 @@ struct Jet {
 
   constexpr Jet() = default;
   constexpr Jet(const T& value) : a(value) {}  // NOLINT(google-explicit-constructor): a constant
-  /// The k-th variable.
+  /// Constructs the k-th variable.
   constexpr Jet(const T& value, int k) : a(value) { v[k] = T(1); }
 
   constexpr Jet& operator+=(const Jet& y) { return *this = *this + y; }
@@ -91,8 +91,8 @@ struct Jet {
   friend Jet pow(const Jet& x, const Jet& p) {
     if (p.IsConstant()) return pow(x, p.a);  // defined for x < 0 as well
     const T f = std::pow(x.a, p.a);
-    const T by_exponent = f == T(0) ? T(0) : f * std::log(x.a);
-    return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, by_exponent, p);
+    const T exponent_slope = f == T(0) ? T(0) : f * std::log(x.a);
+    return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, exponent_slope, p);
   }
 
   friend Jet exp(const Jet& x) {
@@ -136,7 +136,7 @@ struct Jet {
     return Chain(f, T(1) - f * f, x);
   }
 
-  // Piecewise, with the derivative of the piece that holds the value.
+  // Piecewise functions: the derivative is that of the piece which contains the value.
   friend Jet abs(const Jet& x) { return std::signbit(x.a) ? -x : x; }
   friend Jet fabs(const Jet& x) { return abs(x); }
   friend Jet copysign(const Jet& x, const Jet& y) {
@@ -161,7 +161,7 @@ struct Jet {
     }
     return true;
   }
-  /// The chain rule: a value with the derivatives dx v_x, or dx v_x + dy v_y.
+  /// Applies the chain rule: returns a value with the derivatives dx v_x, or dx v_x + dy v_y.
   static constexpr Jet Chain(const T& value, const T& dx, const Jet& x) {
     Jet f(value);
     for (int i = 0; i < N; ++i) f.v[i] = dx * x.v[i];
@@ -176,11 +176,11 @@ struct Jet {
 
 }  // namespace alidade
 
-/// The limits of the value.
+/// Limits of the value.
 template <class T, int N>
 class std::numeric_limits<alidade::Jet<T, N>> : public std::numeric_limits<T> {};
 
-// Eigen's view of a dual number, for models that write their formulas with Eigen's matrices.
+// Traits of a dual number, for models that use Eigen matrices.
 // NOLINTBEGIN(readability-identifier-naming): the names are Eigen's
 namespace Eigen {
 
@@ -211,7 +211,7 @@ struct NumTraits<alidade::Jet<T, N>> {
   static constexpr int digits10() { return std::numeric_limits<T>::digits10; }
 };
 
-/// Matrices of dual numbers and numbers may be multiplied with each other.
+/// Allows products of matrices of dual numbers and matrices of numbers.
 template <class T, int N, class Operation>
 struct ScalarBinaryOpTraits<alidade::Jet<T, N>, T, Operation> {
   using ReturnType = alidade::Jet<T, N>;

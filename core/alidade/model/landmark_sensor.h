@@ -13,9 +13,9 @@ struct PoseAnd<Z, std::tuple<G...>> {
   using Type = Sensor<Z, Vec<3>, UnitQuaternion, G...>;
 };
 
-/// The roles of a camera's pose, then those of a landmark.
+/// Returns the roles of a camera's pose, followed by those of a landmark.
 template <std::size_t N>
-constexpr std::array<Quantity, N + 2> BehindPose(const std::array<Quantity, N>& landmark) {
+constexpr std::array<Quantity, N + 2> PrependPose(const std::array<Quantity, N>& landmark) {
   std::array<Quantity, N + 2> roles{
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
       Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}};
@@ -25,21 +25,21 @@ constexpr std::array<Quantity, N + 2> BehindPose(const std::array<Quantity, N>& 
 
 }  // namespace detail
 
-/// Base of a sensor that sees landmarks of one `Representation` from a camera: the roles position
-/// and orientation, then those of the representation. All representations look the same to the
-/// model, which has
+/// Base of a sensor that sees landmarks of one `Representation` from a camera. Its roles are
+/// position and orientation, followed by those of the representation. The model does not depend on
+/// the representation. It has
 ///
 ///   template <class T> bool PredictInCamera(const T* h, const T& rho, T* z) const;
 ///   template <class T> void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const;
 ///
-/// of the point h / rho in the camera (infinitely far at rho = 0), and Initialise as any sensor.
-/// Where Predict is false the noise is not asked for.
+/// for the point h / rho in the camera frame (infinitely far at rho = 0), and Initialise as any
+/// sensor. The noise is not evaluated if Predict returns false.
 template <class Model, class Z, class Representation>
 struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Type {
-  static constexpr auto kRoles = detail::BehindPose(Representation::kRoles);
+  static constexpr auto kRoles = detail::PrependPose(Representation::kRoles);
   static constexpr int kInitialises = 2;
 
-  /// z of a representation of one block.
+  /// Computes z if the representation is one block.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* y, T* z) const {
     T h[3];
@@ -47,7 +47,7 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Typ
     InCamera(ray, position, orientation, h);
     return static_cast<const Model&>(*this).PredictInCamera(h, ray.rho, z);
   }
-  /// L of a representation of one block, m x m row-major.
+  /// Computes L, m x m row-major, if the representation is one block.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* y, T* L) const {
     T h[3];
@@ -55,24 +55,25 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Typ
     InCamera(ray, position, orientation, h);
     static_cast<const Model&>(*this).SqrtNoiseInCamera(h, ray.rho, L);
   }
-  /// z of a representation of three blocks.
+  /// Computes z if the representation is three blocks.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* anchor, const T* direction,
                const T* inverse_distance, T* z) const {
-    return Predict(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, z);
+    return Predict(position, orientation, JoinedBlocks<T>(anchor, direction, inverse_distance).y,
+                   z);
   }
-  /// L of a representation of three blocks, m x m row-major.
+  /// Computes L, m x m row-major, if the representation is three blocks.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* anchor, const T* direction,
                  const T* inverse_distance, T* L) const {
-    SqrtNoise(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, L);
+    SqrtNoise(position, orientation, JoinedBlocks<T>(anchor, direction, inverse_distance).y, L);
   }
 
  private:
   template <class T>
-  struct Packed {
+  struct JoinedBlocks {
     T y[7];
-    Packed(const T* anchor, const T* direction, const T* inverse_distance) {
+    JoinedBlocks(const T* anchor, const T* direction, const T* inverse_distance) {
       std::copy_n(anchor, 3, y);
       std::copy_n(direction, 3, y + 3);
       y[6] = inverse_distance[0];

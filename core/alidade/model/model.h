@@ -13,70 +13,71 @@
 #include "alidade/model/geometry.h"
 #include "alidade/model/params.h"
 
-/// What the author of a model writes: a struct on one of the two bases below, templated on the
-/// scalar, pure. It needs this header and C++17, and works without the plugin machinery.
+/// Bases of models. A model is a struct that derives from Sensor or Motion. Its functions are
+/// templates of the scalar and have no side effects. It needs this header and C++17 only, and works
+/// without the plugin machinery.
 namespace alidade {
 
-/// A named quantity: a role, a measurement, a control input.
+/// A named quantity: a role, a measurement or a control input.
 struct Quantity {
   const char* name;
   const char* unit = "";
   const char* doc = "";
-  const char* elements = "";  ///< "x,y,z"; "" where there is one element
+  const char* elements = "";  ///< names such as "x,y,z"; "" for a single element
   unsigned flags = 0;         ///< ALIDADE_ROLE_*
 };
 
-/// Row-major view of a Jacobian or covariance factor. Empty where the caller wants none.
+/// Row-major view of a Jacobian or covariance factor. Empty if the caller does not request it.
 struct MatrixRef {
   double* data = nullptr;
   int stride = 0;
   double& operator()(int row, int column) const {
     return data[std::ptrdiff_t{row} * stride + column];
   }
-  /// The view from `row` on.
+  /// Returns the view that starts at `row`.
   MatrixRef Row(int row) const { return {data + std::ptrdiff_t{row} * stride, stride}; }
   explicit operator bool() const { return data != nullptr; }
 };
 
-/// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED, which a config may override: per
-/// element of its tangent, `mean` per ambient element.
+/// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. A config may override them.
+/// `mean` has a number for each ambient element, the others for each element of the tangent.
 struct Owned {
   std::uint32_t dynamics = ALIDADE_STAYS;
   std::vector<double> mean, sigma;
-  std::vector<double> density;   ///< of the white noise that drives it, unit / sqrt(s)
+  std::vector<double> density;   ///< driving white noise, unit / sqrt(s)
   double time_constant_s = 0.0;  ///< of a Gauss-Markov process
 
-  /// Stays as it is.
+  /// Returns a prior without dynamics.
   static Owned Constant(std::vector<double> mean, std::vector<double> sigma) {
     return {ALIDADE_STAYS, std::move(mean), std::move(sigma), {}, 0.0};
   }
-  /// `walk`: standard deviation of its change in one second.
+  /// Returns a random walk; `walk` is the standard deviation of its change in one second.
   static Owned RandomWalk(std::vector<double> mean, std::vector<double> sigma,
                           std::vector<double> walk) {
     return {ALIDADE_RANDOM_WALK, std::move(mean), std::move(sigma), std::move(walk), 0.0};
   }
-  /// Returns to its mean with `time_constant_s`; `sigma` is that of the stationary process too.
+  /// Returns a stationary Gauss-Markov process: `sigma` is its standard deviation at all times.
   static Owned GaussMarkov(std::vector<double> mean, std::vector<double> sigma,
                            double time_constant_s) {
     std::vector<double> density = sigma;
-    for (double& one : density) one *= std::sqrt(2.0 / time_constant_s);
+    for (double& value : density) value *= std::sqrt(2.0 / time_constant_s);
     return {ALIDADE_GAUSS_MARKOV, std::move(mean), std::move(sigma), std::move(density),
             time_constant_s};
   }
 };
 
-/// Process noise over a time that is stepped in parts. An interval lies between two updates; both
-/// kinds are white from one interval to the next.
+/// Process noise over an interval that is predicted in several steps. An interval lies between two
+/// updates. Both kinds are white from one interval to the next.
 enum class NoiseKind {
-  kContinuous,  ///< each step has a w of its own: Q of the whole is F_2 Q_1 F_2' + Q_2
-  kDiscrete,    ///< one w is held over the interval: G Lq of the whole is (F_2 G_1 + G_2) Lq
+  kContinuous,  ///< w is drawn for each step: the interval has Q = F_2 Q_1 F_2' + Q_2
+  kDiscrete,    ///< w is constant over the interval, which has G Lq = (F_2 G_1 + G_2) Lq
 };
 
 /// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model has
 ///
 ///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role geometry
 ///   static constexpr Quantity kMeasurement{...};
-///   static constexpr std::array kParts{Quantity{...}, ...};      only of a Product, for each part
+///   static constexpr std::array kParts{Quantity{...}, ...};      one for each part of a Product
 ///   explicit Model(Params&);
 ///   template <class T> bool Predict(const T* role..., T* z) const;      false: out of domain
 ///   template <class T> void SqrtNoise(const T* role..., [const T* z,] T* L) const;
@@ -85,28 +86,29 @@ enum class NoiseKind {
 /// and may have
 ///
 ///   using Known = Vec<3>; static constexpr Quantity kKnown{...};    numbers that come with each
-///                                       measurement and are no state: where a satellite is. Every
-///                                       function takes them, `const double* known`, behind the
-///                                       roles: Predict(role..., known, z), Valid(known, z)
+///                                       measurement and are not estimated, such as a satellite's
+///                                       position. Every function accepts `const double* known`
+///                                       after the roles: Predict(role..., known, z),
+///                                       Valid(known, z)
 ///   bool Valid(const double* z) const;
-///   static constexpr int kInitialises;                                  the role y below
+///   static constexpr int kInitialises;                         index of the role y below
 ///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
-///   static constexpr int kPrior;         numbers of the prior, beyond z; default 0
+///   static constexpr int kPrior;         count of the prior's numbers; default 0
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
 ///
-/// A role with the flag ALIDADE_ROLE_OWNED is a state that comes with the sensor, a bias or a lever
-/// arm, unless the config binds it: constant at the neutral element of its geometry, or as
+/// A role with the flag ALIDADE_ROLE_OWNED is a state of the sensor, such as a bias or a lever arm,
+/// unless the config binds it to a block. It is constant at the neutral element of its geometry,
+/// unless the model defines its prior and dynamics by
 ///
 ///   Owned OwnedRole(int role) const;
 ///
-/// says. Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the
-/// landmark that a measurement names. Where kInitialises is the first of them, y holds them all,
-/// one after the other. An optional member of another signature is a compile error
-/// (model_members.h).
+/// Roles with the flag ALIDADE_ROLE_LANDMARK are adjacent. They are bound to the landmark that a
+/// measurement names. If kInitialises is the first of them, y contains all of them, one after the
+/// other. An optional member with another signature is a compile error (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   static_assert(((RoleGeometries::kGeometry != ALIDADE_PRODUCT) && ... && true),
-                "a role is no Product: give each part a role of its own");
+                "a role cannot be a Product; expected a separate role for each part");
   using Measurement = MeasurementGeometry;
   using Spaces = std::tuple<RoleGeometries...>;
   using Known = Vec<0>;
@@ -123,24 +125,24 @@ struct Sensor {
 ///                                T* next...) const;
 ///   void SqrtQ([const double* block...,] double dt_s, MatrixRef Lq) const;       zeroed
 ///
-/// Step may return bool, false meaning out of domain. The model may have
+/// Step may return bool; false means out of domain. The model may have
 ///
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
 ///                     MatrixRef G) const;      analytic, zeroed; only without control input
-///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
+///   bool Stationary() const;                   x' = x without noise: estimators skip the step
 ///   NoiseKind noise_kind() const;              default kContinuous; `alidade check` compares
-///   static constexpr int kStepOrder = N;       1 to 8: additive in dt but for an error of order
-///                                              dt^N, 2 by Euler's method; default 0, additive
+///   static constexpr int kStepOrder = N;       1 to 8: additive in dt up to an error of order
+///                                              dt^N (Euler's method: 2); default 0: additive
 ///
-/// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
+/// Lq of discrete noise is evaluated at the start of its interval and does not depend on dt_s.
 ///
-/// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is constant at the neutral
-/// element of its geometry, unless the config gives it an initial value.
+/// A block with the flag ALIDADE_ROLE_OWNED, such as a bias or an extrinsic, is constant at the
+/// neutral element of its geometry, unless the config defines an initial value.
 ///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and
-/// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers: they
-/// must not throw, and a Step that returns false must not have written.
+/// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers and
+/// must not throw. A Step that returns false must leave the buffers untouched.
 template <int NoiseSize, class... BlockGeometries>
 struct Motion {
   using Spaces = std::tuple<BlockGeometries...>;
@@ -170,20 +172,20 @@ using Blocks = SpacesOf<typename Model::Spaces>;
 template <int I, class Model>
 using SpaceAt = std::tuple_element_t<static_cast<std::size_t>(I), typename Model::Spaces>;
 
-/// Whether role i is one of those that Initialise computes.
+/// Returns true if Initialise computes role i.
 template <class Model>
 constexpr bool IsInitialised(int i) {
   constexpr int first = Model::kInitialises;
   if (first < 0 || i < first) return false;
   for (int k = first + 1; k <= i; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    if ((Model::kRoles[at - 1].flags & Model::kRoles[at].flags & ALIDADE_ROLE_LANDMARK) == 0)
+    const auto role = static_cast<std::size_t>(k);
+    if ((Model::kRoles[role - 1].flags & Model::kRoles[role].flags & ALIDADE_ROLE_LANDMARK) == 0)
       return false;
   }
   return true;
 }
 
-/// f(integral_constant<int, I>) for every I.
+/// Calls f(integral_constant<int, I>) for every I.
 template <class F, std::size_t... I>
 void ForEach(const F& f, std::index_sequence<I...>) {
   (f(std::integral_constant<int, static_cast<int>(I)>{}), ...);
@@ -198,31 +200,32 @@ using Matrix = MatrixRef;
 template <class Model>
 inline constexpr bool kHasKnown = Model::Known::kAmbient > 0;
 
-/// Calls f(role pointers..., [known,] rest...) of a sensor.
-template <class Model, class F, class T, std::size_t... I, class... Rest>
+/// Calls f(role pointers..., [known,] arguments...) of a sensor.
+template <class Model, class F, class T, std::size_t... I, class... Arguments>
 decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
-                         std::index_sequence<I...>, Rest... rest) {
+                         std::index_sequence<I...>, Arguments... arguments) {
   static_cast<void>(x);
   if constexpr (kHasKnown<Model>) {
-    return f(x[I]..., known, rest...);
+    return f(x[I]..., known, arguments...);
   } else {
     static_cast<void>(known);
-    return f(x[I]..., rest...);
+    return f(x[I]..., arguments...);
   }
 }
 
-/// Whether Call can be called as (model, const T* for each of Indices..., [known,] rest...).
-template <class T, class Call, class Model, class Indices, class... Rest>
-struct TakesRolesOf;
-template <class T, class Call, class Model, std::size_t... I, class... Rest>
-struct TakesRolesOf<T, Call, Model, std::index_sequence<I...>, Rest...> {
+/// `value` is true if Call accepts (model, const T* for each of Indices..., [known,]
+/// arguments...).
+template <class T, class Call, class Model, class Indices, class... Arguments>
+struct AcceptsRolesOf;
+template <class T, class Call, class Model, std::size_t... I, class... Arguments>
+struct AcceptsRolesOf<T, Call, Model, std::index_sequence<I...>, Arguments...> {
   static constexpr bool value =
       kHasKnown<Model>
-          ? std::is_invocable_v<Call, const Model&, Pointer<T, I>..., const double*, Rest...>
-          : std::is_invocable_v<Call, const Model&, Pointer<T, I>..., Rest...>;
+          ? std::is_invocable_v<Call, const Model&, Pointer<T, I>..., const double*, Arguments...>
+          : std::is_invocable_v<Call, const Model&, Pointer<T, I>..., Arguments...>;
 };
-template <class Call, class Model, class Indices, class... Rest>
-struct TakesRoles : TakesRolesOf<double, Call, Model, Indices, Rest...> {};
+template <class Call, class Model, class Indices, class... Arguments>
+struct AcceptsRoles : AcceptsRolesOf<double, Call, Model, Indices, Arguments...> {};
 
 struct JacobianCall {
   template <class Model, class... A>
@@ -232,14 +235,15 @@ template <class Model, class Indices>
 struct HasJacobian;
 template <class Model, std::size_t... I>
 struct HasJacobian<Model, std::index_sequence<I...>>
-    : TakesRoles<JacobianCall, Model, std::index_sequence<I...>, Matrix<I>...> {};
+    : AcceptsRoles<JacobianCall, Model, std::index_sequence<I...>, Matrix<I>...> {};
 
 struct SqrtNoiseCall {
   template <class Model, class... A>
   auto operator()(const Model& model, A... a) const -> decltype(model.SqrtNoise(a...));
 };
 template <class Model, class Indices>
-struct HasNoiseOfMeasurement : TakesRoles<SqrtNoiseCall, Model, Indices, const double*, double*> {};
+struct HasNoiseOfMeasurement : AcceptsRoles<SqrtNoiseCall, Model, Indices, const double*, double*> {
+};
 
 template <class Model, class = void>
 struct HasSimpleSqrtQ : std::false_type {};
@@ -247,15 +251,15 @@ template <class Model>
 struct HasSimpleSqrtQ<Model, std::void_t<decltype(std::declval<const Model&>().SqrtQ(
                                  1.0, std::declval<MatrixRef>()))>> : std::true_type {};
 
-/// Calls f(block pointers..., [input,] rest...) of a motion model.
-template <class Model, class T, class F, std::size_t... I, class... Rest>
+/// Calls f(block pointers..., [input,] arguments...) of a motion model.
+template <class Model, class T, class F, std::size_t... I, class... Arguments>
 auto WithBlocks(const F& f, const T* const* x, const T* u, std::index_sequence<I...>,
-                Rest... rest) {
+                Arguments... arguments) {
   if constexpr (Model::Input::kAmbient > 0) {
-    return f(x[I]..., u, rest...);
+    return f(x[I]..., u, arguments...);
   } else {
     static_cast<void>(u);
-    return f(x[I]..., rest...);
+    return f(x[I]..., arguments...);
   }
 }
 
@@ -271,7 +275,7 @@ bool CallStep(const Model& model, const T* const* x, const T* u, const T* w, dou
   }
 }
 
-/// L with R = L L' of a sensor, row-major and zeroed before.
+/// Computes L with R = L L' of a sensor, row-major. The caller zeroes L.
 template <class Model, std::size_t... I>
 void CallSqrtNoise(const Model& model, const double* const* x, const double* known, const double* z,
                    double* l, std::index_sequence<I...> indices) {
@@ -284,7 +288,7 @@ void CallSqrtNoise(const Model& model, const double* const* x, const double* kno
   }
 }
 
-/// Lq of a motion model, zeroed before.
+/// Computes Lq of a motion model. The caller zeroes Lq.
 template <class Model, std::size_t... I>
 void CallSqrtQ(const Model& model, const double* const* x, double dt_s, MatrixRef l,
                std::index_sequence<I...>) {

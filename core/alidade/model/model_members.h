@@ -8,15 +8,15 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/model.h"
 
-/// Compile errors, in words, for members of a model that are missing, and for optional ones that
-/// exist but cannot be called: else they would be left out without a sign. Of a final struct the
-/// optional members are not examined.
+/// Readable compile errors for required members of a model that are missing. The checks also reject
+/// optional members that exist but have another signature, because these would be ignored silently.
+/// Optional members of a final struct are not checked.
 namespace alidade {
 namespace detail {
 
 struct Nothing {};
 
-/// DeclaresNAME<Model>::value: whether the model has a member NAME of any kind. If it has, NAME is
+/// DeclaresNAME<Model>::value is true if the model has a member NAME of any kind: NAME is then
 /// ambiguous in a struct that derives from the model and from another struct with that name.
 #define ALIDADE_DECLARES(NAME)                                                         \
   struct With##NAME {                                                                  \
@@ -44,7 +44,7 @@ struct PredictCall {
       -> std::enable_if_t<std::is_convertible_v<decltype(model.Predict(a...)), bool>>;
 };
 template <class Model, class Indices, class T = double>
-struct HasPredict : TakesRolesOf<T, PredictCall, Model, Indices, T*> {};
+struct HasPredict : AcceptsRolesOf<T, PredictCall, Model, Indices, T*> {};
 
 /// A scalar of automatic differentiation.
 using AnyJet = Jet<double, 1>;
@@ -64,7 +64,7 @@ struct HasBlocks<Model, std::void_t<decltype(Model::kBlocks)>> : std::true_type 
 
 template <class Model, class Indices>
 struct HasSqrtNoise {
-  static constexpr bool value = TakesRoles<SqrtNoiseCall, Model, Indices, double*>::value ||
+  static constexpr bool value = AcceptsRoles<SqrtNoiseCall, Model, Indices, double*>::value ||
                                 HasNoiseOfMeasurement<Model, Indices>::value;
 };
 
@@ -104,9 +104,9 @@ struct ValidCall {
       -> std::enable_if_t<std::is_convertible_v<decltype(model.Valid(a...)), bool>>;
 };
 template <class Model>
-struct HasValid : TakesRoles<ValidCall, Model, std::index_sequence<>, const double*> {};
+struct HasValid : AcceptsRoles<ValidCall, Model, std::index_sequence<>, const double*> {};
 
-/// Of a model with Valid.
+/// Calls Valid of a model that has it.
 template <class Model>
 bool CallValid(const Model& model, const double* known, const double* z) {
   const auto valid = [&](auto... arguments) -> bool { return model.Valid(arguments...); };
@@ -128,7 +128,7 @@ struct HasOwnedRole<Model, std::enable_if_t<std::is_convertible_v<
                                decltype(std::declval<const Model&>().OwnedRole(0)), Owned>>>
     : std::true_type {};
 
-/// How many roles Initialise does not compute.
+/// Returns the number of roles that Initialise does not compute.
 template <class Model>
 constexpr std::size_t OtherCount() {
   std::size_t count = 0;
@@ -141,25 +141,26 @@ struct InitialiseCall {
   auto operator()(const Model& model, A... a) const
       -> std::enable_if_t<std::is_convertible_v<decltype(model.Initialise(a...)), bool>>;
 };
-template <class Model, class Others>
+template <class Model, class OtherRoles>
 struct CanInitialise {
   static constexpr bool value =
       Model::kPrior > 0
-          ? TakesRoles<InitialiseCall, Model, Others, const double*, const double*, double*>::value
-          : TakesRoles<InitialiseCall, Model, Others, const double*, double*>::value;
+          ? AcceptsRoles<InitialiseCall, Model, OtherRoles, const double*, const double*,
+                         double*>::value
+          : AcceptsRoles<InitialiseCall, Model, OtherRoles, const double*, double*>::value;
 };
 
-/// Whether each has a name.
+/// Returns true if each quantity has a name.
 template <class Quantities>
 constexpr bool AreNamed(const Quantities& quantities) {
-  for (const Quantity& one : quantities) {
-    if (one.name == nullptr) return false;
+  for (const Quantity& quantity : quantities) {
+    if (quantity.name == nullptr) return false;
   }
   return true;
 }
 
-/// Always true: the errors are its own. Those of the names that a problem and a plugin have of a
-/// model; a filter composed at compile time needs none.
+/// Rejects at compile time a sensor without the names that a problem and a plugin need. A filter
+/// that is composed at compile time does not need them. Always returns true.
 template <class Model>
 constexpr bool CheckSensorNames() {
   static_assert(HasRoles<Model>::value,
@@ -180,11 +181,12 @@ constexpr bool CheckMotionNames() {
   return true;
 }
 
-/// Likewise, of its functions.
+/// Rejects at compile time a sensor whose functions are missing or have another signature. Always
+/// returns true.
 template <class Model>
 constexpr bool CheckSensorMembers() {
   using Indices = typename Blocks<Model>::Indices;
-  using Others = std::make_index_sequence<OtherCount<Model>()>;
+  using OtherRoles = std::make_index_sequence<OtherCount<Model>()>;
   static_assert(HasPredict<Model, Indices>::value,
                 "a sensor needs template <class T> bool Predict(const T* role..., [const double* "
                 "known,] T* z) const, with one pointer for each role: see docs/add_a_sensor.md");
@@ -207,7 +209,7 @@ constexpr bool CheckSensorMembers() {
   static_assert(!DeclaresInitialise<Model>::value || Model::kInitialises >= 0,
                 "Initialise exists but kInitialises, the index of the role that it computes, does "
                 "not: see docs/add_a_sensor.md");
-  static_assert(Model::kInitialises < 0 || CanInitialise<Model, Others>::value,
+  static_assert(Model::kInitialises < 0 || CanInitialise<Model, OtherRoles>::value,
                 "kInitialises exists but Initialise cannot be called as bool Initialise(const T* "
                 "other_role..., [const double* known,] const T* z, [const T* prior,] T* y) const: "
                 "see docs/add_a_sensor.md");
@@ -223,7 +225,8 @@ constexpr bool StepOrderFits() {
   }
 }
 
-/// Likewise.
+/// Rejects at compile time a motion model whose functions are missing or have another signature.
+/// Always returns true.
 template <class Model>
 constexpr bool CheckMotionMembers() {
   using Indices = typename Blocks<Model>::Indices;

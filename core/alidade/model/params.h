@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Bounds of a parameter; an open end excludes its value.
+/// Bounds of a parameter; an open bound is itself excluded.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -24,15 +24,17 @@ struct Range {
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true, false};
 inline constexpr Range kNonNegative{0.0, std::numeric_limits<double>::infinity(), false, false};
 
-/// The parameters of a model, read from its entry in the config. Reading declares: the key, unit,
-/// range, default and doc of every read make the model's schema (`alidade plugins info`), and keys
-/// that nobody reads are refused. A bad value never stops the constructor: a valid stand-in is
-/// returned and the host refuses the model afterwards, with all its errors at once.
+/// Parameters of a model, read from its entry in the config. Each read also declares the parameter:
+/// the keys, units, ranges, defaults and docs of all reads form the model's schema
+/// (`alidade plugins info`), and other keys are refused. A bad value does not stop the constructor.
+/// The read returns a valid stand-in, and the host refuses the model afterwards with all its errors
+/// at once.
 class Params {
  public:
   explicit Params(const AlidadeHost* host) : host_(host) {}
 
-  /// One value of `key`; `fallback` makes it optional. A bad value gives a stand-in within `range`.
+  /// Returns the value of `key`, or a stand-in within `range` if it is bad. With a `fallback` the
+  /// key is optional.
   double Number(const char* key, const char* unit, const char* doc, Range range = {},
                 std::optional<double> fallback = std::nullopt) {
     double value = fallback.value_or(StandIn(range));
@@ -40,15 +42,15 @@ class Params {
          1);
     return value;
   }
-  /// One value of `key`; nullopt for the word `none`, which is the default.
+  /// Returns the value of `key`, or nullopt for the word `none`, which is the default.
   std::optional<double> NumberOrNone(const char* key, const char* unit, const char* doc,
                                      Range range) {
-    const double none = std::numeric_limits<double>::infinity();
-    double value = none;
-    AlidadeParam param = Describe(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, &none);
+    const double infinity = std::numeric_limits<double>::infinity();
+    double value = infinity;
+    AlidadeParam param = Describe(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, &infinity);
     param.flags |= ALIDADE_PARAM_OR_NONE;
     host_->read(host_->context, &param, &value, 1);
-    return value < none ? std::optional(value) : std::nullopt;
+    return value < infinity ? std::optional(value) : std::nullopt;
   }
   double Positive(const char* key, const char* unit, const char* doc,
                   std::optional<double> fallback = std::nullopt) {
@@ -73,7 +75,7 @@ class Params {
          &value, 1);
     return value != 0.0;
   }
-  /// Index of the chosen name in `choices`; `fallback` is an index.
+  /// Returns the index of the chosen name in `choices`; `fallback` is an index.
   int Choice(const char* key, std::initializer_list<const char*> choices, const char* doc,
              std::optional<int> fallback = std::nullopt) {
     double value = fallback.value_or(0);
@@ -85,7 +87,7 @@ class Params {
     host_->read(host_->context, &param, &value, 1);
     return static_cast<int>(value);
   }
-  /// A text of at most 4096 bytes, as it stands in the config.
+  /// Returns the text of `key`, unchanged; it has at most 4096 bytes.
   std::string Text(const char* key, const char* doc,
                    const std::optional<std::string>& fallback = std::nullopt) {
     AlidadeParam param = Describe(ALIDADE_PARAM_TEXT, key, "", doc, {}, 1, nullptr);
@@ -98,7 +100,7 @@ class Params {
                                                static_cast<std::int32_t>(text.size()));
     return size < 0 ? fallback.value_or("") : std::string(text.data());
   }
-  /// `N` numbers with one unit and range.
+  /// Returns the `N` numbers of `key`, all with the same unit and range.
   template <int N>
   std::array<double, N> Vector(const char* key, const char* unit, const char* doc, Range range = {},
                                std::optional<std::array<double, N>> fallback = std::nullopt) {
@@ -109,11 +111,11 @@ class Params {
          values.data(), N);
     return values;
   }
-  /// `N` numbers with one unit and range, or one that goes for all.
+  /// Returns `N` numbers of the same unit and range. The config may state one number for all.
   template <int N>
   std::array<double, N> PerAxis(const char* key, const char* unit, const char* doc,
                                 Range range = {}) {
-    double values[N + 1];  // one more shows a list that is too long
+    double values[N + 1];  // an additional element detects a list that is too long
     const std::int32_t count =
         Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, -1, nullptr, values, N + 1);
     std::array<double, N> result;
@@ -122,7 +124,7 @@ class Params {
     if (count > 1 && count != N) Fail(key, "needs one number, or one for each axis");
     return result;
   }
-  /// Says that parameters, each valid, do not fit together.
+  /// Reports that parameters which are valid by themselves are not consistent.
   void Fail(const char* key, const char* text) { host_->fail(host_->context, key, text); }
 
  private:

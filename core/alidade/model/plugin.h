@@ -8,13 +8,13 @@
 #include "alidade/model/build_tag.h"
 #include "alidade/model/plugin_thunks.h"
 
-/// Puts models behind the plugin ABI, plugin_abi.h. In the .cc of a plugin:
+/// Exports models through the plugin ABI, plugin_abi.h. In the .cc of a plugin:
 ///
 ///   ALIDADE_PLUGIN(ALIDADE_SENSOR(Model, "name", "doc", "citation"), ...)
 namespace alidade {
 namespace detail {
 
-/// Hands `holder` over as `instance`.
+/// Transfers `holder` to `instance`, which then owns it.
 template <class Model>
 void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeInstance* instance) {
   instance->kind = kind;
@@ -27,7 +27,7 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
   static_assert(CheckSensorNames<Model>());
-  constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
+  constexpr auto roles = Model::kRoles;  // a copy, so that plugins do not share the symbol
   holder->DescribeRoles(roles);
   holder->DescribeMeasurement();
   holder->DescribeKnown();
@@ -73,7 +73,7 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);
 }
 
-/// Runs f(params) for an entry's `create`; an exception is noted with the host.
+/// Runs f(params) for an entry's `create`. Reports an exception to the host.
 template <class F>
 std::int32_t GuardedCreate(const AlidadeHost* host, const F& f) noexcept {
   Params params(host);
@@ -115,7 +115,7 @@ constexpr AlidadeEntry Entry(std::uint32_t kind, const char* name, const char* d
 
 }  // namespace detail
 
-/// Makes a model from its parameters and hands it over as `instance`.
+/// Creates a model from its parameters and transfers it to `instance`.
 template <class Model>
 void EmplaceSensor(Params& params, AlidadeInstance* instance) {
   detail::PublishSensor(std::make_unique<detail::Holder<Model>>(params), instance);
@@ -127,8 +127,9 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 
 }  // namespace alidade
 
-/// One model of a plugin. The _BY forms take a function `void (alidade::Params&, AlidadeInstance*)`
-/// that reads a parameter to choose which struct to emplace.
+/// Defines one model of a plugin. The _BY macros accept a function
+/// `void (alidade::Params&, AlidadeInstance*)`. It reads a parameter to choose the struct to
+/// emplace.
 #define ALIDADE_SENSOR(Model, name, doc, citation) \
   ALIDADE_SENSOR_BY(alidade::EmplaceSensor<Model>, name, doc, citation)
 #define ALIDADE_MOTION(Model, name, doc, citation) \
@@ -138,7 +139,8 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 #define ALIDADE_MOTION_BY(make, name, doc, citation) \
   (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
 
-/// Exports the models, constant expressions, as this plugin's table. Once for each plugin.
+/// Exports the models, which are constant expressions, as the plugin's table. Use it once in each
+/// plugin.
 #define ALIDADE_PLUGIN(...)                                                                        \
   ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                      \
   static constexpr AlidadeEntry alidade_entries[] = {__VA_ARGS__};                                 \

@@ -10,7 +10,8 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Calls of plugin_abi.h that lead to a model: noexcept, an exception becomes ALIDADE_ERROR.
+/// Functions of plugin_abi.h that call a model. They are noexcept: an exception becomes
+/// ALIDADE_ERROR.
 namespace alidade {
 namespace detail {
 
@@ -28,32 +29,32 @@ inline AlidadeSpace Describe(const Quantity& q, std::uint32_t geometry, int ambi
   return space;
 }
 
-/// An Owned as the ABI has it.
-struct OwnedByAbi {
-  explicit OwnedByAbi(Owned of) : from(std::move(of)) {
+/// Prior and dynamics of a role, converted to the struct of the ABI.
+struct AbiPrior {
+  explicit AbiPrior(Owned role_prior) : prior(std::move(role_prior)) {
     c.struct_size = sizeof(c);
-    c.dynamics = from.dynamics;
-    c.mean = from.mean.empty() ? nullptr : from.mean.data();
-    c.sqrt_prior = Diagonal(from.sigma, sqrt_prior);
-    c.sqrt_density = Diagonal(from.density, sqrt_density);
-    c.time_constant_s = from.time_constant_s;
+    c.dynamics = prior.dynamics;
+    c.mean = prior.mean.empty() ? nullptr : prior.mean.data();
+    c.sqrt_prior = Diagonal(prior.sigma, sqrt_prior);
+    c.sqrt_density = Diagonal(prior.density, sqrt_density);
+    c.time_constant_s = prior.time_constant_s;
   }
-  OwnedByAbi(const OwnedByAbi&) = delete;
-  OwnedByAbi& operator=(const OwnedByAbi&) = delete;
+  AbiPrior(const AbiPrior&) = delete;
+  AbiPrior& operator=(const AbiPrior&) = delete;
 
-  static const double* Diagonal(const std::vector<double>& of, std::vector<double>& matrix) {
-    const std::size_t n = of.size();
+  static const double* Diagonal(const std::vector<double>& diagonal, std::vector<double>& matrix) {
+    const std::size_t n = diagonal.size();
     matrix.assign(n * n, 0.0);
-    for (std::size_t i = 0; i < n; ++i) matrix[i * n + i] = of[i];
+    for (std::size_t i = 0; i < n; ++i) matrix[i * n + i] = diagonal[i];
     return n > 0 ? matrix.data() : nullptr;
   }
 
-  Owned from;
+  Owned prior;
   std::vector<double> sqrt_prior, sqrt_density;
   AlidadeOwned c{};
 };
 
-/// A model with its description, as the instance's `self`.
+/// A model with its description: the instance's `self`.
 template <class Model>
 struct Holder {
   explicit Holder(Params& p) : Holder(Model(p)) {}
@@ -80,7 +81,6 @@ struct Holder {
     description.roles = roles;
   }
 
-  /// The measurement.
   void DescribeMeasurement() {
     using Z = typename Model::Measurement;
     constexpr Quantity measurement = Model::kMeasurement;
@@ -100,26 +100,27 @@ struct Holder {
     description.output = &space;
   }
 
-  /// Prior and dynamics of the roles that are states of the sensor itself.
+  /// Describes prior and dynamics of the roles that are states of the sensor itself.
   void DescribeOwned() {
     if constexpr (HasOwnedRole<Model>::value) {
       for (int i = 0; i < Blocks<Model>::kCount; ++i) {
         if ((roles[i].flags & ALIDADE_ROLE_OWNED) == 0) continue;
-        Owned own = model.OwnedRole(i);
-        const auto fits = [](const std::vector<double>& of, int size) {
-          return of.empty() || of.size() == static_cast<std::size_t>(size);
+        Owned prior = model.OwnedRole(i);
+        const auto has_valid_size = [](const std::vector<double>& values, int size) {
+          return values.empty() || values.size() == static_cast<std::size_t>(size);
         };
-        if (!fits(own.mean, roles[i].ambient) || !fits(own.sigma, roles[i].tangent) ||
-            !fits(own.density, roles[i].tangent)) {
-          own = Owned{ALIDADE_STAYS, {std::nan("")}, {}, {}, 0.0};  // which the host refuses
-          own.mean.resize(static_cast<std::size_t>(roles[i].ambient));
+        if (!has_valid_size(prior.mean, roles[i].ambient) ||
+            !has_valid_size(prior.sigma, roles[i].tangent) ||
+            !has_valid_size(prior.density, roles[i].tangent)) {
+          prior = Owned{ALIDADE_STAYS, {std::nan("")}, {}, {}, 0.0};  // the host refuses this mean
+          prior.mean.resize(static_cast<std::size_t>(roles[i].ambient));
         }
-        owned[i] = std::make_unique<OwnedByAbi>(std::move(own));
-        roles[i].owned = &owned[i]->c;
+        priors[i] = std::make_unique<AbiPrior>(std::move(prior));
+        roles[i].owned = &priors[i]->c;
       }
     }
   }
-  /// The numbers that come with each measurement.
+  /// Describes the numbers that come with each measurement.
   void DescribeKnown() {
     using Known = typename Model::Known;
     static_assert(Known::kGeometry == ALIDADE_VECTOR, "known numbers are a vector");
@@ -136,21 +137,21 @@ struct Holder {
   AlidadeSpace space;               ///< the measurement, or the control input
   AlidadeSpace known;               ///< of a sensor
   std::vector<AlidadeSpace> parts;  ///< of the measurement
-  std::unique_ptr<OwnedByAbi> owned[Blocks<Model>::kCount];
+  std::unique_ptr<AbiPrior> priors[Blocks<Model>::kCount];
 };
 
-/// What the last ALIDADE_ERROR of this thread was about. Hidden: one for each plugin.
+/// Text of the last ALIDADE_ERROR of this thread. Hidden, so that each plugin has a separate one.
 struct __attribute__((visibility("hidden"))) LastError {
   static char* Text() {
     static thread_local char text[256] = "";
     return text;
   }
-  static void Set(const char* what) { std::snprintf(Text(), 256, "%s", what); }
+  static void Set(const char* text) { std::snprintf(Text(), 256, "%s", text); }
 };
 
-/// Runs f on the holder behind `self`; an exception becomes ALIDADE_ERROR and its text.
+/// Calls f with the model that `self` points to. An exception becomes ALIDADE_ERROR and its text.
 template <class Model, class F>
-std::int32_t Guarded(const void* self, const F& f) noexcept {
+std::int32_t CallGuarded(const void* self, const F& f) noexcept {
   const auto* holder = static_cast<const Holder<Model>*>(self);
 #if defined(__cpp_exceptions)
   try {
@@ -166,43 +167,45 @@ std::int32_t Guarded(const void* self, const F& f) noexcept {
 #endif
 }
 
-/// Not looked up for models that have none.
+/// Returns the known numbers, or null without an access if the model does not use any.
 template <class Model>
-const double* KnownOf(const AlidadeObservation* seen) {
-  return kHasKnown<Model> ? seen->known : nullptr;
+const double* KnownOf(const AlidadeObservation* observation) {
+  return kHasKnown<Model> ? observation->known : nullptr;
 }
 
-/// Hidden, as is MotionCalls: were its table exported, two plugins with a struct of one name would
-/// share the table of the first (STB_GNU_UNIQUE), whatever dlopen is told.
+/// Functions of a sensor for the ABI. Hidden, like MotionCalls: if its table were exported, two
+/// plugins with a struct of the same name would share the table of the first (STB_GNU_UNIQUE),
+/// whatever the flags of dlopen.
 template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
   ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
-      const void* self, const AlidadeObservation* seen, const double* const* roles, double* z,
-      double* const* jacobians, const std::int32_t* strides) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+      const void* self, const AlidadeObservation* observation, const double* const* roles,
+      double* z, double* const* jacobians, const std::int32_t* strides) noexcept {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(
-          Evaluate(model, roles, z, jacobians, strides, KnownOf<Model>(seen)));
+          Evaluate(model, roles, z, jacobians, strides, KnownOf<Model>(observation)));
     });
   }
-  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
+  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self,
+                                                const AlidadeObservation* observation,
                                                 const double* const* roles, double* l,
                                                 std::int32_t stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       constexpr int m = Model::Measurement::kTangent;
       double dense[m * m] = {};
-      CallSqrtNoise(model, roles, KnownOf<Model>(seen), seen->z, dense,
+      CallSqrtNoise(model, roles, KnownOf<Model>(observation), observation->z, dense,
                     typename Blocks<Model>::Indices{});
       for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
       return std::int32_t{ALIDADE_OK};
     });
   }
   ALIDADE_FLATTEN static std::int32_t Valid(const void* self,
-                                            const AlidadeObservation* seen) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+                                            const AlidadeObservation* observation) noexcept {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
-        const bool valid = CallValid(model, KnownOf<Model>(seen), seen->z);
+        const bool valid = CallValid(model, KnownOf<Model>(observation), observation->z);
         return std::int32_t{valid ? ALIDADE_OK : ALIDADE_INVALID};
       } else {
         static_cast<void>(model);
@@ -210,16 +213,16 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
       }
     });
   }
-  static std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
+  static std::int32_t Initialise(const void* self, const AlidadeObservation* observation,
                                  const double* const* roles, const double* prior, double* y,
                                  double* const* jx, const std::int32_t* jx_strides, double* jz,
                                  std::int32_t jz_stride, double* jp,
                                  std::int32_t jp_stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       if constexpr (kInitialises) {
-        return static_cast<std::int32_t>(InitialiseRole(model, roles, seen->z, prior, y, jx,
-                                                        jx_strides, {jz, jz_stride},
-                                                        {jp, jp_stride}, KnownOf<Model>(seen)));
+        return static_cast<std::int32_t>(
+            InitialiseRole(model, roles, observation->z, prior, y, jx, jx_strides, {jz, jz_stride},
+                           {jp, jp_stride}, KnownOf<Model>(observation)));
       } else {
         return std::int32_t{ALIDADE_ERROR};
       }
@@ -235,6 +238,7 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
                                         {}};
 };
 
+/// Functions of a motion model for the ABI.
 template <class Model>
 struct __attribute__((visibility("hidden"))) MotionCalls {
   ALIDADE_FLATTEN static std::int32_t Step(const void* self, const double* const* blocks,
@@ -242,7 +246,7 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
                                            double dt_s, double* const* next, double* f,
                                            std::int32_t f_stride, double* g, std::int32_t g_stride,
                                            double* b, std::int32_t b_stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       const double* u = nullptr;
       if constexpr (Model::Input::kAmbient > 0) {
         u = inputs[0];
@@ -258,7 +262,7 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
   ALIDADE_FLATTEN static std::int32_t SqrtQ(const void* self, const double* const* blocks,
                                             const double* const*, double dt_s, double* l,
                                             std::int32_t stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
+    return CallGuarded<Model>(self, [&](const Model& model) {
       constexpr typename Blocks<Model>::Indices indices{};
       if constexpr (Model::kNoise != kDynamic) {
         constexpr int n = Model::kNoise;

@@ -11,17 +11,17 @@
 
 #include "alidade/model/autodiff.h"
 
-/// The models of a filter combined at compile time: no plugins, no config, no allocation, no
-/// exceptions; C++17 and Eigen. For embedded systems, and as a yardstick of the engine.
+/// A filter whose models are combined at compile time. It needs C++17 and Eigen, but no plugins,
+/// config, allocation or exceptions. It serves embedded systems, and as a baseline of the engine.
 namespace alidade {
 
-/// What became of a measurement that a StaticEkf was given.
+/// Outcome of a measurement in StaticEkf::Update.
 enum class StaticOutcome {
   kAccepted,
   kGated,
   kOutOfDomain,  ///< h is not defined at the prediction
   kInvalid,      ///< beyond the sensor's limits
-  kNotFinite,    ///< S is not positive definite, or something is not finite; nothing has changed
+  kNotFinite,    ///< S is not positive definite, or a result is not finite; x and P are unchanged
 };
 
 /// Extended Kalman filter over the blocks of `Motions`, numbered in order.
@@ -32,13 +32,13 @@ enum class StaticOutcome {
 ///   symbol     shape                  meaning
 ///   x          sum of ambient sizes   state; P, n x n, in its tangent, is its covariance
 ///   r          m                      innovation z (-) h(x)
-///   gate       1                      bound on r' S^-1 r; infinity: none
+///   gate       1                      bound on r' S^-1 r; infinity disables it
 ///
-/// Measurements are used one after the other, each linearised at the state that the one before has
-/// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
-/// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
-/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller. Discrete
-/// noise is held from one accepted measurement (or Set) to the next, as Ekf has it.
+/// Each measurement is linearised at the state after the previous one, as the engine does under
+/// `fuse: per_measurement`. If a unit vector changes, P is rotated with its tangent basis, as the
+/// engine does. Sizes are known at compile time: Constant<1>, not Constant<>. The caller passes the
+/// control inputs to every Predict. Discrete noise is constant from one accepted measurement (or
+/// Set) to the next, as in Ekf.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -46,14 +46,15 @@ class StaticEkf {
   static constexpr int kBlocks = static_cast<int>(std::tuple_size<Spaces>::value);
   static constexpr int kAmbient = detail::SpacesOf<Spaces>::kAmbient;
   static constexpr int kTangent = detail::SpacesOf<Spaces>::kTangent;
-  static_assert(detail::SpacesOf<Spaces>::kStatic, "sizes have to be known at compile time");
+  static_assert(detail::SpacesOf<Spaces>::kStatic, "sizes must be known at compile time");
   template <int B>
   using Space = std::tuple_element_t<static_cast<std::size_t>(B), Spaces>;
   using Covariance = Eigen::Matrix<double, kTangent, kTangent>;
 
   explicit StaticEkf(Motions... motions) : motions_(std::move(motions)...) {}
 
-  /// Sets block B to `value` (ambient) with the covariance `p` (tangent), uncorrelated with others.
+  /// Sets block B to `value` (ambient) with the covariance `p` (tangent), uncorrelated with the
+  /// other blocks.
   template <int B, class Matrix>
   void Set(const double* value, const Eigen::MatrixBase<Matrix>& p) {
     constexpr int o = TangentOffset(B), k = Space<B>::kTangent;
@@ -63,34 +64,34 @@ class StaticEkf {
     p_.template block<k, k>(o, o) = p;
     in_interval_ = false;
   }
-  /// Sets a scalar block to `value`, standard deviation `sigma`.
+  /// Sets a scalar block to `value` with the standard deviation `sigma`.
   template <int B>
   void Set(double value, double sigma) {
     static_assert(Space<B>::kTangent == 1 && Space<B>::kAmbient == 1, "a scalar block");
     Set<B>(&value, Eigen::Matrix<double, 1, 1>::Constant(sigma * sigma));
   }
 
-  /// Ambient values of block B.
+  /// Returns the ambient values of block B.
   template <int B>
   const double* value() const {
     return x_ + AmbientOffset(B);
   }
-  /// P, n x n, in the order of the blocks.
+  /// Returns P, n x n, in the order of the blocks.
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
-  /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each, of those
-  /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined, and
-  /// kError where x' or P' is not finite.
+  /// Predicts by dt_s seconds. `u` are the control inputs (ambient, `const double*` each) of the
+  /// models that have one, in order. Returns kOutOfDomain if a model is not defined and kError if
+  /// x' or P' is not finite. x and P are then unchanged.
   template <class... Inputs>
   ALIDADE_FLATTEN Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
-                  "one control input for each model that takes one");
+                  "one control input for each model that has one");
     const double* const inputs[] = {u..., nullptr};
     return PredictAll(dt_s, inputs, std::index_sequence_for<Motions...>{});
   }
 
-  /// Uses z (ambient, then the known numbers of a model with such), a measurement of `sensor` whose
-  /// roles are filled by the blocks `Roles`.
+  /// Updates with z, a measurement of `sensor` whose roles are bound to the blocks `Roles`. z is
+  /// ambient, followed by the known numbers if the sensor uses any.
   template <int... Roles, class Model>
   ALIDADE_FLATTEN StaticOutcome Update(const Model& sensor, const double* z,
                                        double gate = std::numeric_limits<double>::infinity());
@@ -107,26 +108,26 @@ class StaticEkf {
     for (int i = 0; i < block; ++i) offset += sizes[i];
     return offset;
   }
-  /// Number of the first block of motion model M.
+  /// Returns the index of the first block of motion model m.
   static constexpr int FirstBlock(std::size_t m) {
     const int counts[] = {detail::Blocks<Motions>::kCount...};
     int first = 0;
     for (std::size_t i = 0; i < m; ++i) first += counts[i];
     return first;
   }
-  /// How many of the motion models before M take a control input.
+  /// Returns the number of motion models before m that have a control input.
   static constexpr std::size_t InputsBefore(std::size_t m) {
-    const bool takes[] = {(Motions::Input::kAmbient > 0)...};
+    const bool has_input[] = {(Motions::Input::kAmbient > 0)...};
     std::size_t count = 0;
-    for (std::size_t i = 0; i < m; ++i) count += takes[i] ? 1 : 0;
+    for (std::size_t i = 0; i < m; ++i) count += has_input[i] ? 1 : 0;
     return count;
   }
-  /// What models write, as a matrix. (Eigen wants a single column in column order.)
+  /// View of a matrix that a model has written. (Eigen requires column order for a single column.)
   template <int R, int C>
   using RowMajorMap = Eigen::Map<
       const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
 
-  /// Part of a step of n elements: F, and G Q G'.
+  /// Transition of N tangent elements: F and G Q G'.
   template <int N>
   struct Transition {
     Eigen::Matrix<double, N, N> f, q;
@@ -134,9 +135,9 @@ class StaticEkf {
   template <class Model>
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
-  /// Discrete noise over an interval: Lq of its start, and M = Cov(x, w).
+  /// Discrete noise over an interval: Lq at its start, and M = Cov(x, w).
   template <class Model>
-  struct Held {
+  struct DiscreteNoise {
     Eigen::Matrix<double, Model::kNoise, Model::kNoise> l;
     Eigen::Matrix<double, detail::Blocks<Model>::kTangent, Model::kNoise> m;
   };
@@ -145,13 +146,13 @@ class StaticEkf {
   Status PredictAll(double dt_s, const double* const* inputs, std::index_sequence<M...>) {
     double next[kAmbient];
     std::tuple<TransitionOf<Motions>...> transitions;
-    std::tuple<Held<Motions>...> held;
+    std::tuple<DiscreteNoise<Motions>...> noise;
     Status status = Status::kOk;
-    const bool all =
-        (((status = StepOne<M>(dt_s, inputs[InputsBefore(M)], next, std::get<M>(transitions),
-                               std::get<M>(held))) == Status::kOk) &&
+    const bool succeeded =
+        (((status = StepModel<M>(dt_s, inputs[InputsBefore(M)], next, std::get<M>(transitions),
+                                 std::get<M>(noise))) == Status::kOk) &&
          ...);
-    if (!all) return status;
+    if (!succeeded) return status;
     const auto step = [&] {
       std::copy_n(next, kAmbient, x_);
       const auto normalise = [&](auto index) {
@@ -161,22 +162,22 @@ class StaticEkf {
       detail::ForEach(normalise, Indices{});
       (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     };
-    if (!Try(step)) return Status::kError;
-    (Hold<M>(std::get<M>(held)), ...);
+    if (!ApplyIfFinite(step)) return Status::kError;
+    (StoreDiscreteNoise<M>(std::get<M>(noise)), ...);
     in_interval_ = true;
     return Status::kOk;
   }
-  /// Makes a change of x and P; false, and both as they were, where what it leaves is not finite.
+  /// Applies a change of x and P. Restores both and returns false if a result is not finite.
   template <class Change>
-  bool Try(const Change& change);
-  template <std::size_t M, class NoiseHeld>
-  void Hold(const NoiseHeld& held) {
-    if (std::get<M>(motions_).noise_kind() == NoiseKind::kDiscrete) std::get<M>(held_) = held;
+  bool ApplyIfFinite(const Change& change);
+  template <std::size_t M, class Noise>
+  void StoreDiscreteNoise(const Noise& noise) {
+    if (std::get<M>(motions_).noise_kind() == NoiseKind::kDiscrete) std::get<M>(noise_) = noise;
   }
-  template <std::size_t M, int N, class NoiseHeld>
-  Status StepOne(double dt_s, const double* u,
-                 double* next,  // NOLINT(readability-non-const-parameter): y points into it
-                 Transition<N>& transition, NoiseHeld& held) const {
+  template <std::size_t M, int N, class Noise>
+  Status StepModel(double dt_s, const double* u,
+                   double* next,  // NOLINT(readability-non-const-parameter): y points into it
+                   Transition<N>& transition, Noise& noise) const {
     using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
     constexpr int n_w = Model::kNoise;
@@ -192,38 +193,38 @@ class StaticEkf {
     double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
     const Status status = Step(model, x, u, nullptr, dt_s, y, {f, N}, {g, n_w});
     if (status != Status::kOk) return status;
-    const bool discrete = model.noise_kind() == NoiseKind::kDiscrete;
-    const bool goes_on = discrete && in_interval_;
-    if (!goes_on) detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
-    if (goes_on) {
-      held.l = std::get<M>(held_).l;
+    const bool is_discrete = model.noise_kind() == NoiseKind::kDiscrete;
+    const bool is_continued = is_discrete && in_interval_;
+    if (!is_continued) detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
+    if (is_continued) {
+      noise.l = std::get<M>(noise_).l;
     } else {
-      held.l = RowMajorMap<n_w, n_w>(l);
+      noise.l = RowMajorMap<n_w, n_w>(l);
     }
-    held.m = RowMajorMap<N, n_w>(g).lazyProduct(held.l);
+    noise.m = RowMajorMap<N, n_w>(g).lazyProduct(noise.l);
     transition.f = RowMajorMap<N, N>(f);
-    transition.q = held.m.lazyProduct(held.m.transpose());
-    if (goes_on) {  // A = F M: q += A N' + N A', M' = A + N
-      const Eigen::Matrix<double, N, n_w> moved = transition.f.lazyProduct(std::get<M>(held_).m);
-      const Eigen::Matrix<double, N, N> both = moved.lazyProduct(held.m.transpose());
-      transition.q += both + both.transpose();
-      held.m += moved;
+    transition.q = noise.m.lazyProduct(noise.m.transpose());
+    if (is_continued) {  // A = F M, N = G Lq: q += A N' + N A', M' = A + N
+      const Eigen::Matrix<double, N, n_w> a = transition.f.lazyProduct(std::get<M>(noise_).m);
+      const Eigen::Matrix<double, N, N> product = a.lazyProduct(noise.m.transpose());
+      transition.q += product + product.transpose();
+      noise.m += a;
     }
     return Status::kOk;
   }
 
-  /// P(i, j), of which the lower triangle is kept.
+  /// Returns P(i, j); only the lower triangle is stored.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
-  /// P of the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  /// Updates P for the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
   template <int O, int N>
   void Propagate(const Transition<N>& t);
   template <int M>
   StaticOutcome Correct(const Eigen::Matrix<double, kTangent, M>& pht,
                         const Eigen::Matrix<double, M, M>& s, const Eigen::Matrix<double, M, 1>& r,
                         double gate);
-  /// x <- x (+) dx, and P turns with the tangent planes of unit vectors
-  void Move(const double* dx) {
-    const auto move = [&](auto index) {
+  /// Computes x <- x (+) dx and rotates P with the tangent planes of unit vectors.
+  void ApplyCorrection(const double* dx) {
+    const auto apply = [&](auto index) {
       constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
       double moved[Space<b>::kAmbient];
       Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
@@ -231,23 +232,23 @@ class StaticEkf {
       if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
         double j[n * n];
         Space<b>::Transport(value<b>(), moved, j);
-        const Transition<n> turn{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
-        Propagate<TangentOffset(b)>(turn);
+        const Transition<n> transport{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
+        Propagate<TangentOffset(b)>(transport);
       }
       std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
     };
-    detail::ForEach(move, Indices{});
+    detail::ForEach(apply, Indices{});
   }
 
   std::tuple<Motions...> motions_;
   double x_[kAmbient] = {};
   Covariance p_ = Covariance::Zero();
-  std::tuple<Held<Motions>...> held_;  ///< of discrete noise, while an interval goes on
-  bool in_interval_ = false;           ///< P has been stepped since anything else changed it
+  std::tuple<DiscreteNoise<Motions>...> noise_;  ///< of the current interval
+  bool in_interval_ = false;                     ///< the last change of P was a prediction
 };
 
-// Loops of constant length are unrolled at any level of optimisation; not under sanitizers, for the
-// reason of ALIDADE_FLATTEN.
+// Unrolls a loop of constant length at any level of optimisation. Disabled under sanitizers, for
+// the same reason as ALIDADE_FLATTEN.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ALIDADE_UNROLL
 #else
@@ -256,12 +257,12 @@ class StaticEkf {
 
 template <class... Motions>
 template <class Change>
-bool StaticEkf<Motions...>::Try(const Change& change) {
+bool StaticEkf<Motions...>::ApplyIfFinite(const Change& change) {
   double x[kAmbient];
   std::copy_n(x_, kAmbient, x);
   const Covariance p = p_;
   change();
-  double sum = 0.0;  // 0 times what is not finite is not a number
+  double sum = 0.0;  // 0 times a number that is not finite is NaN
   ALIDADE_UNROLL for (int i = 0; i < kAmbient; ++i) sum += 0.0 * x_[i];
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int j = 0; j <= i; ++j) sum += 0.0 * p_(i, j);
@@ -327,7 +328,7 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
   Eigen::Matrix<double, kTangent, m> pht;
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int c = 0; c < m; ++c) {
-      double sum = -0.0;  // adds nothing, not even a sign
+      double sum = -0.0;  // neutral in a sum, also in its sign
       const auto add = [&](auto index) {
         constexpr int role = decltype(index)::value, o = TangentOffset(bound[role]);
         constexpr int n = detail::SpaceAt<role, Model>::kTangent;
@@ -379,9 +380,9 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
         p_(i, j) -= sum;
       }
     }
-    Move(dx.data());
+    ApplyCorrection(dx.data());
   };
-  if (!Try(correct)) return StaticOutcome::kNotFinite;
+  if (!ApplyIfFinite(correct)) return StaticOutcome::kNotFinite;
   in_interval_ = false;
   return StaticOutcome::kAccepted;
 }

@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// What one evaluation of a model returns. Anything but kOk leaves the outputs untouched.
+/// Result of one evaluation of a model. Any result except kOk leaves the outputs untouched.
 enum class [[nodiscard]] Status : int{
     kOk = ALIDADE_OK,
     kOutOfDomain = ALIDADE_OUT_OF_DOMAIN,  ///< the model is not defined there
-    kInvalid = ALIDADE_INVALID,            ///< the measurement is of no use
+    kInvalid = ALIDADE_INVALID,            ///< the measurement itself is unusable
     kError = ALIDADE_ERROR,                ///< the plugin failed
 };
 

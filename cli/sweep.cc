@@ -46,16 +46,16 @@ void ReadShard(const std::string& text, SweepOptions& options) {
   const std::size_t slash = text.find('/');
   Shard& shard = options.shard.emplace();
   const bool two = slash != std::string::npos && read(text.substr(0, slash), shard.index) &&
-                   read(text.substr(slash + 1), shard.of);
-  if (two && shard.index >= 1 && shard.index <= shard.of) return;
+                   read(text.substr(slash + 1), shard.count);
+  if (two && shard.index >= 1 && shard.index <= shard.count) return;
   throw CLI::ValidationError("--shard",
                              "'" + text + "' is not a shard; expected i/n with 1 <= i <= n");
 }
 
 /// Every shard has a run, so that each gives a result.
 void CheckShards(const SweepOptions& options) {
-  if (!options.shard || options.shard->of <= options.runs) return;
-  throw CLI::ValidationError("--shard", std::to_string(options.shard->of) + " shards of " +
+  if (!options.shard || options.shard->count <= options.runs) return;
+  throw CLI::ValidationError("--shard", std::to_string(options.shard->count) + " shards of " +
                                             std::to_string(options.runs) +
                                             " runs; expected a run for each shard");
 }
@@ -95,7 +95,7 @@ ExitCode SweepSeeds(const Task& task, SweepOptions options) {
 ExitCode SweepValues(const Task& task, SweepOptions options) {
   const Variation variation = Variation::FromText(task.arguments.vary);
   const std::unique_ptr<SweepFolder> folder = OpenFolder(task, options);
-  const VariedSweep sweep = SweepOver(task.config, task.host, options, variation);
+  const VariedSweep sweep = SweepVariation(task.config, task.host, options, variation);
   task.progress.Clear();
   return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.quiet);
 }
@@ -138,7 +138,7 @@ std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
                                    std::to_string(options.first_seed)};
   if (const std::optional<Shard>& shard = options.shard) {
     list.insert(list.end(),
-                {"--shard", std::to_string(shard->index) + '/' + std::to_string(shard->of)});
+                {"--shard", std::to_string(shard->index) + '/' + std::to_string(shard->count)});
   }
   if (!arguments.vary.empty()) list.insert(list.end(), {"--vary", arguments.vary});
   return list;

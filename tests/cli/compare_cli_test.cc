@@ -206,7 +206,7 @@ TEST_F(CompareCli, RefusesASourceThatCanBeReadOnceForSeveralSeeds) {
   ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
   const Outcome compared = Call({"compare", "table.yaml", "--runs", "2", "-o", "out"});
   EXPECT_EQ(compared.code, 78);
-  EXPECT_TRUE(Contains(compared.err, "can be read once")) << compared.err;
+  EXPECT_TRUE(Contains(compared.err, "can be read only once")) << compared.err;
 }
 
 // FAULTS 85
@@ -478,7 +478,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "swept"}, 65, "swept: is the folder of a sweep; expected folders of");
   fs::create_directory(folder_ / "run.partial");
   Write("run.partial/run.json", "{\"status\": \"running\"}");
-  fails({"compare", "run.partial"}, 65, "run.partial: was not written to its end; expected a ");
+  fails({"compare", "run.partial"}, 65, "run.partial: is incomplete; expected a ");
   fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");
   fails({"compare", "config.yaml", "--first-seed", "3"}, 2, "--first-seed requires --runs");
   fails({"compare", "config.yaml", "--jobs", "3"}, 2, "--jobs requires --runs");

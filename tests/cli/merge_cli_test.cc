@@ -88,7 +88,7 @@ TEST_F(MergeCli, RefusesShardsThatAreMissingOrComeTwice) {
   SweepAll();
   ExpectRefused({"s1", "s3"}, "error: shards are missing: 2/3");
   ExpectRefused({"s2"}, "error: shards are missing: 1/3, 3/3");
-  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: is shard 2/3, which comes twice");
+  ExpectRefused({"s1", "s2", "s3", "./s2"}, "error: ./s2: is shard 2/3, which is given twice");
   ExpectRefused({"s1", "s2", "s4"}, "s4/inputs.json: cannot be read", 66);
   EXPECT_EQ(Merge({}).code, 2);
   EXPECT_EQ(Call({"merge", "s1"}).code, 2) << "no --output";
@@ -101,7 +101,7 @@ TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ASSERT_EQ(Sweep("config", "2/2", {"--set", "sensors.stereo.sigma_px=2"}).code, 0);
   ExpectRefused(
       {"s1", "config"},
-      "config: is not of the same sweep as s1: config.resolved.yaml:34: now 'sigma_px: 2', was "
+      "config: belongs to another sweep than s1: config.resolved.yaml:34: now 'sigma_px: 2', was "
       "'sigma_px: 1.0'");
   ASSERT_EQ(Sweep("varied", "2/2", {"--vary", "sensors.stereo.sigma_px=2"}).code, 0);
   ExpectRefused({"s1", "varied"}, "command: now 'sweep --runs 7 --first-seed 5 --vary ");
@@ -118,7 +118,7 @@ TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ASSERT_NE(id, inputs.npos) << inputs;
   inputs[id + 12] = inputs[id + 12] == '0' ? '1' : '0';
   Write("s2/inputs.json", inputs);
-  ExpectRefused({"s1", "s2"}, "s2: is not of the same sweep as s1: build of program: now ");
+  ExpectRefused({"s1", "s2"}, "s2: belongs to another sweep than s1: build of program: now ");
 }
 
 TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
@@ -128,7 +128,8 @@ TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
   }
   before_ = "export ALIDADE_KERNELS=baseline";
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
-  ExpectRefused({"s1", "s2"}, "s2: is not of the same sweep as s1: kernels: now 'baseline', was ");
+  ExpectRefused({"s1", "s2"},
+                "s2: belongs to another sweep than s1: kernels: now 'baseline', was ");
   before_ = "export ALIDADE_KERNELS=none";
   const Outcome none = Sweep("s3", "2/2");
   EXPECT_EQ(none.code, 2);
@@ -140,9 +141,9 @@ TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
 TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ASSERT_EQ(Sweep("s1", "1/2").code, 0);
   ASSERT_EQ(Sweep("whole", "").code, 0);
-  ExpectRefused({"s1", "whole"}, "whole/inputs.json: is not that of a shard");
+  ExpectRefused({"s1", "whole"}, "whole/inputs.json: is not the inputs.json of a shard");
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "run", "--no-figures"}).code, 0);
-  ExpectRefused({"run", "s1"}, "run/inputs.json: is not that of a shard");
+  ExpectRefused({"run", "s1"}, "run/inputs.json: is not the inputs.json of a shard");
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   const std::string runs = Read("s2/finished_runs.jsonl"), summary = Read("s2/sweep.json");
   // Cut in its last line, a line that is not there, one too many.
@@ -151,7 +152,7 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   Write("s2/finished_runs.jsonl", runs.substr(runs.find('\n') + 1));
   ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:1: is not the run of seed 8");
   Write("s2/finished_runs.jsonl", runs + runs);
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is one line too many");
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is a surplus line");
   fs::remove(folder_ / "s2/finished_runs.jsonl");
   ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl: cannot be read", 66);
   std::string stopped = summary;
@@ -182,7 +183,7 @@ TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   ::kill(process, SIGTERM);
   ASSERT_EQ(Wait(process).code, 75) << Read("stderr");
   ExpectRefused({"s1", "s3", "s4.partial"}, "s4.partial: was stopped before it finished");
-  ExpectRefused({"s1", "s3", "s4"}, "error: s4: is not finished: it is s4.partial");
+  ExpectRefused({"s1", "s3", "s4"}, "error: s4: is not finished: its files are in s4.partial");
   ASSERT_EQ(Call(again).code, 0) << Read("stderr");
   EXPECT_EQ(Merge({"s1", "s3", "s4"}).code, 0) << Read("stderr");
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");

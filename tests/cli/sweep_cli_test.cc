@@ -111,7 +111,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
   const Outcome pipe = Call({"sweep", "table.yaml", "--runs", "2", "-o", "out"});
   EXPECT_EQ(pipe.code, 78);
   EXPECT_TRUE(pipe.err.starts_with("error: table.yaml:11:27 source.path: '")) << pipe.err;
-  EXPECT_TRUE(Contains(pipe.err, "can be read once")) << pipe.err;
+  EXPECT_TRUE(Contains(pipe.err, "can be read only once")) << pipe.err;
   for (const char* once : {"-", "/dev/stdin"}) {
     const Outcome sweep = Call({"sweep", "table.yaml", "--runs", "2", "--set",
                                 std::string("source.path=") + once, "-o", "out"});
@@ -122,7 +122,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
         Call({"sweep", "table.yaml", "--runs", "2", "--vary", "sensors.stereo.sigma_px=1,2",
               "--set", std::string("source.path=") + once, "-o", "out"});
     EXPECT_EQ(varied.code, 78) << varied.err;
-    EXPECT_TRUE(Contains(varied.err, "can be read once")) << varied.err;
+    EXPECT_TRUE(Contains(varied.err, "can be read only once")) << varied.err;
   }
   EXPECT_FALSE(Exists("out"));
   // A key that the source does not know stays unknown.
@@ -302,7 +302,7 @@ TEST_F(SweepCli, AKeyIsNotGivenTwice) {
     const Outcome varied =
         Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary", keys + "=1,2"});
     EXPECT_EQ(varied.code, 2) << varied.err;
-    EXPECT_TRUE(Contains(varied.err, "lacks a key, or has one twice")) << varied.err;
+    EXPECT_TRUE(Contains(varied.err, "has an empty or repeated key")) << varied.err;
   }
 }
 
@@ -327,8 +327,9 @@ TEST_F(SweepCli, RefusesSeveralRunsOverDataThatNoSeedChanges) {
   const Outcome sweep = Call(several);
   EXPECT_EQ(sweep.code, 78);
   EXPECT_TRUE(Contains(sweep.err,
-                       "source 'csv' gives the same data for every seed: all runs would be equal; "
-                       "expected one run, or a source that draws its data from the seed"))
+                       "source 'csv' produces the same data for every seed: all runs would be "
+                       "equal; "
+                       "expected one run, or a source whose data depend on the seed"))
       << sweep.err;
   Arguments varied = several;
   varied.insert(varied.end(), {"--vary", "sensors.stereo.sigma_px=1,2"});
@@ -337,7 +338,7 @@ TEST_F(SweepCli, RefusesSeveralRunsOverDataThatNoSeedChanges) {
   EXPECT_EQ(Call(varied).code, 0);
   const Outcome compared = Call({"compare", "table.yaml", "--runs", "3", "-o", "compared"});
   EXPECT_EQ(compared.code, 78);
-  EXPECT_TRUE(Contains(compared.err, "gives the same data for every seed")) << compared.err;
+  EXPECT_TRUE(Contains(compared.err, "produces the same data for every seed")) << compared.err;
 }
 
 TEST_F(SweepCli, FailuresOfAVariedSweepNameTheirValue) {
@@ -355,8 +356,7 @@ TEST_F(SweepCli, EveryValueHasTheSameEstimators) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"{a: {type: ekf}, b: {type: iekf}},{a: {type: ekf}}",
        "error: --vary estimators: the estimators are a with '{a: {type: ekf}}', but a, b with '{a: "
-       "{type: ekf}, b: {type: iekf}}'; expected the same names for every value, to compare each "
-       "with itself"},
+       "{type: ekf}, b: {type: iekf}}'; expected the same estimators for every value"},
       {"{ekf: {type: ekf}},{other: {type: iekf}}", "the estimators are other with '{other: "}};
   for (const auto& [values, words] : wrong) {
     const Outcome sweep = Call(
@@ -445,11 +445,12 @@ TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
 
 TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
-      {"source.noise", "error: --vary: 'source.noise' varies no key; expected KEY=v1,v2,..."},
-      {"=1,2", "'=1,2' varies no key"},
-      {"a.b=1,,2", "'a.b=1,,2' lacks a value"},
-      {"a.b=", "'a.b=' lacks a value"},
-      {"a.b=[1,2", "leaves a bracket or quote open"},
+      {"source.noise",
+       "error: --vary: 'source.noise' names no key to vary; expected KEY=v1,v2,..."},
+      {"=1,2", "'=1,2' names no key to vary"},
+      {"a.b=1,,2", "'a.b=1,,2' has an empty value"},
+      {"a.b=", "'a.b=' has an empty value"},
+      {"a.b=[1,2", "has an unclosed bracket or quote"},
       {"a.b=1,2,1", "has the value '1' twice"}};
   for (const auto& [text, words] : wrong) {
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--vary", text});
@@ -462,7 +463,7 @@ TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
        "you mean 'sigma_px'?"},
       {"sensors.sterio.sigma_px=1,2",
        "error: --vary sensors.sterio.sigma_px: no 'sensors.sterio' "
-       "in the config; expected a key of a map that is there; did "
+       "in the config; expected a key of an existing map; did "
        "you mean 'stereo'?"},
       {"sensors.stereo.sigma_px=1,-2", "error: --vary sensors.stereo.sigma_px: "},
       {"source.seed=1,2", "error: --vary source.seed: every value is run with the same seeds"}};

@@ -100,7 +100,7 @@ TEST(FinishedRuns, OfSeveralThreadsAreAllWritten) {
   std::set<std::uint64_t> seeds;
   std::ifstream stream(folder.partial() / kFinishedRuns);
   for (std::string line; std::getline(stream, line);) {
-    const std::optional<LineOfRun> read = ReadRunLine(line);
+    const std::optional<ParsedRunLine> read = ReadRunLine(line);
     ASSERT_TRUE(read) << line;
     EXPECT_TRUE(seeds.insert(read->run.seed).second) << "twice: " << read->run.seed;
   }
@@ -111,7 +111,7 @@ TEST(RunLine, OfARunThatFailedSaysSo) {
   SweepRun failed = MakeRun(2);
   failed.status = RunStatus::kFailed;
   const std::string line = RunLine("", failed);
-  const std::optional<LineOfRun> read = ReadRunLine(line);
+  const std::optional<ParsedRunLine> read = ReadRunLine(line);
   ASSERT_TRUE(read);
   EXPECT_EQ(read->run.status, RunStatus::kFailed);
   EXPECT_EQ(RunLine(read->value, read->run), line);

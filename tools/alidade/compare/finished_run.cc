@@ -243,7 +243,7 @@ ComparedRun ReadRun(const fs::path& folder) {
   const JsonNode root(run_json, run_file.string());
   if (root.At("status").Text() == "running") {
     throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
-                                              "was not written to its end", "a finished run"));
+                                              "is incomplete", "a finished run"));
   }
   const Json timing_json = ReadJson(timing_file);
   const JsonNode timing(timing_json, timing_file.string());

@@ -14,28 +14,28 @@ FinishedRuns::FinishedRuns(OutputFolder& folder) : folder_(folder) {
   std::ifstream stream(file, std::ios::binary);
   Place place{file.string(), 0, 0};
   SharedNames names;
-  std::uintmax_t whole = 0;  // bytes of the lines that have their end
+  std::uintmax_t complete_bytes = 0;  // of the lines that have a line end
   for (std::string line; std::getline(stream, line) && !stream.eof();) {
     ++place.line;
-    whole += line.size() + 1;
-    std::optional<LineOfRun> read = ReadRunLine(line);
-    if (!read) {
+    complete_bytes += line.size() + 1;
+    std::optional<ParsedRunLine> parsed = ReadRunLine(line);
+    if (!parsed) {
       throw Error(ExitCode::kBadData,
-                  ErrorLine(place, {}, "is not a line that a sweep writes", "a run as JSON"));
+                  ErrorLine(place, {}, "is not the record of a run", "one run as JSON"));
     }
-    const std::uint64_t seed = read->run.seed;
-    read->run.ShareNames(names);
-    known_.try_emplace({read->value, seed}, std::move(read->run));
+    const std::uint64_t seed = parsed->run.seed;
+    parsed->run.ShareNames(names);
+    runs_.try_emplace({parsed->value, seed}, std::move(parsed->run));
   }
   std::error_code error;
-  if (stream.is_open()) std::filesystem::resize_file(file, whole, error);
+  if (stream.is_open()) std::filesystem::resize_file(file, complete_bytes, error);
   if (error) FailIo(file.string(), "write", error.value());
   file_ = folder.Append(kFinishedRuns);
 }
 
 const SweepRun* FinishedRuns::Find(const std::string& value, std::uint64_t seed) const {
-  const auto found = known_.find({value, seed});
-  return found == known_.end() ? nullptr : &found->second;
+  const auto found = runs_.find({value, seed});
+  return found == runs_.end() ? nullptr : &found->second;
 }
 
 void FinishedRuns::Add(const std::string& value, const SweepRun& run) {

@@ -13,29 +13,31 @@
 
 namespace alidade::internal {
 
-/// The runs of a sweep that came to their end, the RunLine() of each: in `FOLDER.partial` in the
-/// order in which they ended, in the folder of a shard by value and seed, with those that failed.
+/// File with the RunLine() of each finished run of a sweep. In `FOLDER.partial` the lines are in
+/// the order in which the runs finished. In the folder of a shard they are sorted by value and
+/// seed, and failed runs are included.
 constexpr const char* kFinishedRuns = "finished_runs.jsonl";
 
-/// The file of that name in a folder that is being written.
+/// The file kFinishedRuns of a folder that is being written.
 class FinishedRuns {
  public:
-  /// Opens the file, and reads what an earlier sweep into this folder left; a last line that was
-  /// cut short is removed. Errors: kBadData with the line, kCannotCreate, kIo.
+  /// Opens the file and reads the runs that an earlier sweep recorded in it. Removes an incomplete
+  /// last line. Errors: kBadData with the line, kCannotCreate, kIo.
   explicit FinishedRuns(OutputFolder& folder);
 
-  /// Null if that run was not finished earlier.
+  /// Returns a run that was finished earlier, or null.
   const SweepRun* Find(const std::string& value, std::uint64_t seed) const;
-  /// Number of runs that were finished earlier.
-  std::size_t size() const { return known_.size(); }
-  /// Adds a run, from any thread. Error: kIo.
+  /// Returns the number of runs that were finished earlier.
+  std::size_t size() const { return runs_.size(); }
+  /// Appends a run to the file. May be called from any thread. Error: kIo.
   void Add(const std::string& value, const SweepRun& run);
-  /// Error: kIo.
+  /// Closes the file. Error: kIo.
   void Close() { file_->Close(); }
 
  private:
   OutputFolder& folder_;
-  std::map<std::pair<std::string, std::uint64_t>, SweepRun> known_;
+  /// Earlier runs, by value and seed.
+  std::map<std::pair<std::string, std::uint64_t>, SweepRun> runs_;
   std::mutex mutex_;
   std::unique_ptr<OutputFile> file_;
 };

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A sweep, and the value of the varied key that it is of, "" where none is varied.
+/// A sweep result with the value of the varied key, "" if no key is varied.
 struct Part {
   const SweepResult* result;
   std::string value;
@@ -50,14 +50,14 @@ Parts PartsOf(const VariedSweep& sweep) {
 Json EstimatorsOf(const std::vector<SweepSummary>& summaries) {
   Json json = Json::object();
   for (const SweepSummary& summary : summaries) {
-    Json& one = json[summary.name];
-    one = {{"diverged", summary.diverged}, {"inconsistent", summary.inconsistent}};
-    Json& metrics = one["metrics"] = Json::object();
+    Json& entry = json[summary.name];
+    entry = {{"diverged", summary.diverged}, {"inconsistent", summary.inconsistent}};
+    Json& metrics = entry["metrics"] = Json::object();
     for (const auto& [key, spread] : summary.metrics) {
       metrics[key] = {
           {"mean", spread.mean}, {"p05", spread.p05}, {"p50", spread.p50}, {"p95", spread.p95}};
     }
-    Json& nees = one["bounds"] = Json::object();
+    Json& nees = entry["bounds"] = Json::object();
     for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
       nees[key] = {{"low", bounds.low}, {"high", bounds.high}};
     }
@@ -95,33 +95,33 @@ std::string SweepJson(const VariedSweep& sweep) {
                              {"values", std::move(values)}});
 }
 
-/// Keys that any run has, in the order of a comparison.
+/// Collects the metric and count keys of all runs in one result, which OrderedMetrics() sorts.
 RunResult AllKeys(const Parts& parts) {
-  RunResult all;
-  EstimatorResult& keys = all.estimators.emplace_back();
-  std::set<const void*> seen;  // lists of names
-  const auto add = [&seen](const auto& row, auto& to) {
-    if (!seen.insert(&row.names()).second) return;
-    for (const std::string& name : row.names()) to[name];
+  RunResult result;
+  EstimatorResult& keys = result.estimators.emplace_back();
+  std::set<const void*> visited_lists;  // lists of names
+  const auto add = [&visited_lists](const auto& row, auto& map) {
+    if (!visited_lists.insert(&row.names()).second) return;
+    for (const std::string& name : row.names()) map[name];
   };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const SweepRow& one : run.estimators) {
-        add(one.metrics, keys.metrics);
-        add(one.counts, keys.counts);
+      for (const SweepRow& row : run.estimators) {
+        add(row.metrics, keys.metrics);
+        add(row.counts, keys.counts);
       }
     }
   }
-  return all;
+  return result;
 }
 
-/// `header`, below the varied key where there is one.
+/// Returns `header`, preceded by the varied key if there is one.
 std::vector<std::string> Header(const std::string& key, std::vector<std::string> header) {
   if (!key.empty()) header.insert(header.begin(), key);
   return header;
 }
 
-/// Columns of a table, which go by names of their own order.
+/// Columns of a table. Arranges the values of rows, whose names have another order, in columns.
 template <class Value>
 class Columns {
  public:
@@ -129,49 +129,49 @@ class Columns {
     for (std::size_t i = 0; i < names_.size(); ++i) columns_[names_[i]] = i;
   }
   const std::vector<std::string>& names() const { return names_; }
-  /// The cells of a row with those values, none of other names; null: it has none.
-  const std::vector<const Value*>& Of(const NamedValues<Value>& row) {
-    std::vector<std::size_t>& places = places_[&row.names()];
-    if (places.empty()) {
-      for (const std::string& name : row.names()) places.push_back(columns_.at(name));
+  /// Returns the values of a row in the order of the columns; null for columns without a value.
+  const std::vector<const Value*>& Arrange(const NamedValues<Value>& row) {
+    std::vector<std::size_t>& columns = columns_of_list_[&row.names()];
+    if (columns.empty()) {
+      for (const std::string& name : row.names()) columns.push_back(columns_.at(name));
     }
     cells_.assign(names_.size(), nullptr);
-    for (std::size_t i = 0; i < places.size(); ++i) cells_[places[i]] = &row.values()[i];
+    for (std::size_t i = 0; i < columns.size(); ++i) cells_[columns[i]] = &row.values()[i];
     return cells_;
   }
 
  private:
   std::vector<std::string> names_;
   std::map<std::string, std::size_t> columns_;  ///< by name
-  /// By list of names: the columns of its values.
-  std::unordered_map<const void*, std::vector<std::size_t>> places_;
+  /// The column of each name, by the address of the list of names.
+  std::unordered_map<const void*, std::vector<std::size_t>> columns_of_list_;
   std::vector<const Value*> cells_;
 };
 
 void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string& key) {
-  const RunResult all = AllKeys(parts);
-  Columns<double> metrics(internal::OrderedMetrics(all));
-  Columns<std::int64_t> counts(internal::OrderedCounts(all));
+  const RunResult keys = AllKeys(parts);
+  Columns<double> metrics(internal::OrderedMetrics(keys));
+  Columns<std::int64_t> counts(internal::OrderedCounts(keys));
   std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
   header.insert(header.end(), metrics.names().begin(), metrics.names().end());
   header.insert(header.end(), counts.names().begin(), counts.names().end());
   CsvFile csv(folder, "runs.csv", header);
-  const auto write_run = [&](const Part& part, const SweepRun& run, const SweepRow& one) {
+  const auto write_run = [&](const Part& part, const SweepRun& run, const SweepRow& row) {
     if (!key.empty()) csv.Text(part.value);
-    csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
-    csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
-    for (const double* const value : metrics.Of(one.metrics)) {
+    csv.Integer(static_cast<std::int64_t>(run.seed)).Text(row.name);
+    csv.Text(row.diverged ? "true" : "false").Text(row.inconsistent ? "true" : "false");
+    for (const double* const value : metrics.Arrange(row.metrics)) {
       value == nullptr ? csv.Empty() : csv.Number(*value);
     }
-    for (const std::int64_t* const count : counts.Of(one.counts)) {
+    for (const std::int64_t* const count : counts.Arrange(row.counts)) {
       csv.Integer(count == nullptr ? 0 : *count);
     }
     csv.EndRow();
   };
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
-      for (const SweepRow& one : run.estimators) {
-        if (run.Uses(one) || one.diverged) write_run(part, run, one);
+      for (const SweepRow& row : run.estimators) {
+        if (run.UsesMetricsOf(row) || row.diverged) write_run(part, run, row);
       }
     }
   }
@@ -180,8 +180,10 @@ void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string
 
 void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
-  const auto any = [&](const Part& part) { return std::ranges::any_of(part.result->done, failed); };
-  if (std::ranges::none_of(parts, any)) return;
+  const auto has_failed_run = [&](const Part& part) {
+    return std::ranges::any_of(part.result->done, failed);
+  };
+  if (std::ranges::none_of(parts, has_failed_run)) return;
   CsvFile csv(folder, "failures.csv", Header(key, {"seed", "exit_code", "reason"}));
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
@@ -194,7 +196,7 @@ void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::st
   csv.Close();
 }
 
-/// Replaces the runs in the order in which they ended by all of them, by value and seed.
+/// Replaces the file of finished runs by one with all runs, sorted by value and seed.
 void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
   const std::string sorted = std::string(internal::kFinishedRuns) + ".sorted";
   const auto file = folder.Create(sorted);
@@ -207,26 +209,26 @@ void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
   if (error) internal::FailIo((folder.partial() / sorted).string(), "rename", error.value());
 }
 
-/// Refuses to continue a sweep of another config or other inputs than `now`.
+/// Refuses to continue a sweep whose config or inputs differ from `current`.
 void CheckInputs(const fs::path& partial, const internal::InputTexts& current) {
   const std::string difference = internal::DescribeDifferences(
       internal::ReadInputTexts(partial), (partial / internal::kInputsFile).string(), current);
   if (difference.empty()) return;
   throw Error(ExitCode::kCannotCreate,
               ErrorLine(Place{partial.string()}, {}, "was made from other inputs: " + difference) +
-                  "; to start anew, remove it, or replace it by --force without --resume");
+                  "; to start again, remove it, or use --force without --resume");
 }
 
-/// Removes what a sweep that was stopped has written of its results.
+/// Removes the result files of a stopped sweep.
 void RemoveResults(const OutputFolder& folder) {
-  const std::set<std::string> kept = {internal::kResolvedConfig, internal::kInputsFile,
-                                      internal::kFinishedRuns, "files.txt"};
+  const std::set<std::string> permanent = {internal::kResolvedConfig, internal::kInputsFile,
+                                           internal::kFinishedRuns, "files.txt"};
   std::set<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder.partial())) {
     names.insert(entry.path().filename().string());
   }
   for (const std::string& name : names) {
-    if (!kept.contains(name)) folder.Remove(name);
+    if (!permanent.contains(name)) folder.Remove(name);
   }
 }
 
@@ -235,7 +237,7 @@ void RemoveResults(const OutputFolder& folder) {
 struct SweepFolder::Impl {
   Impl(const Options& options, const Config& config);
   Impl(const fs::path& path, bool force) : folder(path, force) {}
-  /// The end of every Write().
+  /// Completes the folder at the end of Write().
   void Complete(const Parts& parts, bool stopped, const Config& config);
 
   OutputFolder folder;

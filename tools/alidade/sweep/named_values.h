@@ -12,50 +12,50 @@
 
 namespace alidade {
 
-/// Lists of names, each kept once.
+/// Pool of lists of names that stores equal lists once.
 class SharedNames {
  public:
   using List = std::shared_ptr<const std::vector<std::string>>;
 
-  /// The first of those given that is the same.
-  const List& Of(const List& names) { return *lists_.insert(names).first; }
+  /// Returns the stored list that equals `names`; stores `names` if there is no such list.
+  const List& Intern(const List& names) { return *lists_.insert(names).first; }
 
  private:
-  struct Before {
+  struct LessByNames {
     bool operator()(const List& a, const List& b) const { return *a < *b; }
   };
-  std::set<List, Before> lists_;
+  std::set<List, LessByNames> lists_;
 };
 
-/// Values by name, in the order of the names. The runs of a sweep have the same names, mostly: they
-/// share one list of them, and a run is a row of numbers.
+/// Values by name, in the order of the names. Most runs of a sweep have the same names: they share
+/// one list of names, and each stores a row of values only.
 template <class Value>
 class NamedValues {
  public:
   NamedValues() : NamedValues(std::map<std::string, Value>()) {}
-  explicit NamedValues(const std::map<std::string, Value>& from) {
+  explicit NamedValues(const std::map<std::string, Value>& map) {
     std::vector<std::string> names;
-    names.reserve(from.size());
-    values_.reserve(from.size());
-    for (const auto& [name, value] : from) {
+    names.reserve(map.size());
+    values_.reserve(map.size());
+    for (const auto& [name, value] : map) {
       names.push_back(name);
       values_.push_back(value);
     }
     names_ = std::make_shared<const std::vector<std::string>>(std::move(names));
   }
 
-  /// By address the same for all that share it.
+  /// Returns the list of names. Objects that share a list return the same address.
   const std::vector<std::string>& names() const { return *names_; }
   const std::vector<Value>& values() const { return values_; }
-  /// Null: there is none of that name.
+  /// Returns the value of that name, or null.
   const Value* Find(std::string_view name) const {
-    const auto at = std::ranges::lower_bound(names(), name);
-    if (at == names().end() || *at != name) return nullptr;
-    return &values_[static_cast<std::size_t>(at - names().begin())];
+    const auto position = std::ranges::lower_bound(names(), name);
+    if (position == names().end() || *position != name) return nullptr;
+    return &values_[static_cast<std::size_t>(position - names().begin())];
   }
 
-  /// Of several that have the same names all have one list then.
-  void ShareNames(SharedNames& with) { names_ = with.Of(names_); }
+  /// Replaces the list of names by the equal one from the pool.
+  void ShareNames(SharedNames& pool) { names_ = pool.Intern(names_); }
 
  private:
   SharedNames::List names_;

@@ -10,7 +10,8 @@ namespace alidade::internal {
 
 std::int64_t UsableProcessors() {
   cpu_set_t usable;
-  // The set has room for 1024 processors; where there are more, all of them count.
+  // The set has room for 1024 processors. On a larger machine the call fails, and all of them
+  // count.
   if (::sched_getaffinity(0, sizeof usable, &usable) == 0) return CPU_COUNT(&usable);
   return std::max<std::int64_t>(1, std::thread::hardware_concurrency());
 }

@@ -5,8 +5,8 @@
 
 namespace alidade::internal {
 
-/// The processors that this process may use, at least 1: those of its affinity mask, which a batch
-/// system, `taskset` or a container may have made smaller than the machine.
+/// Returns the number of processors that this process may use, at least 1. It counts the
+/// processors in the affinity mask, which a batch system, `taskset` or a container may restrict.
 std::int64_t UsableProcessors();
 
 }  // namespace alidade::internal

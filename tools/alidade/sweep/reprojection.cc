@@ -14,16 +14,16 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kMostFrames = 500;
+constexpr std::size_t kMaxFrames = 500;
 
-/// The runs of one value for one estimator and sensor.
+/// Mean errors over the runs of one value, for one estimator and sensor.
 struct MeanErrors {
   FrameErrors mean;
-  std::vector<int> runs = {};  ///< by frame
+  std::vector<int> runs = {};  ///< number of runs, by frame
 };
 
-bool IsOf(const FrameErrors& one, const FrameErrors& another) {
-  return one.estimator == another.estimator && one.sensor == another.sensor;
+bool HaveSameSensor(const FrameErrors& a, const FrameErrors& b) {
+  return a.estimator == b.estimator && a.sensor == b.sensor;
 }
 
 void AddTo(MeanErrors& sum, const FrameErrors& errors) {
@@ -36,16 +36,16 @@ void AddTo(MeanErrors& sum, const FrameErrors& errors) {
   }
 }
 
-/// By estimator and sensor.
+/// Returns the mean errors of one value, by estimator and sensor.
 std::vector<MeanErrors> MeansOf(const SweepResult& result) {
   std::vector<MeanErrors> means;
   for (const SweepRun& run : result.done) {
     for (const SweepRow& estimator : run.estimators) {
-      if (!run.Uses(estimator)) continue;
+      if (!run.UsesMetricsOf(estimator)) continue;
       for (const FrameErrors& errors : run.reprojection) {
         if (errors.estimator != estimator.name) continue;
         auto mean = std::ranges::find_if(
-            means, [&](const MeanErrors& one) { return IsOf(one.mean, errors); });
+            means, [&](const MeanErrors& entry) { return HaveSameSensor(entry.mean, errors); });
         if (mean == means.end()) {
           mean = means.insert(mean,
                               MeanErrors{{errors.estimator, errors.sensor, errors.unit, {}}, {}});
@@ -54,26 +54,26 @@ std::vector<MeanErrors> MeansOf(const SweepResult& result) {
       }
     }
   }
-  for (MeanErrors& one : means) {
-    for (std::size_t k = 0; k < one.runs.size(); ++k) one.mean.rms[k] /= one.runs[k];
+  for (MeanErrors& entry : means) {
+    for (std::size_t k = 0; k < entry.runs.size(); ++k) entry.mean.rms[k] /= entry.runs[k];
   }
   return means;
 }
 
-/// By value, estimator and sensor: the order of the rows of `reprojection.csv`.
+/// Returns the mean errors by value, estimator and sensor, in the order of `reprojection.csv`.
 std::vector<std::vector<MeanErrors>> MeansOf(const VariedSweep& sweep) {
   std::vector<std::vector<MeanErrors>> means;
   for (const SweepResult& result : sweep.results) means.push_back(MeansOf(result));
   return means;
 }
 
-/// The rows of one value, estimator and sensor.
+/// Returns the gnuplot condition that selects `count` rows from row `first`.
 std::string Rows(std::size_t first, std::size_t count) {
   return "column(0) >= " + std::to_string(first) + " && column(0) < " +
          std::to_string(first + count);
 }
 
-/// The curves of one estimator and sensor, one for each value.
+/// Adds the panel of one estimator and sensor, with one curve for each value.
 void AddPanel(FigureScript& script, const std::vector<std::vector<MeanErrors>>& means,
               const FrameErrors& panel, const std::vector<std::string>& labels) {
   script.Panel(panel.estimator + ", " + panel.sensor + ": rms of z - h, mean over the runs",
@@ -81,12 +81,12 @@ void AddPanel(FigureScript& script, const std::vector<std::vector<MeanErrors>>& 
   script.Set("set logscale y 2\nset format y '%g'\nset xrange [1:*]");
   std::size_t row = 0;
   for (std::size_t v = 0; v < means.size(); ++v) {
-    for (const MeanErrors& one : means[v]) {
+    for (const MeanErrors& errors : means[v]) {
       const std::size_t first = row;
-      row += one.runs.size();
-      if (!IsOf(one.mean, panel) || v >= kMaxCurves) continue;
+      row += errors.runs.size();
+      if (!HaveSameSensor(errors.mean, panel) || v >= kMaxCurves) continue;
       script.Curve({"reprojection.csv", 0},
-                   "(column('frame')):(" + Rows(first, one.runs.size()) +
+                   "(column('frame')):(" + Rows(first, errors.runs.size()) +
                        " ? column('rms') : NaN) with lines ls " + std::to_string(v + 1),
                    labels[v]);
     }
@@ -95,22 +95,24 @@ void AddPanel(FigureScript& script, const std::vector<std::vector<MeanErrors>>& 
 
 FigureScript ReprojectionFigure(const VariedSweep& sweep) {
   const std::vector<std::string>& values = sweep.variation.values;
-  const std::string some = values.size() <= kMaxCurves
-                               ? ""
-                               : ": the first " + std::to_string(kMaxCurves) + " of " +
-                                     std::to_string(values.size()) + " values";
+  const std::string selection = values.size() <= kMaxCurves
+                                    ? ""
+                                    : ": the first " + std::to_string(kMaxCurves) + " of " +
+                                          std::to_string(values.size()) + " values";
   FigureScript script("reprojection",
-                      "reprojection error of each frame, by " + sweep.variation.key + some,
+                      "reprojection error of each frame, by " + sweep.variation.key + selection,
                       "frame");
   const std::vector<std::vector<MeanErrors>> means = MeansOf(sweep);
   const std::vector<std::string> labels = ValueLabels(values);
   std::vector<FrameErrors> panels;
-  for (const std::vector<MeanErrors>& of_value : means) {
-    for (const MeanErrors& one : of_value) {
-      const auto same = [&](const FrameErrors& other) { return IsOf(other, one.mean); };
-      if (panels.size() == kMaxPanels || std::ranges::any_of(panels, same)) continue;
-      panels.push_back(one.mean);
-      AddPanel(script, means, one.mean, labels);
+  for (const std::vector<MeanErrors>& value_means : means) {
+    for (const MeanErrors& errors : value_means) {
+      const auto is_same = [&](const FrameErrors& panel) {
+        return HaveSameSensor(panel, errors.mean);
+      };
+      if (panels.size() == kMaxPanels || std::ranges::any_of(panels, is_same)) continue;
+      panels.push_back(errors.mean);
+      AddPanel(script, means, errors.mean, labels);
     }
   }
   return script;
@@ -118,23 +120,23 @@ FigureScript ReprojectionFigure(const VariedSweep& sweep) {
 
 }  // namespace
 
-void ReprojectionOfRun::Begin(const Experiment& experiment) {
+void ReprojectionRecorder::Begin(const Experiment& experiment) {
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
     const EstimatorSpec& spec = experiment.estimators[e];
     for (std::size_t s = 0; s < spec.problem.sensors.size(); ++s) {
       const SensorBinding& sensor = spec.problem.sensors[s];
       if (!HasReprojection(sensor)) continue;
-      places_.push_back({static_cast<int>(e), static_cast<int>(s)});
+      sensors_.push_back({static_cast<int>(e), static_cast<int>(s)});
       errors_.push_back({spec.name, sensor.name, sensor.model->measurement().unit, {}});
     }
   }
 }
 
-void ReprojectionOfRun::OnEstimate(int estimator, const SourceFrame& /*frame*/,
-                                   const State& /*state*/, const UpdateReport& report) {
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (places_[i].estimator != estimator || errors_[i].rms.size() == kMostFrames) continue;
-    errors_[i].rms.push_back(FrameInnovationOf(report, places_[i].sensor).rms);
+void ReprojectionRecorder::OnEstimate(int estimator, const SourceFrame& /*frame*/,
+                                      const State& /*state*/, const UpdateReport& report) {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensors_[i].estimator != estimator || errors_[i].rms.size() == kMaxFrames) continue;
+    errors_[i].rms.push_back(FrameInnovationOf(report, sensors_[i].sensor).rms);
   }
 }
 
@@ -144,11 +146,11 @@ void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep) {
   CsvFile csv(folder, "reprojection.csv",
               {sweep.variation.key, "estimator", "sensor", "frame", "runs", "rms"});
   for (std::size_t v = 0; v < means.size(); ++v) {
-    for (const MeanErrors& one : means[v]) {
-      for (std::size_t k = 0; k < one.runs.size(); ++k) {
-        csv.Text(sweep.variation.values[v]).Text(one.mean.estimator).Text(one.mean.sensor);
-        csv.Integer(static_cast<std::int64_t>(k) + 1).Integer(one.runs[k]);
-        one.runs[k] > 0 ? csv.Number(one.mean.rms[k]) : csv.Empty();
+    for (const MeanErrors& errors : means[v]) {
+      for (std::size_t k = 0; k < errors.runs.size(); ++k) {
+        csv.Text(sweep.variation.values[v]).Text(errors.mean.estimator).Text(errors.mean.sensor);
+        csv.Integer(static_cast<std::int64_t>(k) + 1).Integer(errors.runs[k]);
+        errors.runs[k] > 0 ? csv.Number(errors.mean.rms[k]) : csv.Empty();
         csv.EndRow();
       }
     }

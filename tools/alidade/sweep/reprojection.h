@@ -9,34 +9,36 @@
 #include "alidade/io/output_folder.h"
 #include "alidade/sweep/sweep.h"
 
-/// The reprojection error over the frames of a varied sweep.
+/// Reprojection error over the frames of a varied sweep.
 namespace alidade::internal {
 
-/// Follows a run: the rms of the innovations z - h of each frame and sensor of landmarks, h at the
-/// prediction, as `NAME/reprojection.csv` has it; of the first 500 frames.
-class ReprojectionOfRun : public RunObserver {
+/// Observer that records the RMS of the innovations z - h, h at the prediction, as in
+/// `NAME/reprojection.csv`: for each landmark sensor and each of the first 500 frames of a run.
+class ReprojectionRecorder : public RunObserver {
  public:
   void Begin(const Experiment& experiment) override;
   void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
-  std::vector<FrameErrors> Take() { return std::move(errors_); }
+  /// Returns the recorded errors and releases them.
+  std::vector<FrameErrors> Release() { return std::move(errors_); }
 
  private:
-  struct Place {
+  struct SensorIndex {
     int estimator, sensor;
   };
 
   std::vector<FrameErrors> errors_;
-  std::vector<Place> places_;  ///< of errors_
+  std::vector<SensorIndex> sensors_;  ///< of each entry of errors_
 };
 
-/// Writes `reprojection.csv`: for each value, estimator and sensor of landmarks a row for each
-/// frame with the mean over the runs that count. Nothing where there are none. Errors:
-/// kCannotCreate, kIo.
+/// Writes `reprojection.csv`: one row for each value, estimator, landmark sensor and frame, with
+/// the mean over the used runs (SweepRun::UsesMetricsOf). Writes no file if there are no errors to
+/// write. Errors: kCannotCreate, kIo.
 void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep);
 
-/// Draws `figures/reprojection.svg` from it, a curve for each value. Returns why there is none, or
-/// "", also where there is nothing to draw. Errors: kIo.
+/// Draws `figures/reprojection.svg` from reprojection.csv, one curve for each value. Returns the
+/// reason if the drawing failed; "" if the figure was drawn or there is nothing to draw. Errors:
+/// kIo.
 std::string DrawReprojection(const OutputFolder& folder, const VariedSweep& sweep,
                              const std::function<bool()>& stop);
 

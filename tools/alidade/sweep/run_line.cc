@@ -11,7 +11,8 @@
 namespace alidade::internal {
 namespace {
 
-/// JSON has no number that is not finite: such a one is a text. A minus of zero takes a point.
+/// Formats a number. JSON cannot represent a number that is not finite; it is written as a string.
+/// Negative zero is written as -0.0 to preserve its sign.
 std::string TextOfNumber(double value) {
   if (!std::isfinite(value)) return '"' + NumberText(value) + '"';
   return value == 0.0 && std::signbit(value) ? "-0.0" : NumberText(value);
@@ -19,16 +20,16 @@ std::string TextOfNumber(double value) {
 
 const char* TextOfFlag(bool flag) { return flag ? "true" : "false"; }
 
-/// `"KEY":{...}`, the values as `text` gives them.
+/// Returns `"KEY":{...}`; `text` formats each value.
 template <class Value, class F>
 std::string MapText(const char* key, const NamedValues<Value>& map, const F& text) {
-  std::string all = JsonString(key) + ":{";
+  std::string json = JsonString(key) + ":{";
   const char* comma = "";
   for (std::size_t i = 0; i < map.names().size(); ++i) {
-    all.append(comma).append(JsonString(map.names()[i])).append(":").append(text(map.values()[i]));
+    json.append(comma).append(JsonString(map.names()[i])).append(":").append(text(map.values()[i]));
     comma = ",";
   }
-  return all + '}';
+  return json + '}';
 }
 
 double NumberOf(const Json& json) {
@@ -39,26 +40,26 @@ double NumberOf(const Json& json) {
   return text == "-inf" ? -infinity : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string TextOfEstimator(const SweepRow& one) {
+std::string TextOfEstimator(const SweepRow& row) {
   const auto count = [](std::int64_t value) { return std::to_string(value); };
   const auto unit = [](const std::string& value) { return JsonString(value); };
-  return "{\"name\":" + JsonString(one.name) + ",\"diverged\":" + TextOfFlag(one.diverged) +
-         ",\"inconsistent\":" + TextOfFlag(one.inconsistent) +
-         ",\"failed\":" + TextOfFlag(one.failed) + ',' + MapText("units", one.units, unit) + ',' +
-         MapText("counts", one.counts, count) + ',' +
-         MapText("metrics", one.metrics, TextOfNumber) + '}';
+  return "{\"name\":" + JsonString(row.name) + ",\"diverged\":" + TextOfFlag(row.diverged) +
+         ",\"inconsistent\":" + TextOfFlag(row.inconsistent) +
+         ",\"failed\":" + TextOfFlag(row.failed) + ',' + MapText("units", row.units, unit) + ',' +
+         MapText("counts", row.counts, count) + ',' +
+         MapText("metrics", row.metrics, TextOfNumber) + '}';
 }
 
 SweepRow EstimatorOf(const Json& json) {
-  EstimatorResult one;
-  one.name = json.at("name").get<std::string>();
-  one.diverged = json.at("diverged").get<bool>();
-  one.inconsistent = json.at("inconsistent").get<bool>();
-  one.failed = json.at("failed").get<bool>();
-  one.units = json.at("units").get<std::map<std::string, std::string>>();
-  one.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();
-  for (const auto& [key, value] : json.at("metrics").items()) one.metrics[key] = NumberOf(value);
-  return SweepRow(one);
+  EstimatorResult result;
+  result.name = json.at("name").get<std::string>();
+  result.diverged = json.at("diverged").get<bool>();
+  result.inconsistent = json.at("inconsistent").get<bool>();
+  result.failed = json.at("failed").get<bool>();
+  result.units = json.at("units").get<std::map<std::string, std::string>>();
+  result.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();
+  for (const auto& [key, value] : json.at("metrics").items()) result.metrics[key] = NumberOf(value);
+  return SweepRow(result);
 }
 
 std::string TextOfErrors(const FrameErrors& errors) {
@@ -89,8 +90,8 @@ SweepRun RunOf(const Json& json) {
   run.code = static_cast<ExitCode>(json.at("code").get<int>());
   run.reason = json.at("reason").get<std::string>();
   run.withheld = json.at("withheld").get<bool>();
-  for (const Json& one : json.at("estimators")) run.estimators.push_back(EstimatorOf(one));
-  for (const Json& one : json.at("reprojection")) run.reprojection.push_back(ErrorsOf(one));
+  for (const Json& row : json.at("estimators")) run.estimators.push_back(EstimatorOf(row));
+  for (const Json& errors : json.at("reprojection")) run.reprojection.push_back(ErrorsOf(errors));
   return run;
 }
 
@@ -102,22 +103,22 @@ std::string RunLine(const std::string& value, const SweepRun& run) {
                      ",\"code\":" + std::to_string(static_cast<int>(run.code)) +
                      ",\"reason\":" + JsonString(run.reason) +
                      ",\"withheld\":" + TextOfFlag(run.withheld) + ",\"estimators\":[";
-  for (const SweepRow& one : run.estimators) {
-    line += TextOfEstimator(one);
-    if (&one != &run.estimators.back()) line += ',';
+  for (const SweepRow& row : run.estimators) {
+    line += TextOfEstimator(row);
+    if (&row != &run.estimators.back()) line += ',';
   }
   line += "],\"reprojection\":[";
-  for (const FrameErrors& one : run.reprojection) {
-    line += TextOfErrors(one);
-    if (&one != &run.reprojection.back()) line += ',';
+  for (const FrameErrors& errors : run.reprojection) {
+    line += TextOfErrors(errors);
+    if (&errors != &run.reprojection.back()) line += ',';
   }
   return line + "]}\n";
 }
 
-std::optional<LineOfRun> ReadRunLine(const std::string& line) {
+std::optional<ParsedRunLine> ReadRunLine(const std::string& line) {
   try {
     const Json json = Json::parse(line);
-    return LineOfRun{json.at("value").get<std::string>(), RunOf(json)};
+    return ParsedRunLine{json.at("value").get<std::string>(), RunOf(json)};
   } catch (const Json::exception&) {
     return {};
   }

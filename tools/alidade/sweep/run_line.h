@@ -8,16 +8,16 @@
 
 namespace alidade::internal {
 
-/// The text of a run that came to its end or failed, one line of JSON with all that the files of a
-/// sweep rest on: `value` is that of the varied key, "" where none is varied.
+/// Formats a finished or failed run as one line of JSON. The line contains all data from which the
+/// files of a sweep are written. `value` is the value of the varied key, "" if no key is varied.
 std::string RunLine(const std::string& value, const SweepRun& run);
 
-/// What such a line says.
-struct LineOfRun {
+/// The content of such a line.
+struct ParsedRunLine {
   std::string value;
   SweepRun run;
 };
-/// None where the line is of another form.
-std::optional<LineOfRun> ReadRunLine(const std::string& line);
+/// Parses such a line. Returns nullopt if it has another form.
+std::optional<ParsedRunLine> ReadRunLine(const std::string& line);
 
 }  // namespace alidade::internal

@@ -22,17 +22,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the folder of a shard says of itself.
+/// Description of a shard, read from its folder.
 struct ShardFolder {
   fs::path folder;
   Shard shard;
   std::vector<std::string> arguments;
-  InputTexts input_texts;  ///< of the whole sweep
+  InputTexts input_texts;  ///< without the option --shard
 };
 
-[[noreturn]] void FailData(const fs::path& file, const std::string& what,
+[[noreturn]] void FailData(const fs::path& file, const std::string& message,
                            const std::string& expected = "") {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string()}, {}, what, expected));
+  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string()}, {}, message, expected));
 }
 
 std::string TextOf(const fs::path& file) {
@@ -42,11 +42,11 @@ std::string TextOf(const fs::path& file) {
   });
 }
 
-/// The value of an option; "" where it is not there.
+/// Returns the value of an option; "" if it is missing.
 std::string ValueOf(const std::vector<std::string>& arguments, const std::string& option) {
-  const auto place = std::ranges::find(arguments, option);
-  const bool is_there = place != arguments.end() && place + 1 != arguments.end();
-  return is_there ? *(place + 1) : "";
+  const auto position = std::ranges::find(arguments, option);
+  const bool has_value = position != arguments.end() && position + 1 != arguments.end();
+  return has_value ? *(position + 1) : "";
 }
 
 template <class Integer>
@@ -56,110 +56,121 @@ Integer IntegerOf(const std::string& text) {
   return number;
 }
 
-/// `3/16`
+/// Formats a shard as `3/16`.
 std::string TextOf(const Shard& shard) {
-  return std::to_string(shard.index) + '/' + std::to_string(shard.of);
+  return std::to_string(shard.index) + '/' + std::to_string(shard.count);
 }
 
 ShardFolder ReadShardFolder(const fs::path& folder) {
   if (!fs::exists(folder) && fs::exists(PartialOf(folder))) {
-    FailData(folder, "is not finished: it is " + PartialOf(folder).string(),
-             "a folder that its sweep has completed");
+    FailData(folder, "is not finished: its files are in " + PartialOf(folder).string(),
+             "the folder of a finished sweep");
   }
   const RecordedInputs recorded = ReadReplayable(folder);
   const std::string text = ValueOf(recorded.command.arguments, "--shard");
   const fs::path inputs = folder / kInputsFile;
   if (recorded.command.arguments[0] != "sweep" || text.empty()) {
-    FailData(inputs, "is not that of a shard", "a folder of `alidade sweep --shard i/n`");
+    FailData(inputs, "is not the inputs.json of a shard",
+             "a folder of `alidade sweep --shard i/n`");
   }
-  ShardFolder one{folder, {}, recorded.command.arguments, {}};
+  ShardFolder shard_folder{folder, {}, recorded.command.arguments, {}};
   const std::size_t slash = std::min(text.find('/'), text.size() - 1);
-  one.shard = {IntegerOf<int>(text.substr(0, slash)), IntegerOf<int>(text.substr(slash + 1))};
-  const auto runs = IntegerOf<std::int64_t>(ValueOf(one.arguments, "--runs"));
-  if (one.shard.index < 1 || one.shard.index > one.shard.of || one.shard.of > runs) {
-    FailData(inputs, "has the shard '" + text + "' of " + std::to_string(runs) + " runs",
-             "i/n with 1 <= i <= n, and a run for each shard");
+  shard_folder.shard = {IntegerOf<int>(text.substr(0, slash)),
+                        IntegerOf<int>(text.substr(slash + 1))};
+  const auto runs = IntegerOf<std::int64_t>(ValueOf(shard_folder.arguments, "--runs"));
+  const Shard& shard = shard_folder.shard;
+  if (shard.index < 1 || shard.index > shard.count || shard.count > runs) {
+    FailData(inputs, "records the shard '" + text + "' of " + std::to_string(runs) + " runs",
+             "i/n with 1 <= i <= n, and at least one run for each shard");
   }
-  one.input_texts = ReadInputTexts(folder);
-  one.input_texts.inputs = WithoutOption(one.input_texts.inputs, "--shard", text);
-  return one;
+  shard_folder.input_texts = ReadInputTexts(folder);
+  shard_folder.input_texts.inputs = WithoutOption(shard_folder.input_texts.inputs, "--shard", text);
+  return shard_folder;
 }
 
-/// Refuses a shard that is of another sweep than the first.
-void CheckSameSweep(const ShardFolder& first, const ShardFolder& one) {
-  if (one.shard.of != first.shard.of) {
-    FailData(one.folder,
-             "is shard " + TextOf(one.shard) + ", but " + first.folder.string() + " is shard " +
-                 TextOf(first.shard),
+/// Refuses a shard of another sweep than the first shard.
+void CheckSameSweep(const ShardFolder& first, const ShardFolder& candidate) {
+  if (candidate.shard.count != first.shard.count) {
+    FailData(candidate.folder,
+             "is shard " + TextOf(candidate.shard) + ", but " + first.folder.string() +
+                 " is shard " + TextOf(first.shard),
              "the shards of one sweep");
   }
   const std::string difference = DescribeDifferences(
-      first.input_texts, (first.folder / kInputsFile).string(), one.input_texts);
+      first.input_texts, (first.folder / kInputsFile).string(), candidate.input_texts);
   if (difference.empty()) return;
-  FailData(one.folder, "is not of the same sweep as " + first.folder.string() + ": " + difference,
+  FailData(candidate.folder,
+           "belongs to another sweep than " + first.folder.string() + ": " + difference,
            "the shards of one sweep");
 }
 
-/// Sorts the shards by index. Refuses shards that come twice or are missing.
-void Order(std::vector<ShardFolder>& shards) {
-  std::ranges::stable_sort(shards, {}, [](const ShardFolder& one) { return one.shard.index; });
+/// Sorts the shards by index. Refuses repeated and missing shards.
+void SortByIndex(std::vector<ShardFolder>& shards) {
+  std::ranges::stable_sort(shards, {},
+                           [](const ShardFolder& folder) { return folder.shard.index; });
   std::vector<std::string> missing;
   int index = 0;
-  for (const ShardFolder& one : shards) {
-    if (one.shard.index == index) {
-      FailData(one.folder, "is shard " + TextOf(one.shard) + ", which comes twice",
+  for (const ShardFolder& folder : shards) {
+    const Shard& shard = folder.shard;
+    if (shard.index == index) {
+      FailData(folder.folder, "is shard " + TextOf(shard) + ", which is given twice",
                "each shard once");
     }
-    while (++index < one.shard.index) missing.push_back(TextOf(Shard{index, one.shard.of}));
+    while (++index < shard.index) missing.push_back(TextOf(Shard{index, shard.count}));
   }
-  const int of = shards.front().shard.of;
-  while (++index <= of) missing.push_back(TextOf(Shard{index, of}));
+  const int count = shards.front().shard.count;
+  while (++index <= count) missing.push_back(TextOf(Shard{index, count}));
   if (missing.empty()) return;
   constexpr std::size_t kShown = 10;
-  const std::size_t count = missing.size();
-  if (count > kShown) missing.resize(kShown);
-  throw Error(ExitCode::kBadData,
-              "shards are missing: " + Join(missing, ", ") +
-                  (count > kShown ? " and " + std::to_string(count - kShown) + " more" : ""));
+  const std::size_t missing_count = missing.size();
+  if (missing_count > kShown) missing.resize(kShown);
+  throw Error(
+      ExitCode::kBadData,
+      "shards are missing: " + Join(missing, ", ") +
+          (missing_count > kShown ? " and " + std::to_string(missing_count - kShown) + " more"
+                                  : ""));
 }
 
-/// Adds the runs of a shard to `results`, which are by value; all share `names`.
-void AddRuns(const ShardFolder& one, const SeedRange& seeds, const std::vector<std::string>& values,
-             SharedNames& names, std::vector<SweepResult>& results) {
-  const fs::path file = one.folder / kFinishedRuns;
+/// Adds the runs of a shard to `results`, which has one entry for each value. Shares their names
+/// through the pool.
+void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
+             const std::vector<std::string>& values, SharedNames& pool,
+             std::vector<SweepResult>& results) {
+  const fs::path file = folder.folder / kFinishedRuns;
   std::ifstream stream(file);
   if (!stream)
     throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read"));
   Place place{file.string(), 0, 0};
-  const auto fail = [&place](const std::string& what) {
-    throw Error(ExitCode::kBadData, ErrorLine(place, {}, what));
+  const auto fail = [&place](const std::string& message) {
+    throw Error(ExitCode::kBadData, ErrorLine(place, {}, message));
   };
   std::string line;
   for (std::size_t v = 0; v < values.size(); ++v) {
     for (std::int64_t i = 0; i < seeds.count; ++i) {
       ++place.line;
       const std::uint64_t seed = seeds.first + static_cast<std::uint64_t>(i);
-      std::optional<LineOfRun> read;
-      if (std::getline(stream, line)) read = ReadRunLine(line);
-      if (!read || read->value != values[v] || read->run.seed != seed)
+      std::optional<ParsedRunLine> parsed;
+      if (std::getline(stream, line)) parsed = ReadRunLine(line);
+      if (!parsed || parsed->value != values[v] || parsed->run.seed != seed)
         fail("is not the run of seed " + std::to_string(seed));
-      read->run.ShareNames(names);
-      results[v].done.push_back(std::move(read->run));
+      parsed->run.ShareNames(pool);
+      results[v].done.push_back(std::move(parsed->run));
     }
   }
-  if (std::getline(stream, line)) fail("is one line too many");
+  if (std::getline(stream, line)) fail("is a surplus line");
 }
 
-/// What the runs of a sweep share, for each value; `summary` is the sweep.json of any shard.
+/// Returns a result without runs for each value. `summary` is the sweep.json of any shard.
 std::vector<SweepResult> EmptyResults(const Json& summary, std::int64_t runs,
                                       std::uint64_t first_seed) {
   std::vector<SweepResult> results;
-  const auto add = [&](const Json& of) {
+  const auto add = [&](const Json& entry) {
     SweepResult& result = results.emplace_back();
     result.runs = runs;
     result.first_seed = first_seed;
-    result.reference = of.at("reference").get<std::string>();
-    for (const auto& [name, one] : of.at("estimators").items()) result.estimators.push_back(name);
+    result.reference = entry.at("reference").get<std::string>();
+    for (const auto& [name, estimator] : entry.at("estimators").items())
+      result.estimators.push_back(name);
   };
   const auto values = summary.find("values");
   if (values == summary.end()) {
@@ -181,10 +192,11 @@ std::vector<SweepResult> ReadResults(const std::vector<ShardFolder>& shards,
     results = EmptyResults(ParseJson(TextOf(file), file.string()), runs, first_seed);
   } catch (const Json::exception&) {
   }
-  if (results.size() != values.size()) FailData(file, "is not what a sweep of this version writes");
-  SharedNames names;
-  for (const ShardFolder& one : shards) {
-    AddRuns(one, SeedsOf(one.shard, first_seed, runs), values, names, results);
+  if (results.size() != values.size())
+    FailData(file, "is not the sweep.json of a sweep of this version");
+  SharedNames pool;
+  for (const ShardFolder& folder : shards) {
+    AddRuns(folder, SeedsOf(folder.shard, first_seed, runs), values, pool, results);
   }
   return results;
 }
@@ -198,7 +210,7 @@ MergedSweep MergeShards(const std::vector<fs::path>& folders) {
     shards.push_back(ReadShardFolder(folder));
     CheckSameSweep(shards.front(), shards.back());
   }
-  Order(shards);
+  SortByIndex(shards);
   const ShardFolder& first = shards.front();
   const std::string varied = ValueOf(first.arguments, "--vary");
   std::optional<Variation> variation;

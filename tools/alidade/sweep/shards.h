@@ -9,21 +9,21 @@
 #include "alidade/config/config.h"
 #include "alidade/sweep/sweep.h"
 
-/// The shards of one sweep, put together.
+/// Merging of the shards of one sweep.
 namespace alidade::internal {
 
-/// A sweep, as one process would have made it.
+/// A merged sweep, equal to the result of one process that executes all runs.
 struct MergedSweep {
   Config config;
   std::string inputs;                  ///< the text of inputs.json
-  std::optional<Variation> variation;  ///< none: no key is varied
-  std::vector<SweepResult> results;    ///< by value; one where none is varied
+  std::optional<Variation> variation;  ///< nullopt: no key is varied
+  std::vector<SweepResult> results;    ///< by value; one entry if no key is varied
 };
 
-/// Reads the folders of all shards of one sweep, in any order. Errors: kInputMissing where a folder
-/// or a file of it is missing; kBadData where one is not that of a finished shard, or of another
-/// sweep than the first: of another config, other options, another build or data; where a shard
-/// comes twice or is missing, or lacks a run.
+/// Reads the folders of all shards of one sweep, in any order. Errors: kInputMissing if a folder or
+/// a file in it is missing. kBadData if a folder is not that of a finished shard; if its config,
+/// options, build or data differ from those of the first; if a shard is given twice or is missing;
+/// or if a shard lacks a run.
 MergedSweep MergeShards(const std::vector<std::filesystem::path>& folders);
 
 }  // namespace alidade::internal

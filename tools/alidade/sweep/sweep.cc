@@ -19,28 +19,28 @@ namespace alidade {
 
 namespace {
 
-/// The runs of a sweep, handed out to threads one after the other.
-class Queue {
+/// Queue of the runs of a sweep, which several threads process.
+class RunQueue {
  public:
-  Queue(const Config& config, const PluginHost& host, const SweepOptions& options,
-        std::uint64_t first_seed, std::int64_t runs)
+  RunQueue(const Config& config, const PluginHost& host, const SweepOptions& options,
+           std::uint64_t first_seed, std::int64_t runs)
       : config_(config), host_(host), options_(options), first_seed_(first_seed), runs_(runs) {}
 
-  /// Takes runs until there are none left. What ends it before that, Take() throws.
-  void Work() noexcept {
+  /// Executes runs until the queue is empty. Release() rethrows an exception that ends it early.
+  void ExecuteRuns() noexcept {
     try {
       const Config config = CopyOfConfig();
-      while (TakeOne(config)) continue;
+      while (ExecuteNextRun(config)) continue;
     } catch (...) {
       const std::lock_guard lock(mutex_);
-      thrown_ = std::current_exception();
+      exception_ = std::current_exception();
       next_ = runs_;
     }
   }
 
-  /// The finished ones, by seed.
-  std::vector<SweepRun> Take() {
-    if (thrown_) std::rethrow_exception(thrown_);
+  /// Returns the finished runs, sorted by seed, and releases them.
+  std::vector<SweepRun> Release() {
+    if (exception_) std::rethrow_exception(exception_);
     std::sort(done_.begin(), done_.end(),
               [](const SweepRun& a, const SweepRun& b) { return a.seed < b.seed; });
     return std::move(done_);
@@ -49,17 +49,18 @@ class Queue {
  private:
   bool Stopped() const { return options_.stop && options_.stop(); }
 
-  /// False where none is left. Once it is stopped, only those that were finished before are taken.
-  bool TakeOne(const Config& config) {
+  /// Executes the next run, or returns false if there are no more. After a stop it only adds runs
+  /// that were finished earlier.
+  bool ExecuteNextRun(const Config& config) {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
     const std::uint64_t seed = first_seed_ + static_cast<std::uint64_t>(index);
-    const SweepRun* const known =
+    const SweepRun* const earlier =
         options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
-    if (known == nullptr && Stopped()) return true;
-    SweepRun run = known != nullptr ? *known : RunSeed(config, seed);
+    if (earlier == nullptr && Stopped()) return true;
+    SweepRun run = earlier != nullptr ? *earlier : RunSeed(config, seed);
     if (run.status == RunStatus::kStopped) return true;
-    if (known == nullptr && options_.finished != nullptr && run.status == RunStatus::kOk) {
+    if (earlier == nullptr && options_.finished != nullptr && run.status == RunStatus::kOk) {
       options_.finished->Add(options_.value, run);
     }
     const std::lock_guard lock(mutex_);
@@ -69,18 +70,18 @@ class Queue {
     return true;
   }
 
-  /// For one thread: asking marks keys as read.
+  /// Returns a copy for one thread, because a query marks keys of a config as read.
   Config CopyOfConfig() {
     const std::lock_guard lock(mutex_);
     return config_.Copy();
   }
 
-  SweepRun RunSeed(const Config& from, std::uint64_t seed) {
+  SweepRun RunSeed(const Config& base, std::uint64_t seed) {
     SweepRun run;
     run.seed = seed;
     const LogScope log("seed " + std::to_string(seed) + ": ", LogLevel::kInfo);
     try {
-      Config config = from.Copy();
+      Config config = base.Copy();
       config.Set("source.seed", std::to_string(seed), "--first-seed");
       Experiment experiment = BuildExperiment(config, host_);
       for (EstimatorSpec& spec : experiment.estimators) {
@@ -88,7 +89,7 @@ class Queue {
       }
       RunOptions options;
       options.stop = options_.stop;
-      internal::ReprojectionOfRun reprojection;
+      internal::ReprojectionRecorder reprojection;
       if (!options_.value.empty()) options.observers = {&reprojection};
       RunResult result =
           options_.run ? options_.run(experiment, options) : Run(experiment, options);
@@ -96,8 +97,10 @@ class Queue {
       run.code = result.code;
       run.reason = std::move(result.reason);
       run.withheld = !result.withheld.empty();
-      for (const EstimatorResult& one : result.estimators) run.estimators.emplace_back(one);
-      run.reprojection = reprojection.Take();
+      for (const EstimatorResult& estimator : result.estimators) {
+        run.estimators.emplace_back(estimator);
+      }
+      run.reprojection = reprojection.Release();
     } catch (...) {
       Failure failure = CaughtFailure();
       run.status = RunStatus::kFailed;
@@ -116,11 +119,11 @@ class Queue {
   std::mutex mutex_;
   std::vector<SweepRun> done_;
   SharedNames names_;
-  std::exception_ptr thrown_;
+  std::exception_ptr exception_;
 };
 
-/// Whether every model on offer may work in several instances at once. Asked of all that the host
-/// has opened: which ones a config uses is known only to those who build it.
+/// Reports whether every loaded model allows several instances at once. It checks all models of the
+/// host, because the models that a config uses are known only when it is built.
 bool MayRunInParallel(const PluginHost& host) {
   return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
     return !entry.is_model() || (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
@@ -141,7 +144,7 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
   SweepResult result;
   CheckReadableAgain(config);
-  // What is wrong with the config is said once, before the first run.
+  // A trial build reports errors of the config once, before the first run.
   {
     const Experiment experiment = BuildExperiment(config, host);
     for (const EstimatorSpec& spec : experiment.estimators) {
@@ -156,31 +159,31 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   result.runs = seeds.count;
   result.first_seed = seeds.first;
 
-  Queue queue(config, host, options, result.first_seed, result.runs);
+  RunQueue queue(config, host, options, result.first_seed, result.runs);
   const std::int64_t jobs = options.jobs > 0 ? options.jobs : UsableProcessors();
-  const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
+  const std::int64_t thread_count = MayRunInParallel(host) ? jobs : 1;
   {
     std::vector<std::jthread> threads;
-    for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
+    for (std::int64_t i = 1; i < std::min(thread_count, result.runs); ++i) {
       try {
-        threads.emplace_back([&queue] { queue.Work(); });
+        threads.emplace_back([&queue] { queue.ExecuteRuns(); });
       } catch (const std::system_error&) {
-        break;  // no more threads are to be had; these do
+        break;  // the system refuses more threads; continue with the existing ones
       }
     }
-    queue.Work();
+    queue.ExecuteRuns();
   }
-  result.done = queue.Take();
+  result.done = queue.Release();
   result.stopped = static_cast<std::int64_t>(result.done.size()) < result.runs;
   return result;
 }
 
 namespace {
 
-/// The values of one estimator over all runs, by name.
+/// Values of one estimator over all runs, by name.
 class ValuesByName {
  public:
-  /// But for those that are not a number.
+  /// Adds the values of one run, except NaN.
   void Add(const NamedValues<double>& row) {
     if (&row.names() != names_) {
       names_ = &row.names();
@@ -192,8 +195,8 @@ class ValuesByName {
       if (!std::isnan(value)) lists_[i]->push_back(value);
     }
   }
-  /// Of each name that has one.
-  std::map<std::string, Spread> TakeSpreads() {
+  /// Computes the spread of each name with at least one value. Consumes the values.
+  std::map<std::string, Spread> ComputeSpreads() && {
     std::map<std::string, Spread> spreads;
     for (auto& [name, list] : values_) {
       if (!list.empty()) spreads[name] = SpreadOf(std::move(list));
@@ -203,8 +206,8 @@ class ValuesByName {
 
  private:
   std::map<std::string, std::vector<double>> values_;
-  const std::vector<std::string>* names_ = nullptr;  ///< of the row before
-  std::vector<std::vector<double>*> lists_;          ///< its places in values_
+  const std::vector<std::string>* names_ = nullptr;  ///< of the previous row
+  std::vector<std::vector<double>*> lists_;          ///< its entries of values_
 };
 
 void AddUnits(const NamedValues<std::string>& row, std::map<std::string, std::string>& units) {
@@ -217,20 +220,20 @@ SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
   SweepSummary summary;
   summary.name = name;
   ValuesByName values;
-  const std::vector<std::string>* units = nullptr;  // of the run before
+  const std::vector<std::string>* units = nullptr;  // of the previous run
   for (const SweepRun& run : result.done) {
-    for (const SweepRow& one : run.estimators) {
-      if (one.name != name) continue;
-      if (&one.units.names() != units) AddUnits(one.units, summary.units);
-      units = &one.units.names();
-      summary.diverged += one.diverged ? 1 : 0;
-      if (!run.Uses(one)) continue;
+    for (const SweepRow& row : run.estimators) {
+      if (row.name != name) continue;
+      if (&row.units.names() != units) AddUnits(row.units, summary.units);
+      units = &row.units.names();
+      summary.diverged += row.diverged ? 1 : 0;
+      if (!run.UsesMetricsOf(row)) continue;
       ++summary.used;
-      summary.inconsistent += one.inconsistent ? 1 : 0;
-      values.Add(one.metrics);
+      summary.inconsistent += row.inconsistent ? 1 : 0;
+      values.Add(row.metrics);
     }
   }
-  summary.metrics = values.TakeSpreads();
+  summary.metrics = std::move(values).ComputeSpreads();
   return summary;
 }
 

@@ -15,10 +15,10 @@ void CheckReadableAgain(const Config& config, const char* reader) {
   if (!path || path->kind() != Node::Kind::kScalar) return;
   std::error_code error;
   const auto status = std::filesystem::status(config.folder() / path->Text(), error);
-  const bool file =
+  const bool is_reopenable =
       !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
-  if (path->Text() != "-" && file) return;
-  path->Fail("'" + path->Text() + "' can be read once, but " + reader, "a regular file");
+  if (path->Text() != "-" && is_reopenable) return;
+  path->Fail("'" + path->Text() + "' can be read only once, but " + reader, "a regular file");
 }
 
 namespace {
@@ -43,13 +43,14 @@ bool AreEqual(const SourceFrame& a, const SourceFrame& b) {
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) {
   CheckReadableAgain(config);
   const Config first = WithSeed(config, seed), second = WithSeed(config, seed + 1);
-  const Experiment one = BuildExperiment(first, host), another = BuildExperiment(second, host);
+  const Experiment first_experiment = BuildExperiment(first, host);
+  const Experiment second_experiment = BuildExperiment(second, host);
   SourceFrame a, b;
   try {
     for (;;) {
-      const bool more = one.source->Next(a);
-      if (more != another.source->Next(b)) return true;
-      if (!more) return false;
+      const bool has_frame = first_experiment.source->Next(a);
+      if (has_frame != second_experiment.source->Next(b)) return true;
+      if (!has_frame) return false;
       if (!AreEqual(a, b)) return true;
     }
   } catch (const Error&) {
@@ -58,18 +59,20 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) 
 }
 
 SeedRange SeedsOf(const Shard& shard, std::uint64_t first_seed, std::int64_t runs) {
-  ALIDADE_EXPECTS(shard.index >= 1 && shard.index <= shard.of);
-  const auto end = [&](int i) { return runs / shard.of * i + runs % shard.of * i / shard.of; };
-  const std::int64_t before = end(shard.index - 1);
-  return {first_seed + static_cast<std::uint64_t>(before), end(shard.index) - before};
+  ALIDADE_EXPECTS(shard.index >= 1 && shard.index <= shard.count);
+  const auto end = [&](int i) {
+    return runs / shard.count * i + runs % shard.count * i / shard.count;
+  };
+  const std::int64_t begin = end(shard.index - 1);
+  return {first_seed + static_cast<std::uint64_t>(begin), end(shard.index) - begin};
 }
 
 void FailUnseeded(const Config& config) {
   const Config copy = config.Copy();
   const Node type = copy.root().At("source").At("type");
   type.Fail(
-      "source '" + type.Text() + "' gives the same data for every seed: all runs would be equal",
-      "one run, or a source that draws its data from the seed");
+      "source '" + type.Text() + "' produces the same data for every seed: all runs would be equal",
+      "one run, or a source whose data depend on the seed");
 }
 
 }  // namespace alidade::internal

@@ -5,32 +5,33 @@
 
 #include "alidade/sweep/sweep.h"
 
-/// The configs of a sweep's runs.
+/// Configs and seeds of the runs of a sweep.
 namespace alidade::internal {
 
-/// Refuses a source that is empty for whoever reads it a second time, as `reader` says: standard
-/// input, or a pipe. Error: kBadConfig.
+/// Refuses a source that can be read only once: standard input, or a pipe. `reader` explains in the
+/// message why it is read again. Error: kBadConfig.
 void CheckReadableAgain(const Config& config,
                         const char* reader = "a sweep reads it for every run");
 
-/// Whether the source of `config` gives other data for `seed` than for the next one: reads both up
-/// to their first difference. A source whose data have an error counts as one that does.
+/// Reports whether the data of the source depend on the seed. Reads the data of `seed` and of the
+/// next seed up to their first difference. Returns true if the data contain an error.
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 
-/// Says that it does not. Error: kBadConfig.
+/// Throws the error for a source whose data do not depend on the seed: kBadConfig.
 [[noreturn]] void FailUnseeded(const Config& config);
 
-/// Seeds that count up from the first.
+/// Consecutive seeds.
 struct SeedRange {
   std::uint64_t first = 1;
   std::int64_t count = 1;
 };
 
-/// Those of a share of `runs` seeds from `first_seed` on: of share i from floor(runs (i - 1) / of)
-/// to floor(runs i / of), so that no two shares differ by more than one.
+/// Returns the seeds of a shard, out of `runs` seeds that start at `first_seed`. Shard i of n has
+/// the offsets from floor(runs (i - 1) / n) up to, but not including, floor(runs i / n). The sizes
+/// of two shards differ by at most one.
 SeedRange SeedsOf(const Shard& shard, std::uint64_t first_seed, std::int64_t runs);
 
-/// As Sweep(), for data that depend on the seed or not.
+/// Equals Sweep(), but does not require that the data depend on the seed.
 SweepResult SweepSeeds(const Config& config, const PluginHost& host, const SweepOptions& options);
 
 }  // namespace alidade::internal

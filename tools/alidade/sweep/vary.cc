@@ -15,19 +15,19 @@ using internal::Quoted;
 
 constexpr const char* kOrigin = "--vary";
 
-[[noreturn]] void FailUsage(const std::string& what) {
-  throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, what,
+[[noreturn]] void FailUsage(const std::string& message) {
+  throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, message,
                                           "KEY=v1,v2,... as in sensors.stereo.sigma_px=0.5,1,2"));
 }
 
-/// Without the blanks around it.
+/// Returns the text without leading and trailing blanks.
 std::string Trimmed(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t");
   if (first == text.npos) return "";
   return text.substr(first, text.find_last_not_of(" \t") + 1 - first);
 }
 
-/// Splits at the commas outside of brackets, braces and quotes.
+/// Splits at the commas outside brackets, braces and quotes.
 std::vector<std::string> SplitValues(const std::string& text) {
   std::vector<std::string> values(1);
   int depth = 0;
@@ -47,23 +47,23 @@ std::vector<std::string> SplitValues(const std::string& text) {
     }
     values.back() += c;
   }
-  if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " leaves a bracket or quote open");
+  if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " has an unclosed bracket or quote");
   std::ranges::transform(values, values.begin(), Trimmed);
   return values;
 }
 
-/// Refuses a key whose map is not there: written wrong, it would make a map that nobody wants.
+/// Refuses a key whose parent map does not exist. A misspelt key would create an unwanted map.
 void CheckKey(const Config& config, const std::string& key) {
   const Place place{kOrigin};
   if (key == "source.seed") {
     internal::FailAt(place, key, "every value is run with the same seeds",
-                     "another key; --first-seed and --runs for the seeds");
+                     "another key; --first-seed and --runs set the seeds");
   }
   Node map = config.root();
   std::size_t start = 0;
   for (std::size_t dot = key.find('.'); dot != key.npos; dot = key.find('.', start)) {
     const std::string name = key.substr(start, dot - start);
-    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set tells
+    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set reports the error
     std::vector<std::string> names;
     std::optional<Node> next;
     for (const auto& [entry, node] : map.Entries()) {
@@ -72,34 +72,35 @@ void CheckKey(const Config& config, const std::string& key) {
     }
     if (!next) {
       internal::FailAt(place, key, "no " + Quoted(key.substr(0, dot)) + " in the config",
-                       "a key of a map that is there", Nearest(name, names));
+                       "a key of an existing map", Nearest(name, names));
     }
     map = *next;
     start = dot + 1;
   }
 }
 
-/// A config of its own for each value.
+/// Returns a copy of the config with the value.
 Config ConfigWith(const Config& config, const Variation& variation, const std::string& value) {
   Config copy = config.Copy();
   variation.Set(copy, value);
   return copy;
 }
 
-/// Refuses a value with which the config is wrong, or has other estimators than with the first.
+/// Refuses a value with which the config is invalid or its estimators differ from those of the
+/// first value.
 void CheckValues(const Config& config, const PluginHost& host, const Variation& variation) {
-  std::vector<std::string> first;
+  std::vector<std::string> first_names;
   for (const std::string& value : variation.values) {
-    const Config with = ConfigWith(config, variation, value);
-    internal::CheckReadableAgain(with);
-    const auto names = internal::NamesOf(BuildExperiment(with, host).estimators);
-    if (first.empty()) first = names;
-    if (names == first) continue;
+    const Config varied = ConfigWith(config, variation, value);
+    internal::CheckReadableAgain(varied);
+    const auto names = internal::NamesOf(BuildExperiment(varied, host).estimators);
+    if (first_names.empty()) first_names = names;
+    if (names == first_names) continue;
     internal::FailAt(Place{kOrigin}, variation.key,
                      "the estimators are " + internal::Join(names) + " with " + Quoted(value) +
-                         ", but " + internal::Join(first) + " with " +
+                         ", but " + internal::Join(first_names) + " with " +
                          Quoted(variation.values.front()),
-                     "the same names for every value, to compare each with itself");
+                     "the same estimators for every value");
   }
 }
 
@@ -107,16 +108,16 @@ void CheckValues(const Config& config, const PluginHost& host, const Variation& 
 
 Variation Variation::FromText(const std::string& text) {
   const std::size_t equals = text.find('=');
-  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " varies no key");
+  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " names no key to vary");
   Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
   std::vector<std::string> keys = variation.Keys();
   std::ranges::sort(keys);
   if (keys.front().empty() || std::ranges::adjacent_find(keys) != keys.end()) {
-    FailUsage(Quoted(text) + " lacks a key, or has one twice");
+    FailUsage(Quoted(text) + " has an empty or repeated key");
   }
   const std::vector<std::string>& values = variation.values;
   for (auto value = values.begin(); value != values.end(); ++value) {
-    if (value->empty()) FailUsage(Quoted(text) + " lacks a value");
+    if (value->empty()) FailUsage(Quoted(text) + " has an empty value");
     if (std::find(values.begin(), value, *value) != value) {
       FailUsage(Quoted(text) + " has the value " + Quoted(*value) + " twice");
     }
@@ -137,11 +138,11 @@ std::vector<std::string> Variation::Keys() const {
 }
 
 void Variation::Set(Config& config, const std::string& value) const {
-  for (const std::string& one : Keys()) config.Set(one, value, kOrigin);
+  for (const std::string& name : Keys()) config.Set(name, value, kOrigin);
 }
 
-VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
-                      const Variation& variation) {
+VariedSweep SweepVariation(const Config& config, const PluginHost& host,
+                           const SweepOptions& options, const Variation& variation) {
   ALIDADE_EXPECTS(!variation.values.empty());
   Config copy = config.Copy();
   copy.Set("alidade", "1", kOrigin);
@@ -154,18 +155,19 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
     internal::FailUnseeded(ConfigWith(config, variation, variation.values.front()));
   }
   VariedSweep sweep{variation, {}};
-  SweepOptions each = options;
+  SweepOptions value_options = options;
   for (const std::string& value : variation.values) {
-    each.value = value;
-    const auto before = static_cast<std::int64_t>(sweep.results.size());
+    value_options.value = value;
+    const auto finished_values = static_cast<std::int64_t>(sweep.results.size());
     if (options.progress) {
-      each.progress = [&options, before, &variation](std::int64_t done, std::int64_t total) {
+      value_options.progress = [&options, finished_values, &variation](std::int64_t done,
+                                                                       std::int64_t total) {
         const auto values = static_cast<std::int64_t>(variation.values.size());
-        options.progress(before * total + done, values * total);
+        options.progress(finished_values * total + done, values * total);
       };
     }
-    const Config with = ConfigWith(config, variation, value);
-    sweep.results.push_back(internal::SweepSeeds(with, host, each));
+    const Config varied = ConfigWith(config, variation, value);
+    sweep.results.push_back(internal::SweepSeeds(varied, host, value_options));
     if (sweep.stopped()) break;
   }
   return sweep;

@@ -40,7 +40,7 @@ bool WriteAll(int fd, std::string_view text) {
 }
 
 /// `text` as a terminal may have it: it obeys none of it but the line ends.
-std::string Harmless(std::string_view text) { return internal::ShownUtf8(text, "\n\t"); }
+std::string Harmless(std::string_view text) { return internal::PrintableUtf8(text, "\n\t"); }
 
 /// What cannot be said on standard error cannot be said.
 void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }

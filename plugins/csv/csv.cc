@@ -142,7 +142,7 @@ class CsvSource : public Source {
           "counts rows as the file has them, not as 'out_of_sequence.policy' puts them",
           "'out_of_sequence.policy: reject', which asks for a file in the order of time");
     }
-    if (!reader_.regular()) {
+    if (!reader_.is_regular()) {
       layout_.blind_after_node->Fail(
           "'" + reader_.name() + "' is a pipe, which cannot be read twice",
           "a regular file, whose rows can be counted first");
@@ -164,7 +164,7 @@ class CsvSource : public Source {
     const bool few = cells_.size() < names_.size();
     const std::size_t column = few ? line_.size() : Column(cells_[names_.size()]) - 1;
     Fail(Place{reader_.name(), reader_.number(), static_cast<int>(column) + 1}, {},
-         (few && reader_.unterminated() ? "the last line is cut short: " : "") +
+         (few && reader_.is_unterminated() ? "the last line is cut short: " : "") +
              count(cells_.size()),
          count(names_.size()) + ", as in line " + std::to_string(header_line_));
   }
@@ -207,7 +207,7 @@ class CsvSource : public Source {
     if (wrong == nullptr) return value;
     std::string expected = "a finite number";
     if (may_miss && !std::isfinite(value))
-      expected += ", or 'source.missing: " + cell::Harmless(text) + '\'';
+      expected += ", or 'source.missing: " + cell::PrintableStart(text) + '\'';
     FailCell(column, wrong, expected);
   }
 
@@ -245,7 +245,7 @@ class CsvSource : public Source {
                              std::string_view expected = "a finite number") const {
     const int at = static_cast<int>(Column(cells_[column.index]));
     Fail(Place{reader_.name(), reader_.number(), at}, column.name,
-         '\'' + cell::Harmless(cell::Trim(cells_[column.index])) + "' " + what, expected);
+         '\'' + cell::PrintableStart(cell::Trim(cells_[column.index])) + "' " + what, expected);
   }
   [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,
                                 std::string_view expected) {

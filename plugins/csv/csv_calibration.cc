@@ -31,7 +31,7 @@ std::optional<Config> CsvCalibration::Get() const {
     double value = 0.0;
     const char* const wrong = cell::ParseNumber(note.text, value);
     if (wrong != nullptr) {
-      Fail(note, '\'' + cell::Harmless(note.text) + "' " + wrong, "a finite number");
+      Fail(note, '\'' + cell::PrintableStart(note.text) + "' " + wrong, "a finite number");
     }
     const auto first = std::ranges::find(notes_, note.key, &Written::key);
     if (&*first != &note) {

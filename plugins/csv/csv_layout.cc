@@ -117,12 +117,12 @@ void Resolve(const std::vector<std::string>& names, const std::string& file, Csv
   if (found == names.end()) {
     std::string expected = "one of ";
     for (std::size_t i = 0; i < std::min(names.size(), kListed); ++i) {
-      expected += (i > 0 ? ", " : "") + cell::Harmless(names[i]);
+      expected += (i > 0 ? ", " : "") + cell::PrintableStart(names[i]);
     }
     if (names.size() > kListed) expected += ", ...";
     const std::string remedy = OtherSeparator(names);
     column.node.Fail("no column '" + column.name + "' in " + file, expected + remedy,
-                     remedy.empty() ? cell::Harmless(Nearest(column.name, names)) : "");
+                     remedy.empty() ? cell::PrintableStart(Nearest(column.name, names)) : "");
   }
   if (std::find(found + 1, names.end(), column.name) != names.end()) {
     column.node.Fail(file + " has two columns '" + column.name + "'", "one");

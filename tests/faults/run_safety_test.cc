@@ -127,9 +127,10 @@ TEST_F(RunSafety, ForceSparesRunsInsideARun) {
     all.insert(all.end(), {"-o", "out", "--force"});
     const Outcome refused = Call(all);
     EXPECT_EQ(refused.code, 73);
-    EXPECT_EQ(refused.err,
-              "error: out: holds files that alidade did not write: 'base', 'ekf/sweep'; move that "
-              "elsewhere, or choose another folder\n");
+    EXPECT_EQ(
+        refused.err,
+        "error: out: contains files that alidade did not write: 'base', 'ekf/sweep'; move them, "
+        "or choose another folder\n");
   }
   EXPECT_TRUE(Exists("out/base/run.json"));
   EXPECT_TRUE(Exists("out/ekf/sweep/sweep.json"));

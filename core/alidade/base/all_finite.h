@@ -8,7 +8,7 @@ namespace alidade::internal {
 
 inline constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// 0; not a number if one of the values is infinite or not a number.
+/// Returns 0, or NaN if a value is infinite or NaN.
 [[gnu::always_inline]] inline double ZeroIfFinite(std::span<const double> values) {
   double sum = 0.0;
   for (const double *value = values.data(), *end = value + values.size(); value != end; ++value) {
@@ -16,7 +16,7 @@ inline constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
   }
   return sum;
 }
-/// Whether none of the values is infinite or not a number.
+/// Returns true if all values are finite.
 [[gnu::always_inline]] inline bool AllFinite(std::span<const double> values) {
   return ZeroIfFinite(values) == 0.0;
 }

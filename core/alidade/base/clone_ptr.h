@@ -6,17 +6,17 @@
 
 namespace alidade {
 
-/// A T somewhere else in memory that is copied with its holder, by T::Clone where it has one. What
-/// was moved from may be assigned to or destroyed. T may be incomplete but where one is made.
+/// Owning pointer that copies its T when it is copied, by T::Clone if T has it. A moved-from
+/// pointer may only be assigned to or destroyed. T may be incomplete, except for the constructor.
 template <class T>
 class ClonePtr {
  public:
   explicit ClonePtr(std::unique_ptr<T> value)
-      : value_(std::move(value)), copy_([](const T& of) -> std::shared_ptr<T> {
-          if constexpr (requires { of.Clone(); }) {
-            return of.Clone();
+      : value_(std::move(value)), copy_([](const T& source) -> std::shared_ptr<T> {
+          if constexpr (requires { source.Clone(); }) {
+            return source.Clone();
           } else {
-            return std::make_shared<T>(of);
+            return std::make_shared<T>(source);
           }
         }) {}
   ClonePtr(const ClonePtr& other) : value_(other.copy_(*other.value_)), copy_(other.copy_) {}
@@ -31,7 +31,7 @@ class ClonePtr {
   const T* operator->() const { return value_.get(); }
 
  private:
-  std::shared_ptr<T> value_;  // never shared: it knows how to delete a T that is incomplete here
+  std::shared_ptr<T> value_;  // never shared; its deleter also works for an incomplete T
   std::shared_ptr<T> (*copy_)(const T&);
 };
 

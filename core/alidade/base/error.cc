@@ -18,15 +18,15 @@ std::string ToString(const Place& place) {
   return text;
 }
 
-std::string ErrorLine(const Place& place, std::string_view key, std::string_view what,
+std::string ErrorLine(const Place& place, std::string_view key, std::string_view problem,
                       std::string_view expected, std::string_view suggestion) {
   std::string line = ToString(place);
   if (!key.empty()) {
     if (!line.empty()) line += ' ';
     line += key;
   }
-  if (!line.empty() && !what.empty()) line += ": ";
-  line += what;
+  if (!line.empty() && !problem.empty()) line += ": ";
+  line += problem;
   if (!expected.empty()) {
     line += expected.starts_with("expected") ? "; " : "; expected ";
     line += expected;
@@ -50,17 +50,17 @@ Failure CaughtFailure() {
 }
 
 int EditDistance(std::string_view a, std::string_view b) {
-  std::vector<int> before_last, last(b.size() + 1), row(b.size() + 1);
+  std::vector<int> second_last, last(b.size() + 1), row(b.size() + 1);
   std::iota(last.begin(), last.end(), 0);
   for (std::size_t i = 1; i <= a.size(); ++i) {
     row[0] = static_cast<int>(i);
     for (std::size_t j = 1; j <= b.size(); ++j) {
       row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
       if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-        row[j] = std::min(row[j], before_last[j - 2] + 1);
+        row[j] = std::min(row[j], second_last[j - 2] + 1);
       }
     }
-    before_last = last;
+    second_last = last;
     last.swap(row);
   }
   return last[b.size()];

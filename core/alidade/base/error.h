@@ -7,35 +7,35 @@
 
 namespace alidade {
 
-/// What a process that ends with this error returns (sysexits where one fits).
+/// Exit code of a process that ends with an error. The values follow sysexits.h if a code applies.
 enum class ExitCode : int {
   kOk = 0,
-  kFound = 1,          ///< ran, and found something wrong (check, compare)
+  kFound = 1,          ///< the command succeeded and found a defect (check, compare)
   kUsage = 2,          ///< the command line
   kBadData = 65,       ///< a measurement file
   kInputMissing = 66,  ///< a file that cannot be opened
-  kPlugin = 69,        ///< a plugin missing or refused
+  kPlugin = 69,        ///< a plugin is missing or was refused
   kInternal = 70,      ///< a defect of this program
   kCannotCreate = 73,  ///< an output that cannot be created
-  kIo = 74,            ///< a read or write that failed half-way
-  kStopped = 75,       ///< stopped by a signal; complete up to there
+  kIo = 74,            ///< a read or write that failed before its end
+  kStopped = 75,       ///< stopped by a signal; the output is complete up to that time
   kNotTrusted = 77,    ///< a file or folder that someone else could have written
   kBadConfig = 78,     ///< the config
   kDiverged = 79,      ///< the filter diverged under `on_divergence: fail`
 };
 
-/// Where a value was written: 1-based line and column, 0 where there is none.
+/// Position of a value in a file: line and column count from 1; 0 means unknown.
 struct Place {
   std::string file;
   int line = 0;
   int column = 0;
 };
 
-/// `FILE:LINE:COL`, leaving out what is zero or empty.
+/// Returns `FILE:LINE:COL` without the parts that are zero or empty.
 std::string ToString(const Place& place);
 
-/// A set-up or input error: what() is one or more lines of the form
-/// `FILE:LINE:COL key: what; expected; did you mean ...?`, without the word "error".
+/// Set-up or input error. Its message is one or more lines of the form
+/// `FILE:LINE:COL key: problem; expected ...; did you mean ...?`, without the word "error".
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
@@ -45,28 +45,29 @@ class Error : public std::runtime_error {
   ExitCode code_;
 };
 
-/// An exception as an end of the program: its exit code, and what to say.
+/// Reason for which the program ends: its exit code and message.
 struct Failure {
   ExitCode code = ExitCode::kInternal;
   std::string reason;
 };
 
-/// Of the exception that is being handled: an Error's own code and text; anything else is internal.
-/// Call it in a catch block only.
+/// Returns the failure of the exception that is being handled: the code and text of an Error;
+/// kInternal for any other exception. Call it only in a catch block.
 Failure CaughtFailure();
 
-/// Composes the one message form of the project; empty parts are left out.
-std::string ErrorLine(const Place& place, std::string_view key, std::string_view what,
+/// Composes an error message in the form that all messages have. Empty parts are omitted.
+std::string ErrorLine(const Place& place, std::string_view key, std::string_view problem,
                       std::string_view expected = {}, std::string_view suggestion = {});
 
-/// The candidate nearest to `word` by edit distance, or "" where none is near enough to suggest.
+/// Returns the candidate with the smallest edit distance to `word`, or "" if it is too large for a
+/// suggestion.
 template <class Range>
 std::string Nearest(std::string_view word, const Range& candidates);
 
-/// Damerau-Levenshtein distance (adjacent transpositions count one).
+/// Returns the Damerau-Levenshtein distance (an adjacent transposition counts one).
 int EditDistance(std::string_view a, std::string_view b);
 
-/// Thrown by ALIDADE_EXPECTS: a programmer's misuse of the API.
+/// Programmer's misuse of the API, thrown by ALIDADE_EXPECTS.
 class ContractViolation : public std::logic_error {
   using std::logic_error::logic_error;
 };

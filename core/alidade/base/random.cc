@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// The finaliser of splitmix64: a bijection of 64 bits with Mix(0) = 0.
+/// Finaliser of splitmix64: a bijection of 64 bits with Mix(0) = 0.
 std::uint64_t Mix(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
@@ -39,7 +39,7 @@ double Random::Normal() {
     has_spare_ = false;
     return spare_;
   }
-  for (;;) {  // a point in the unit disc, uniform; pi/4 of the tries hit
+  for (;;) {  // a uniform point in the unit disc; pi/4 of the points are accepted
     const double u = 2.0 * Uniform() - 1.0;
     const double v = 2.0 * Uniform() - 1.0;
     const double square = u * u + v * v;

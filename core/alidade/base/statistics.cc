@@ -12,12 +12,12 @@
 namespace alidade {
 namespace {
 
-/// y^a e^-y / Gamma(a).
+/// Returns y^a e^-y / Gamma(a).
 double GammaKernel(double a, double y) {
   constexpr double kSmall = 10.0;
   if (a <= kSmall) return std::pow(y, a) * std::exp(-y) / std::tgamma(a);
-  // By Stirling's series of ln Gamma(a), of which the next term is below 1e-15, and with the two
-  // large terms of the exponent taken together: a (ln(y / a) - mu).
+  // Stirling's series of ln Gamma(a); its next term is below 1e-15. The two large terms of the
+  // exponent are combined: a (ln(y / a) - mu).
   const double mu = (y - a) / a, square = 1.0 / (a * a);
   const double log_ratio = mu < -0.5 ? std::log(y / a) : std::log1p(mu);
   constexpr double kSeries[] = {1.0 / 12.0,    -1.0 / 360.0, 1.0 / 1260.0,
@@ -30,14 +30,14 @@ double GammaKernel(double a, double y) {
   return std::sqrt(a / (2.0 * std::numbers::pi)) * std::exp(a * (log_ratio - mu) - stirling);
 }
 
-/// Probabilities that a value of chi-square is below and above x.
+/// Probabilities of values of chi-square below and above x.
 struct Tails {
   double below, above;
 };
 
-/// The regularised incomplete gamma functions P(a, y) and Q(a, y), a = dof / 2, y = x / 2: the
-/// smaller one by its series or its continued fraction, the other one as its complement
-/// [Press2007, sec. 6.2].
+/// Returns the regularised incomplete gamma functions P(a, y) and Q(a, y), a = dof / 2, y = x / 2
+/// [Press2007, sec. 6.2]. The smaller one is computed by its series or its continued fraction, the
+/// larger one as its complement.
 Tails ChiSquareTails(double x, double dof) {
   const double a = 0.5 * dof, y = 0.5 * x;
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
@@ -48,7 +48,7 @@ Tails ChiSquareTails(double x, double dof) {
     for (double k = a + 1.0; term > 0.1 * kEpsilon * sum; k += 1.0) sum += term *= y / k;
     return {kernel * sum, 1.0 - kernel * sum};
   }
-  // Lentz's method; no denominator vanishes, for y > a - 1.
+  // Lentz's method; its denominators are not zero, because y > a - 1.
   double b = y + 1.0 - a, c = std::numeric_limits<double>::max(), d = 1.0 / b, fraction = d;
   for (double k = 1.0, factor = 0.0; std::abs(factor - 1.0) > kEpsilon; k += 1.0) {
     b += 2.0;
@@ -66,7 +66,7 @@ double ChiSquareQuantile(double q, double dof) {
   ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0.0);
   if (q == 0.0) return 0.0;
   if (q == 1.0) return std::numeric_limits<double>::infinity();
-  // By the tail that is not rounded to 1.
+  // Bisection with the tail that is not rounded to 1.
   const auto is_below = [q, dof](double x) {
     const Tails tails = ChiSquareTails(x, dof);
     return q <= 0.5 ? tails.below < q : tails.above > 1.0 - q;
@@ -87,11 +87,11 @@ Interval ConsistencyBounds(double dof, double n, double cut) {
   ALIDADE_EXPECTS(dof > 0.0 && n > 0.0 && cut > 0.0);
   double m = 1.0, v = 2.0 / dof;
   if (std::isfinite(cut)) {
-    // x chi2(x; dof) = dof chi2(x; dof + 2), of the densities.
+    // The densities satisfy x chi2(x; dof) = dof chi2(x; dof + 2).
     const auto below = [cut](double k) { return ChiSquareTails(cut, k).below; };
-    const double all = below(dof);
-    m = below(dof + 2.0) / all;
-    v = (dof + 2.0) / dof * below(dof + 4.0) / all - m * m;
+    const double accepted = below(dof);
+    m = below(dof + 2.0) / accepted;
+    v = (dof + 2.0) / dof * below(dof + 4.0) / accepted - m * m;
   }
   const double nu = 2.0 * n * m * m / v;
   return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
@@ -100,12 +100,12 @@ Interval ConsistencyBounds(double dof, double n, double cut) {
 double Quantile(const std::vector<double>& ascending, double q) {
   ALIDADE_EXPECTS(!ascending.empty() && q >= 0.0 && q <= 1.0);
   const double h = static_cast<double>(ascending.size() - 1) * q;
-  const auto below = static_cast<std::size_t>(h);
-  const double low = ascending[below];
-  const double high = ascending[std::min(below + 1, ascending.size() - 1)];
-  const double share = h - static_cast<double>(below);
-  // Infinities next to one another have no difference.
-  return share == 0.0 || low == high ? low : low + share * (high - low);
+  const auto index = static_cast<std::size_t>(h);
+  const double low = ascending[index];
+  const double high = ascending[std::min(index + 1, ascending.size() - 1)];
+  const double fraction = h - static_cast<double>(index);
+  // The difference of two equal infinities would be NaN.
+  return fraction == 0.0 || low == high ? low : low + fraction * (high - low);
 }
 
 Spread SpreadOf(std::vector<double> values) {

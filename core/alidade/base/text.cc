@@ -11,9 +11,9 @@ std::string Join(const std::vector<std::string>& parts, const char* separator) {
 }
 
 std::string WithArticle(const std::string& noun) {
-  // `unit_quaternion` is spoken with a consonant.
-  const bool vowel = noun.find_first_of("aeiou") == 0 && !noun.starts_with("uni");
-  return (vowel ? "an " : "a ") + noun;
+  // `unit_quaternion` is pronounced with a consonant.
+  const bool has_vowel = noun.find_first_of("aeiou") == 0 && !noun.starts_with("uni");
+  return (has_vowel ? "an " : "a ") + noun;
 }
 
 }  // namespace alidade::internal

@@ -6,17 +6,17 @@
 
 namespace alidade::internal {
 
-/// `a, b, c`
+/// Joins texts: `a, b, c`.
 std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
 
-/// `a source`, `an estimator`
+/// Returns the noun with its article: `a source`, `an estimator`.
 std::string WithArticle(const std::string& noun);
 
-/// The `name` of each.
+/// Returns the member `name` of each element.
 template <class Range>
-std::vector<std::string> NamesOf(const Range& named) {
+std::vector<std::string> NamesOf(const Range& elements) {
   std::vector<std::string> names;
-  for (const auto& one : named) names.push_back(one.name);
+  for (const auto& element : elements) names.push_back(element.name);
   return names;
 }
 

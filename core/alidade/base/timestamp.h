@@ -5,12 +5,12 @@
 
 namespace alidade {
 
-/// Timestamps are int64 nanoseconds from the source's own origin.
+/// Timestamp in nanoseconds from an origin that the source defines.
 using Timestamp = std::int64_t;
 
 inline constexpr Timestamp kNoTimestamp = INT64_MIN;
 
-/// Nearest timestamp to `t_s` seconds; requires |t_s| < 9.2e9 (292 years).
+/// Returns the timestamp nearest to `t_s` seconds; requires |t_s| < 9.2e9 (292 years).
 Timestamp TimestampFromSeconds(double t_s);
 inline double Seconds(Timestamp t) { return 1e-9 * static_cast<double>(t); }
 

@@ -11,8 +11,8 @@
 
 namespace alidade::internal {
 
-/// A csv file written cell by cell: comma, `\n`, numbers in the shortest form that reads back,
-/// texts quoted where RFC 4180 asks for it.
+/// CSV file that is written cell by cell. It has commas, `\n`, numbers in the shortest form that
+/// reads back, and texts quoted if RFC 4180 requires quotes.
 class CsvFile {
  public:
   /// Creates the file with its header. Errors: kCannotCreate, kIo.
@@ -22,17 +22,17 @@ class CsvFile {
   CsvFile& Time(Timestamp timestamp);  ///< empty for kNoTimestamp
   CsvFile& Number(double value);
   CsvFile& Integer(std::int64_t value);
-  /// Empty where it is negative: there is none.
+  /// Appends an empty cell for a negative id, which means no landmark.
   CsvFile& Landmark(std::int64_t id);
   CsvFile& Text(std::string_view value);
   CsvFile& Empty(std::size_t cells = 1);
-  /// `values`, then empty cells up to `width`.
+  /// Appends `values`, then empty cells up to `width`.
   CsvFile& Numbers(const double* values, std::size_t count, std::size_t width);
   /// Ends the row, which must have a cell for each column. Error: kIo.
   void EndRow();
   void Close();
 
-  /// Rows below the header.
+  /// Returns the number of rows below the header.
   std::int64_t rows() const { return rows_; }
 
  private:
@@ -44,7 +44,7 @@ class CsvFile {
   std::int64_t rows_ = 0;
 };
 
-/// `text` as a csv cell.
+/// Returns `text` as a CSV cell.
 std::string CsvQuoted(std::string_view text);
 
 }  // namespace alidade::internal

@@ -11,37 +11,37 @@ namespace fs = std::filesystem;
 
 fs::path FollowLinks(const fs::path& path, const PathVisitor& visit) {
   constexpr int kMaxLinks = 40;
-  std::vector<fs::path> todo;  // the next part last
+  std::vector<fs::path> pending;  // parts in reverse order
   const auto push = [&](const fs::path& added) {
     std::vector<fs::path> parts(added.begin(), added.end());
     std::erase_if(parts, [](const fs::path& part) { return part.empty() || part == "."; });
-    todo.insert(todo.end(), parts.rbegin(), parts.rend());
+    pending.insert(pending.end(), parts.rbegin(), parts.rend());
   };
   push(path);
-  fs::path at;
-  for (int links = 0; !todo.empty();) {
-    const fs::path part = todo.back();
-    todo.pop_back();
+  fs::path resolved;
+  for (int links = 0; !pending.empty();) {
+    const fs::path part = pending.back();
+    pending.pop_back();
     if (part.is_absolute()) {
-      at = part;
+      resolved = part;
       continue;
     }
     if (part == "..") {
-      at = at.parent_path();
+      resolved = resolved.parent_path();
       continue;
     }
-    const fs::path entry = at / part;
-    if (visit) visit(at, entry, todo.empty());
+    const fs::path entry = resolved / part;
+    if (visit) visit(resolved, entry, pending.empty());
     std::error_code error;
     if (!fs::is_symlink(fs::symlink_status(entry, error))) {
-      at = entry;
+      resolved = entry;
       continue;
     }
     const fs::path target = fs::read_symlink(entry, error);
     if (error || ++links > kMaxLinks) return {};
     push(target);
   }
-  return at;
+  return resolved;
 }
 
 }  // namespace alidade::internal

@@ -6,12 +6,13 @@
 
 namespace alidade::internal {
 
-/// Sees an entry of a folder before it is followed; `last` if no other part of the path comes.
+/// Function that is called with each entry of a folder before it is followed. `is_last` is true for
+/// the last part of the path.
 using PathVisitor = std::function<void(const std::filesystem::path& folder,
-                                       const std::filesystem::path& entry, bool last)>;
+                                       const std::filesystem::path& entry, bool is_last)>;
 
-/// Where the absolute `path` leads, part by part from the root, with every symbolic link on the way
-/// followed, also one to nothing. "" beyond 40 links, or if one cannot be read.
+/// Resolves the absolute `path` part by part from the root, with all symbolic links, including
+/// dangling ones. Returns "" after more than 40 links, or if a link cannot be read.
 std::filesystem::path FollowLinks(const std::filesystem::path& path,
                                   const PathVisitor& visit = nullptr);
 

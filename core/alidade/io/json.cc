@@ -9,13 +9,14 @@
 namespace alidade::internal {
 namespace {
 
-/// Why the parser gave up, `syntax error while parsing value - invalid literal`: its message
-/// without its number and place in front, and without the bytes of the file and the tokens behind.
+/// Returns the reason of a parser error, as in `syntax error while parsing value - invalid
+/// literal`. It omits the leading number and position of the message, and the trailing bytes of the
+/// file and tokens.
 std::string ReasonOf(const Json::exception& error) {
-  const std::string what = error.what();
-  const std::size_t place = what.find(": ");
-  const std::size_t from = (place == what.npos ? what.find("] ") : place) + 2;
-  return what.substr(from, what.find(';', from) - from);
+  const std::string message = error.what();
+  const std::size_t position = message.find(": ");
+  const std::size_t start = (position == message.npos ? message.find("] ") : position) + 2;
+  return message.substr(start, message.find(';', start) - start);
 }
 
 }  // namespace
@@ -32,14 +33,15 @@ Json ParseJson(std::string_view text, const std::string& file) {
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {
-    // `byte` counts from 1 and is one beyond the end where the text is cut short.
-    const std::size_t at = std::min(error.byte - std::min<std::size_t>(error.byte, 1), text.size());
-    const std::string_view before = text.substr(0, at);
-    const auto line = 1 + std::ranges::count(before, '\n');
-    const std::size_t column = at - (before.rfind('\n') + 1) + 1;
+    // `byte` counts from 1 and is one beyond the end if the text is incomplete.
+    const std::size_t offset =
+        std::min(error.byte - std::min<std::size_t>(error.byte, 1), text.size());
+    const std::string_view preceding = text.substr(0, offset);
+    const auto line = 1 + std::ranges::count(preceding, '\n');
+    const std::size_t column = offset - (preceding.rfind('\n') + 1) + 1;
     const Place place{file, static_cast<int>(line), static_cast<int>(column)};
     throw Error(ExitCode::kBadData, ErrorLine(place, {}, ReasonOf(error), "JSON"));
-  } catch (const Json::exception& error) {  // a number that no double holds; it has no place
+  } catch (const Json::exception& error) {  // a number out of the range of a double; no position
     throw Error(ExitCode::kBadData, ErrorLine(Place{file}, {}, ReasonOf(error), "JSON"));
   }
 }

@@ -29,18 +29,18 @@ LogLevel FromSpdlog(spdlog::level::level_enum level) {
                                      : static_cast<LogLevel>(static_cast<int>(level));
 }
 
-/// Whether this thread is inside a sink.
+/// True while this thread is inside a sink.
 thread_local bool in_log_sink = false;
-/// The innermost scope of this thread.
+/// Innermost scope of this thread.
 thread_local const LogScope* log_scope = nullptr;
 
-/// The least level that a sink takes: what is below it costs a load, and no logger.
-std::atomic<int> least_log_level{static_cast<int>(LogLevel::kOff)};
+/// Lowest level that a sink receives. A message below this level costs only one load.
+std::atomic<int> lowest_log_level{static_cast<int>(LogLevel::kOff)};
 
-/// The logger of the library.
+/// Logger of the library.
 class Logger {
  public:
-  /// Never destroyed: what ends after main() may log.
+  /// Returns the logger. It is never destroyed, because code after the end of main() may log.
   static Logger& Get() {
     static Logger& logger = *new Logger;
     return logger;
@@ -48,13 +48,13 @@ class Logger {
 
   void Add(const std::shared_ptr<spdlog::sinks::sink>& sink) {
     const std::lock_guard lock(mutex_);
-    taken_.push_back(sink);
+    subscribed_.push_back(sink);
     sinks_->add_sink(sink);
     Update();
   }
   void Remove(const std::shared_ptr<spdlog::sinks::sink>& sink) {
     const std::lock_guard lock(mutex_);
-    std::erase(taken_, sink);
+    std::erase(subscribed_, sink);
     sinks_->remove_sink(sink);
     Update();
   }
@@ -64,19 +64,19 @@ class Logger {
 
  private:
   Logger() : sinks_(std::make_shared<spdlog::sinks::dist_sink_mt>()), logger_("alidade", sinks_) {
-    logger_.set_level(spdlog::level::trace);               // the sinks decide
-    logger_.set_error_handler([](const std::string&) {});  // by itself it prints
+    logger_.set_level(spdlog::level::trace);               // the sinks filter by level
+    logger_.set_error_handler([](const std::string&) {});  // the default handler prints
   }
   void Update() {
-    int least = static_cast<int>(LogLevel::kOff);
-    for (const auto& sink : taken_) least = std::min(least, static_cast<int>(sink->level()));
-    least_log_level = least;
+    int lowest = static_cast<int>(LogLevel::kOff);
+    for (const auto& sink : subscribed_) lowest = std::min(lowest, static_cast<int>(sink->level()));
+    lowest_log_level = lowest;
   }
 
   std::shared_ptr<spdlog::sinks::dist_sink_mt> sinks_;
   spdlog::logger logger_;
-  std::mutex mutex_;  ///< of the list
-  std::vector<std::shared_ptr<spdlog::sinks::sink>> taken_;
+  std::mutex mutex_;  ///< guards `subscribed_`
+  std::vector<std::shared_ptr<spdlog::sinks::sink>> subscribed_;
 };
 
 }  // namespace
@@ -84,22 +84,22 @@ class Logger {
 const char* ToString(LogLevel level) { return kLogLevelNames.at(static_cast<std::size_t>(level)); }
 
 std::optional<LogLevel> LogLevelOf(std::string_view name) {
-  const auto found = std::ranges::find(kLogLevelNames, name);
-  if (found == kLogLevelNames.end()) return std::nullopt;
-  return static_cast<LogLevel>(found - kLogLevelNames.begin());
+  const auto position = std::ranges::find(kLogLevelNames, name);
+  if (position == kLogLevelNames.end()) return std::nullopt;
+  return static_cast<LogLevel>(position - kLogLevelNames.begin());
 }
 
-/// A sink of spdlog that calls a function. The one that holds it locks.
+/// Sink of spdlog that calls a function. The sink that contains it locks.
 class LogSubscription::Sink : public spdlog::sinks::sink {
  public:
   explicit Sink(LogSink function) : function_(std::move(function)) {}
 
   void log(const spdlog::details::log_msg& message) override {
-    if (broken_) return;
+    if (has_thrown_) return;
     try {
       function_(FromSpdlog(message.level), {message.payload.data(), message.payload.size()});
     } catch (...) {
-      broken_ = true;
+      has_thrown_ = true;
     }
   }
   void flush() override {}
@@ -108,12 +108,12 @@ class LogSubscription::Sink : public spdlog::sinks::sink {
 
  private:
   LogSink function_;
-  bool broken_ = false;
+  bool has_thrown_ = false;
 };
 
-LogSubscription::LogSubscription(LogLevel least, LogSink sink)
+LogSubscription::LogSubscription(LogLevel lowest, LogSink sink)
     : sink_(std::make_shared<Sink>(std::move(sink))) {
-  sink_->set_level(ToSpdlog(least));
+  sink_->set_level(ToSpdlog(lowest));
   Logger::Get().Add(sink_);
 }
 
@@ -125,7 +125,7 @@ LogScope::LogScope(std::string prefix, LogLevel highest)
 LogScope::~LogScope() { log_scope = outer_; }
 
 bool IsLogged(LogLevel level) {
-  return level < LogLevel::kOff && static_cast<int>(level) >= least_log_level.load();
+  return level < LogLevel::kOff && static_cast<int>(level) >= lowest_log_level.load();
 }
 
 void Log(LogLevel level, std::string_view text) noexcept {
@@ -138,7 +138,7 @@ void Log(LogLevel level, std::string_view text) noexcept {
     } else {
       Logger::Get().Write(level, text);
     }
-  } catch (...) {  // a message lost is no reason to end anything
+  } catch (...) {  // losing a message must not end the program
   }
   in_log_sink = false;
 }

@@ -7,27 +7,27 @@
 #include <string>
 #include <string_view>
 
-/// What the library reports to a person while it works. Results are returned and errors are thrown;
-/// neither depends on the log. Without a sink the library is silent. Every function here may be
-/// called from any thread.
+/// Log: messages of the library to a person. Results are returned and errors are thrown, whether or
+/// not they are logged. Without a sink the library is silent. All functions of this header are
+/// thread-safe.
 namespace alidade {
 
 enum class LogLevel { kTrace, kDebug, kInfo, kWarning, kError, kOff };
-/// `trace`, `debug`, `info`, `warning`, `error`, `off`.
+/// Returns `trace`, `debug`, `info`, `warning`, `error` or `off`.
 const char* ToString(LogLevel level);
-/// The level of that name; none if there is no such level.
+/// Returns the level with that name; nullopt for an unknown name.
 std::optional<LogLevel> LogLevelOf(std::string_view name);
 
-/// Takes one message: its level, and its text without a line end. Calls come one at a time. A sink
-/// that throws is given nothing more. What a sink logs itself is dropped. A sink makes and destroys
-/// no LogSubscription: that would wait for itself.
+/// Receiver of messages, each with its level and its text without a line end. Calls do not overlap.
+/// A sink that throws receives no further messages. Messages that a sink logs itself are dropped. A
+/// sink must not create or destroy a LogSubscription: that would deadlock.
 using LogSink = std::function<void(LogLevel level, std::string_view text)>;
 
-/// A sink in use, until the end of its scope.
+/// Subscription of a sink, until the end of its scope.
 class LogSubscription {
  public:
-  /// `sink` is given the messages of level `least` and above.
-  LogSubscription(LogLevel least, LogSink sink);
+  /// Subscribes `sink` to the messages of level `lowest` and above.
+  LogSubscription(LogLevel lowest, LogSink sink);
   ~LogSubscription();
   LogSubscription(const LogSubscription&) = delete;
   LogSubscription& operator=(const LogSubscription&) = delete;
@@ -37,8 +37,8 @@ class LogSubscription {
   std::shared_ptr<Sink> sink_;
 };
 
-/// Until the end of its scope messages of this thread begin with `prefix`, and those above level
-/// `highest` get that level: for one run of many. The scope around it then has no effect.
+/// Logging scope of one run among many. Until its end, messages of this thread begin with `prefix`,
+/// and levels above `highest` are reduced to `highest`. An outer scope then has no effect.
 class LogScope {
  public:
   LogScope(std::string prefix, LogLevel highest);
@@ -55,10 +55,10 @@ class LogScope {
   const LogScope* outer_;
 };
 
-/// Whether a sink takes messages of that level: texts are composed only if so.
+/// Returns true if a sink receives messages of that level. Callers need not compose other messages.
 bool IsLogged(LogLevel level);
 
-/// Gives the message to each sink that takes its level. Throws nothing.
+/// Passes the message to each sink that receives its level.
 void Log(LogLevel level, std::string_view text) noexcept;
 
 }  // namespace alidade

@@ -16,34 +16,35 @@
 
 namespace alidade {
 
-/// The rows of a file of numbers, one at a time, in constant memory. Blank lines and lines that
-/// begin with `#` are left out, and so is a last row without a line end in `NAME.partial`, the
-/// folder of a run that has not come to its end.
+/// Reader of a file of numbers, row by row, in constant memory. It skips blank lines, lines that
+/// begin with `#`, and a last row without a line end in `NAME.partial`, the folder of an unfinished
+/// run.
 ///
 /// Errors       kBadData with file, line and column; those of LineReader.
 class NumberRows {
  public:
   static constexpr char kCommaOrBlanks = '\0';
 
-  /// `separator` ' ': any blanks; kCommaOrBlanks: commas in a row that has one, else blanks.
+  /// `separator` ' ' means any blanks. kCommaOrBlanks means commas in a row that contains a comma,
+  /// else blanks.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
       : reader_(path, place, key), separator_(separator) {
     const auto is_partial = [](const auto& part) { return part.extension() == ".partial"; };
-    may_be_torn_ = std::any_of(path.begin(), path.end(), is_partial);
+    may_be_incomplete_ = std::any_of(path.begin(), path.end(), is_partial);
   }
 
   const std::string& name() const { return reader_.name(); }
   int line() const { return reader_.number(); }
-  /// The row's cells stand between commas.
+  /// Returns true if commas separate the cells of the row.
   bool has_commas() const { return line_.find(',') != std::string_view::npos; }
   std::size_t size() const { return cells_.size(); }
   std::string_view text(std::size_t i) const { return cell::Trim(cells_[i]); }
 
-  /// The next row; false at the end.
+  /// Reads the next row. Returns false at the end.
   bool Next() {
     while (reader_.Next(line_)) {
-      if (may_be_torn_ && reader_.unterminated()) return false;
+      if (may_be_incomplete_ && reader_.is_unterminated()) return false;
       if (line_.find_first_not_of(" \t") == std::string_view::npos) continue;
       if (line_.starts_with('#')) continue;
       Split();
@@ -54,21 +55,21 @@ class NumberRows {
   /// Fails unless the row has `count` columns, named in `columns`.
   void ExpectColumns(std::size_t count, const std::string& columns) const {
     if (cells_.size() == count) return;
-    const bool few = cells_.size() < count;
-    const std::size_t at = few ? line_.size() + 1 : Column(count);
-    Fail(at, {},
-         (few && reader_.unterminated() ? "the last line is cut short: " : "") +
+    const bool is_short = cells_.size() < count;
+    const std::size_t column = is_short ? line_.size() + 1 : Column(count);
+    Fail(column, {},
+         (is_short && reader_.is_unterminated() ? "the last line is cut short: " : "") +
              std::to_string(cells_.size()) + (cells_.size() == 1 ? " column" : " columns"),
          std::to_string(count) + ", " + columns);
   }
-  /// The finite number of column i, called `name`.
+  /// Returns the finite number in column i, called `name`.
   double Number(std::size_t i, const char* name) const {
     double value = 0.0;
-    const char* const wrong = cell::ParseNumber(text(i), value);
-    if (wrong != nullptr) FailCell(i, name, wrong, "a finite number");
+    const char* const problem = cell::ParseNumber(text(i), value);
+    if (problem != nullptr) FailCell(i, name, problem, "a finite number");
     return value;
   }
-  /// A whole number of 0 or more.
+  /// Returns the whole number in column i, 0 or more.
   std::int64_t Index(std::size_t i, const char* name) const {
     const std::string_view digits = text(i);
     std::int64_t value = 0;
@@ -82,62 +83,62 @@ class NumberRows {
     if (value < 0) FailCell(i, name, "is negative", expected);
     return value;
   }
-  /// A time in seconds, exact to the ns.
+  /// Returns the time in column i, in seconds and exact to the ns.
   Timestamp Time(std::size_t i, const char* name) const {
     const double t_s = Number(i, name);
     if (!(std::abs(t_s) < cell::kTimeLimit)) FailCell(i, name, "is beyond 292 years", "seconds");
     return cell::ParseTimestamp(text(i), t_s, 9);
   }
 
-  /// Of column i, called `name`.
-  [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& what,
+  /// Reports an error of column i, called `name`.
+  [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& problem,
                              std::string_view expected) const {
-    Fail(Column(i), name, '\'' + cell::Harmless(text(i)) + "' " + what, expected);
+    Fail(Column(i), name, '\'' + cell::PrintableStart(text(i)) + "' " + problem, expected);
   }
-  /// Of the whole line, or the whole file where there is none yet.
-  [[noreturn]] void FailLine(const std::string& what, std::string_view expected) const {
-    Fail(0, {}, what, expected);
+  /// Reports an error of the whole line, or of the whole file before the first line.
+  [[noreturn]] void FailLine(const std::string& problem, std::string_view expected) const {
+    Fail(0, {}, problem, expected);
   }
 
  private:
   void Split() {
     cells_.clear();
-    const char rows = has_commas() ? ',' : ' ';
-    const char separator = separator_ == kCommaOrBlanks ? rows : separator_;
+    const char row_separator = has_commas() ? ',' : ' ';
+    const char separator = separator_ == kCommaOrBlanks ? row_separator : separator_;
     if (separator != ' ') {
-      for (std::string_view rest = line_;;) {
-        const std::size_t end = std::min(rest.find(separator), rest.size());
-        cells_.push_back(rest.substr(0, end));
-        if (end == rest.size()) return;
-        rest.remove_prefix(end + 1);
+      for (std::string_view remaining = line_;;) {
+        const std::size_t end = std::min(remaining.find(separator), remaining.size());
+        cells_.push_back(remaining.substr(0, end));
+        if (end == remaining.size()) return;
+        remaining.remove_prefix(end + 1);
       }
     }
-    for (std::size_t at = line_.find_first_not_of(" \t"); at < line_.size();) {
-      const std::size_t end = std::min(line_.find_first_of(" \t", at), line_.size());
-      cells_.push_back(line_.substr(at, end - at));
-      at = line_.find_first_not_of(" \t", end);
+    for (std::size_t start = line_.find_first_not_of(" \t"); start < line_.size();) {
+      const std::size_t end = std::min(line_.find_first_of(" \t", start), line_.size());
+      cells_.push_back(line_.substr(start, end - start));
+      start = line_.find_first_not_of(" \t", end);
     }
   }
   std::size_t Column(std::size_t i) const {
     return static_cast<std::size_t>(cells_[i].data() - line_.data()) + 1;
   }
-  [[noreturn]] void Fail(std::size_t column, std::string_view key, std::string_view what,
+  [[noreturn]] void Fail(std::size_t column, std::string_view key, std::string_view problem,
                          std::string_view expected) const {
     const Place place{reader_.name(), reader_.number(), static_cast<int>(column)};
-    throw Error(ExitCode::kBadData, ErrorLine(place, key, what, expected));
+    throw Error(ExitCode::kBadData, ErrorLine(place, key, problem, expected));
   }
 
   LineReader reader_;
   char separator_;
-  bool may_be_torn_ = false;
+  bool may_be_incomplete_ = false;
   std::string_view line_;
   std::vector<std::string_view> cells_;
 };
 
-/// Columns 1 to 7 of a trajectory in the form of TUM, whose first is t, s.
+/// Columns 1 to 7 of a trajectory in TUM format. Column 0 is the time in s.
 inline constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
 
-/// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, named by `names`.
+/// Returns columns 1 to 7, called `names`: x y z and a quaternion, whose length must be 1 to 1e-3.
 inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
                                          const std::array<const char*, 7>& names) {
   std::array<double, 7> values{};

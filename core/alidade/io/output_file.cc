@@ -12,15 +12,16 @@ namespace alidade::internal {
 namespace {
 
 constexpr std::size_t kBufferSize = 1 << 16;
-constexpr std::chrono::seconds kLongestWait{1};
+constexpr std::chrono::seconds kMaxDelay{1};
 
 std::string Reason(int error_number) { return std::generic_category().message(error_number); }
 
 }  // namespace
 
 void FailCreate(const std::string& path, int error_number) {
-  const bool disk = error_number == ENOSPC || error_number == EDQUOT || error_number == EIO;
-  throw Error(disk ? ExitCode::kIo : ExitCode::kCannotCreate,
+  const bool is_disk_error =
+      error_number == ENOSPC || error_number == EDQUOT || error_number == EIO;
+  throw Error(is_disk_error ? ExitCode::kIo : ExitCode::kCannotCreate,
               ErrorLine(Place{path}, {}, "cannot create: " + Reason(error_number)));
 }
 
@@ -46,21 +47,21 @@ OutputFile::~OutputFile() {
 
 void OutputFile::Write(std::string_view text) {
   buffer_ += text;
-  const bool due = std::chrono::steady_clock::now() - flushed_ >= kLongestWait;
-  if (due || buffer_.size() >= kBufferSize) Flush();
+  const bool is_due = std::chrono::steady_clock::now() - flushed_ >= kMaxDelay;
+  if (is_due || buffer_.size() >= kBufferSize) Flush();
 }
 
 void OutputFile::Flush() {
-  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // rows after a gap would mislead
-  for (std::string_view rest = buffer_; !rest.empty();) {
-    const ssize_t written = ::write(fd_, rest.data(), rest.size());
+  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // rows after a gap would be misleading
+  for (std::string_view remaining = buffer_; !remaining.empty();) {
+    const ssize_t written = ::write(fd_, remaining.data(), remaining.size());
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) {
       error_ = errno;
       ::close(std::exchange(fd_, -1));
       FailIo(path_.string(), "write", error_);
     }
-    rest.remove_prefix(static_cast<std::size_t>(written));
+    remaining.remove_prefix(static_cast<std::size_t>(written));
   }
   buffer_.clear();
   flushed_ = std::chrono::steady_clock::now();

@@ -10,24 +10,25 @@
 
 namespace alidade::internal {
 
-/// A file that is written from front to end, every byte checked. What it is given waits for at most
-/// a second, as long as more follows, before the operating system has it.
+/// File that is written sequentially and reports every write error. Text is buffered for at most a
+/// second, as long as more text follows.
 class OutputFile {
  public:
   enum class Mode { kReplace, kAppend };
 
   /// Creates `file`, or opens one that exists. Errors: kCannotCreate, kIo.
   explicit OutputFile(std::filesystem::path file, Mode mode = Mode::kReplace);
-  /// Writes and closes, ignoring errors, unless Close() has.
+  /// Closes the file without reporting errors, unless Close() was called.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Error: kIo; the file then takes no more, and may end in the middle of a text.
+  /// Appends a text. Error: kIo; the file then accepts no further text, and may end in the middle
+  /// of one.
   void Write(std::string_view text);
-  /// Gives what is buffered to the operating system now. Error: kIo.
+  /// Writes the buffer to the operating system now. Error: kIo.
   void Flush();
-  /// Writes what is buffered and closes. Error: kIo.
+  /// Writes the buffer and closes the file. Error: kIo.
   void Close();
 
  private:
@@ -38,9 +39,9 @@ class OutputFile {
   int error_ = 0;  ///< of the write that failed
 };
 
-/// Reports that `path` cannot be created: kIo if the disk is at fault, else kCannotCreate.
+/// Reports that `path` cannot be created: kIo for a failure of the disk, else kCannotCreate.
 [[noreturn]] void FailCreate(const std::string& path, int error_number);
-/// Error kIo: `PATH: cannot VERB: REASON`.
+/// Reports an error kIo: `PATH: cannot VERB: REASON`.
 [[noreturn]] void FailIo(const std::string& path, const char* verb, int error_number);
 
 }  // namespace alidade::internal

@@ -18,8 +18,10 @@ namespace fs = std::filesystem;
 
 constexpr const char* kList = "files.txt";
 
-[[noreturn]] void Refuse(const fs::path& path, const std::string& what, const std::string& remedy) {
-  throw Error(ExitCode::kCannotCreate, ErrorLine(Place{path.string()}, {}, what) + "; " + remedy);
+[[noreturn]] void Refuse(const fs::path& path, const std::string& problem,
+                         const std::string& remedy) {
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{path.string()}, {}, problem) + "; " + remedy);
 }
 
 bool Exists(const fs::path& path) {
@@ -27,8 +29,8 @@ bool Exists(const fs::path& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-/// `target` without a trailing slash; if it is a link or `.`, the folder that it stands for.
-fs::path Normal(const fs::path& target) {
+/// Returns `target` without a trailing slash. Resolves a link, `.` and `..` to the folder.
+fs::path Normalised(const fs::path& target) {
   fs::path path = target.lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   std::error_code error;
@@ -41,7 +43,7 @@ fs::path Normal(const fs::path& target) {
               ErrorLine(Place{target.string()}, {}, "is not a name for a folder", "PATH/NAME"));
 }
 
-/// The names of all files and folders in `folder`, at any depth, sorted. Error: kIo.
+/// Returns the sorted names of all files and folders in `folder`, at any depth. Error: kIo.
 std::set<std::string> Contents(const fs::path& folder) {
   std::set<std::string> names;
   std::error_code error;
@@ -53,26 +55,26 @@ std::set<std::string> Contents(const fs::path& folder) {
   return names;
 }
 
-/// The names of `folder` that its list does not have; a folder stands for all that is in it.
-std::vector<std::string> Unlisted(const fs::path& folder) {
+/// Returns the names in `folder` that its list does not contain. A folder represents its contents.
+std::vector<std::string> UnlistedNames(const fs::path& folder) {
   std::set<std::string> listed = {kList};
-  std::vector<std::string> whole;  // folders that are listed with all that is in them
+  std::vector<std::string> listed_folders;  // with all their contents
   std::ifstream stream(folder / kList);
   for (std::string line; std::getline(stream, line);) {
-    if (line.ends_with('/')) whole.push_back(line);
+    if (line.ends_with('/')) listed_folders.push_back(line);
     listed.insert(std::move(line));
   }
-  std::vector<std::string> found;
+  std::vector<std::string> unlisted;
   for (const std::string& name : Contents(folder)) {
-    const auto holds = [&](const std::string& one) { return name.starts_with(one); };
-    if (listed.contains(name) || std::ranges::any_of(whole, holds)) continue;
-    if (found.empty() || !name.starts_with(found.back() + '/')) found.push_back(name);
+    const auto contains_name = [&](const std::string& parent) { return name.starts_with(parent); };
+    if (listed.contains(name) || std::ranges::any_of(listed_folders, contains_name)) continue;
+    if (unlisted.empty() || !name.starts_with(unlisted.back() + '/')) unlisted.push_back(name);
   }
-  return found;
+  return unlisted;
 }
 
-/// The first few of the names, for a message.
-std::string Few(const std::vector<std::string>& names) {
+/// Returns the first names, for a message.
+std::string FirstNames(const std::vector<std::string>& names) {
   constexpr std::size_t kShown = 3;
   std::string text;
   for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) {
@@ -82,29 +84,29 @@ std::string Few(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Refuses to replace a folder that holds files that its list does not have.
+/// Refuses to replace a folder with files that its list does not contain.
 void CheckListed(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder, error)) {
     Refuse(folder, "is a link to a missing file", "remove it, or choose another folder");
   }
   if (!fs::is_directory(folder, error)) Refuse(folder, "is a file", "choose another folder");
-  const std::vector<std::string> foreign = Unlisted(folder);
+  const std::vector<std::string> foreign = UnlistedNames(folder);
   if (foreign.empty()) return;
   if (!Exists(folder / kList)) {
-    Refuse(folder, std::string("is not a run folder (it has no ") + kList + ')',
+    Refuse(folder, std::string("is not a run folder (it does not contain ") + kList + ')',
            "--force replaces run folders only; remove it yourself, or choose another folder");
   }
-  Refuse(folder, "holds files that alidade did not write: " + Few(foreign),
-         "move that elsewhere, or choose another folder");
+  Refuse(folder, "contains files that alidade did not write: " + FirstNames(foreign),
+         "move them, or choose another folder");
 }
 
 }  // namespace
 
-fs::path PartialOf(const fs::path& target) { return Normal(target) += ".partial"; }
+fs::path PartialOf(const fs::path& target) { return Normalised(target) += ".partial"; }
 
 OutputFolder::OutputFolder(const fs::path& target, bool force, bool resume)
-    : target_(Normal(target)), partial_(fs::path(target_) += ".partial"), force_(force) {
+    : target_(Normalised(target)), partial_(fs::path(target_) += ".partial"), force_(force) {
   CheckTarget();
   std::error_code error;
   if (Exists(partial_)) {
@@ -114,7 +116,7 @@ OutputFolder::OutputFolder(const fs::path& target, bool force, bool resume)
              "add --force to replace it, or remove it");
     }
     CheckListed(partial_);
-    keep_ = resume;
+    is_retained_ = resume;
     if (resume) {
       Open();
       return;
@@ -145,18 +147,19 @@ void OutputFolder::CheckTarget() const {
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
-  if (!keep_ && exists()) fs::remove_all(partial_, ignored);
+  if (!is_retained_ && exists()) fs::remove_all(partial_, ignored);
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 fs::path OutputFolder::Add(const std::string& name) const {
   const fs::path path = partial_ / name;
   OutputFile list(partial_ / kList, OutputFile::Mode::kAppend);
-  for (fs::path above = fs::path(name).parent_path(); !above.empty(); above = above.parent_path()) {
-    list.Write(above.string() + '\n');
+  for (fs::path parent = fs::path(name).parent_path(); !parent.empty();
+       parent = parent.parent_path()) {
+    list.Write(parent.string() + '\n');
   }
   list.Write(name + '\n');
-  list.Close();  // before anything is created: no file of a killed process is unlisted
+  list.Close();  // before the file is created, so that a killed process leaves no unlisted file
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) FailCreate(path.parent_path().string(), error.value());
@@ -183,13 +186,13 @@ void OutputFolder::Remove(const std::string& name) const {
 }
 
 void OutputFolder::Commit() {
-  keep_ = true;
+  is_retained_ = true;
   if (!exists()) {
     Refuse(partial_, "was replaced by another command while this one wrote it",
            "write to another folder");
   }
   std::set<std::string> names = Contents(partial_);
-  for (const std::string& foreign : Unlisted(partial_)) {
+  for (const std::string& foreign : UnlistedNames(partial_)) {
     std::erase_if(names, [&](const std::string& name) {
       return name == foreign || name.starts_with(foreign + '/');
     });
@@ -197,7 +200,7 @@ void OutputFolder::Commit() {
   names.insert(kList);
   std::string list;
   for (const std::string& name : names) list += name + '\n';
-  constexpr const char* kNewList = "files.txt.new";  // a disk that is full keeps the old one
+  constexpr const char* kNewList = "files.txt.new";  // the old list survives a full disk
   Write(kNewList, list);
   std::error_code error;
   fs::rename(partial_ / kNewList, partial_ / kList, error);

@@ -10,53 +10,54 @@
 
 namespace alidade::internal {
 
-/// A folder `NAME` that exists only if it is complete: its files are written to `NAME.partial` next
-/// to it, which Commit() renames. `files.txt` lists the files of the folder; no other file is ever
+/// Output folder `NAME` that appears atomically. Files are written to the adjacent `NAME.partial`,
+/// which Commit() renames. `files.txt` lists the files of the folder; no other file is ever
 /// removed.
 class OutputFolder {
  public:
-  /// Creates `NAME.partial`, and the folders above it. If `target` is a link to a folder, NAME is
-  /// that folder. With `force`, an existing `NAME.partial` is replaced now and NAME in Commit();
-  /// with `resume`, an existing `NAME.partial` stays as it is. Errors: kCannotCreate if one of them
-  /// exists otherwise, or holds a file that its `files.txt` does not list; kIo.
+  /// Creates `NAME.partial`, and its parent folders. If `target` is a link to a folder, NAME is
+  /// that folder. With `force`, an existing `NAME.partial` is replaced now and NAME in Commit().
+  /// With `resume`, an existing `NAME.partial` is continued. Errors: kCannotCreate if one of them
+  /// exists otherwise, or contains a file that its `files.txt` does not list; kIo.
   OutputFolder(const std::filesystem::path& target, bool force, bool resume = false);
-  /// Removes `NAME.partial` unless it was committed or Keep() was called.
+  /// Removes `NAME.partial` unless it was committed or Retain() was called.
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Lists a file that something else writes, or a folder, whose name ends in `/`, with all that it
-  /// will hold. Creates the folders above it and returns its path. Errors: kCannotCreate, kIo.
+  /// Adds a file that other code writes to the list. A name that ends in `/` is a folder with all
+  /// its future contents. Creates the parent folders and returns the path. Errors: kCannotCreate,
+  /// kIo.
   std::filesystem::path Add(const std::string& name) const;
-  /// Opens a new file, or one to be replaced. Errors: kCannotCreate, kIo.
+  /// Creates or replaces a file. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
-  /// Opens a file at its end. Errors: kCannotCreate, kIo.
+  /// Opens a file to append to it. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Append(const std::string& name) const;
-  /// Errors: kCannotCreate, kIo.
+  /// Writes a whole file. Errors: kCannotCreate, kIo.
   void Write(const std::string& name, std::string_view text) const;
   /// Removes a file or folder, if it exists.
   void Remove(const std::string& name) const;
-  /// From now on `NAME.partial` stays even if it is not committed, because it holds results.
-  void Keep() { keep_ = true; }
-  /// `NAME.partial`
+  /// Retains `NAME.partial` from now on, even if it is not committed, because it contains results.
+  void Retain() { is_retained_ = true; }
+  /// Returns the path of `NAME.partial`.
   const std::filesystem::path& partial() const { return partial_; }
-  /// Lists all files in `files.txt` and renames the folder; an existing NAME is removed before.
-  /// Errors: kCannotCreate, kIo, and `NAME.partial` stays.
+  /// Lists all files in `files.txt`, removes an existing NAME and renames the folder. Errors:
+  /// kCannotCreate, kIo; `NAME.partial` is then retained.
   void Commit();
 
  private:
-  /// Refuses to replace NAME.
+  /// Fails if NAME exists and must not be replaced.
   void CheckTarget() const;
-  /// Keeps a descriptor of `NAME.partial`, which knows if another command removes the folder.
+  /// Opens a descriptor of `NAME.partial`. It detects that another command removes the folder.
   void Open();
   bool exists() const;
 
   std::filesystem::path target_, partial_;
   int descriptor_ = -1;  ///< of `NAME.partial`
-  bool force_, keep_ = false;
+  bool force_, is_retained_ = false;
 };
 
-/// The place of a folder until it is complete: `NAME.partial`.
+/// Returns the path of an incomplete folder: `NAME.partial`.
 std::filesystem::path PartialOf(const std::filesystem::path& target);
 
 }  // namespace alidade::internal

@@ -10,35 +10,36 @@
 
 namespace alidade::internal {
 
-std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail, std::size_t most,
-                     const ReadLook& look) {
-  struct Opened {
+std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail,
+                     std::size_t max_size, const BeginningCheck& check) {
+  struct OpenFile {
     int descriptor;
-    ~Opened() {
+    ~OpenFile() {
       if (descriptor >= 0) ::close(descriptor);
     }
   };
-  const Opened opened{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  const OpenFile open_file{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
   struct stat status {};
   int error = 0;
-  if (opened.descriptor < 0 || ::fstat(opened.descriptor, &status) != 0) {
+  if (open_file.descriptor < 0 || ::fstat(open_file.descriptor, &status) != 0) {
     error = errno;
   } else if (S_ISDIR(status.st_mode)) {
     error = EISDIR;
   }
-  if (error == 0) return ReadDescriptor(opened.descriptor, fail, most, look);
+  if (error == 0) return ReadDescriptor(open_file.descriptor, fail, max_size, check);
   fail(ExitCode::kInputMissing, error);
   return {};
 }
 
-std::string ReadDescriptor(int descriptor, const ReadFailure& fail, std::size_t most,
-                           const ReadLook& look) {
+std::string ReadDescriptor(int descriptor, const ReadFailure& fail, std::size_t max_size,
+                           const BeginningCheck& check) {
   std::string bytes;
-  for (char chunk[1 << 14]; bytes.size() < most;) {
-    const ssize_t count = ::read(descriptor, chunk, std::min(sizeof chunk, most - bytes.size()));
+  for (char chunk[1 << 14]; bytes.size() < max_size;) {
+    const ssize_t count =
+        ::read(descriptor, chunk, std::min(sizeof chunk, max_size - bytes.size()));
     if (count < 0) fail(ExitCode::kIo, errno);
     if (count <= 0) break;
-    if (bytes.empty() && look) look({chunk, static_cast<std::size_t>(count)});
+    if (bytes.empty() && check) check({chunk, static_cast<std::size_t>(count)});
     bytes.append(chunk, static_cast<std::size_t>(count));
   }
   return bytes;

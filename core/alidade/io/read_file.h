@@ -10,19 +10,22 @@
 
 namespace alidade::internal {
 
-/// Throws the error of a caller: kInputMissing if the file cannot be opened or is a folder, kIo if
-/// a read fails. `error` is the errno.
+/// Function of the caller that throws an error: kInputMissing if the file cannot be opened or is a
+/// folder, kIo if a read fails. `error` is the errno.
 using ReadFailure = std::function<void(ExitCode code, int error)>;
 
-/// Is shown the beginning of a file before the rest is read: what is no such file may have no end.
-using ReadLook = std::function<void(std::string_view beginning)>;
+/// Function of the caller that checks the beginning of a file before more is read. A file of
+/// another kind may be endless.
+using BeginningCheck = std::function<void(std::string_view beginning)>;
 
-/// The bytes of `file`, at most the first `most` of them. If `fail` returns: those read so far.
+/// Returns the bytes of `file`, up to `max_size`. If `fail` returns, the result is the bytes that
+/// were read before the failure.
 std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail,
-                     std::size_t most = std::string::npos, const ReadLook& look = {});
+                     std::size_t max_size = std::string::npos, const BeginningCheck& check = {});
 
-/// Likewise, of an open file or pipe, which stays open.
+/// Returns the bytes of an open file or pipe, like ReadFile. Does not close it.
 std::string ReadDescriptor(int descriptor, const ReadFailure& fail,
-                           std::size_t most = std::string::npos, const ReadLook& look = {});
+                           std::size_t max_size = std::string::npos,
+                           const BeginningCheck& check = {});
 
 }  // namespace alidade::internal

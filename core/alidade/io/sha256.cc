@@ -11,14 +11,15 @@
 namespace alidade::internal {
 namespace {
 
-/// An EVP call fails for want of memory alone: SHA-256 is in every build of the library.
-void Check(int ok) {
-  if (ok != 1) throw std::bad_alloc();
+/// Throws std::bad_alloc unless a call of EVP succeeded. It fails only if memory runs out, because
+/// SHA-256 is in every build of OpenSSL.
+void Check(int result) {
+  if (result != 1) throw std::bad_alloc();
 }
 
 }  // namespace
 
-void Sha256Stream::Free::operator()(evp_md_ctx_st* context) const { EVP_MD_CTX_free(context); }
+void Sha256Stream::Deleter::operator()(evp_md_ctx_st* context) const { EVP_MD_CTX_free(context); }
 
 Sha256Stream::Sha256Stream() : context_(EVP_MD_CTX_new()) {
   Check(context_ != nullptr ? EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) : 0);
@@ -47,15 +48,15 @@ std::string Sha256(std::string_view bytes) {
 
 std::string Sha256OfFile(const std::filesystem::path& file) {
   errno = 0;
-  std::ifstream in(file, std::ios::binary);
-  if (!in && errno == ENOMEM) throw std::bad_alloc();
-  if (!in) return {};
+  std::ifstream input(file, std::ios::binary);
+  if (!input && errno == ENOMEM) throw std::bad_alloc();
+  if (!input) return {};
   Sha256Stream stream;
   std::array<char, 1 << 16> buffer;
-  while (in.read(buffer.data(), buffer.size()) || in.gcount() > 0) {
-    stream.Add({buffer.data(), static_cast<std::size_t>(in.gcount())});
+  while (input.read(buffer.data(), buffer.size()) || input.gcount() > 0) {
+    stream.Add({buffer.data(), static_cast<std::size_t>(input.gcount())});
   }
-  return in.bad() ? "" : stream.Digest();
+  return input.bad() ? "" : stream.Digest();
 }
 
 }  // namespace alidade::internal

@@ -11,40 +11,40 @@
 #include "alidade/base/timestamp.h"
 #include "alidade/io/utf8.h"
 
-/// What the text of a single cell of a table means, whatever the locale.
+/// Conversions of the text of a single table cell, independent of the locale.
 namespace alidade::cell {
 
-/// Without blanks around it, and then without quotes.
+/// Returns `text` without surrounding blanks, and then without surrounding quotes.
 inline std::string_view Trim(std::string_view text) {
   const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size());
   text.remove_prefix(first);
   text = text.substr(0, text.find_last_not_of(" \t") + 1);
-  const bool quoted = text.size() > 1 && text.front() == '"' && text.back() == '"';
-  return quoted ? text.substr(1, text.size() - 2) : text;
+  const bool is_quoted = text.size() > 1 && text.front() == '"' && text.back() == '"';
+  return is_quoted ? text.substr(1, text.size() - 2) : text;
 }
 
-/// The finite number that `text` is, in full; else what is wrong with it, as in `is not a number`.
-/// nullptr: nothing.
+/// Converts the whole of `text` to a finite number. Returns nullptr, or the problem, as in `is not
+/// a number`.
 inline const char* ParseNumber(std::string_view text, double& value) {
-  const bool plus = text.starts_with('+');
-  if (plus) text.remove_prefix(1);
+  const bool has_plus = text.starts_with('+');
+  if (has_plus) text.remove_prefix(1);
   const char* const last = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), last, value);
-  if (error == std::errc::invalid_argument || end != last || (plus && text.starts_with('-'))) {
+  if (error == std::errc::invalid_argument || end != last || (has_plus && text.starts_with('-'))) {
     return "is not a number";
   }
   if (error == std::errc::result_out_of_range) return "is too large or too small";
   return std::isfinite(value) ? nullptr : "is not finite";
 }
 
-/// Times of a size below this, s, are timestamps (292 years).
+/// Bound on the magnitude of a time, s (292 years), so that it is a timestamp.
 inline constexpr double kTimeLimit = 9.2e9;
 
-/// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns, of a time below
-/// kTimeLimit.
+/// Returns the timestamp nearest to a decimal number without exponent, in a unit of 10^digits ns.
+/// The time is below kTimeLimit.
 inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
-  const bool negative = text.starts_with('-');
-  if (negative || text.starts_with('+')) text.remove_prefix(1);
+  const bool is_negative = text.starts_with('-');
+  if (is_negative || text.starts_with('+')) text.remove_prefix(1);
   const std::size_t point = std::min(text.find('.'), text.size());
   const std::string_view fraction = text.substr(std::min(point + 1, text.size()));
   Timestamp ns = 0;
@@ -53,21 +53,21 @@ inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
     ns = 10 * ns + (i < fraction.size() ? fraction[i] - '0' : 0);
   }
   if (fraction.size() > digits && fraction[digits] >= '5') ++ns;
-  return negative ? -ns : ns;
+  return is_negative ? -ns : ns;
 }
 
-/// The timestamp that `text` writes in a unit of 10^digits ns, `value` being the number it is;
-/// exact where it has no exponent. The time is below kTimeLimit.
+/// Returns the timestamp of `text`, in a unit of 10^digits ns. `value` is the number in `text`. The
+/// result is exact for a number without exponent. The time is below kTimeLimit.
 inline Timestamp ParseTimestamp(std::string_view text, double value, std::size_t digits) {
   if (text.find_first_of("eE") == std::string_view::npos) return ExactTimestamp(text, digits);
   return TimestampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));
 }
 
-/// The start of a cell for a message: UTF-8 without control characters.
-inline std::string Harmless(std::string_view cell) {
-  constexpr std::size_t kShown = 40;
-  const std::string shown = internal::ShownUtf8(cell.substr(0, kShown), "");
-  return cell.size() > kShown ? shown + "..." : shown;
+/// Returns the start of a cell for a message: UTF-8 without control characters.
+inline std::string PrintableStart(std::string_view cell) {
+  constexpr std::size_t kMaxSize = 40;
+  const std::string start = internal::PrintableUtf8(cell.substr(0, kMaxSize), "");
+  return cell.size() > kMaxSize ? start + "..." : start;
 }
 
 }  // namespace alidade::cell

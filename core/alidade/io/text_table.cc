@@ -14,15 +14,15 @@ std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent) {
     widths.resize(std::max(widths.size(), row.size()));
     for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
   }
-  std::vector<bool> used(widths.size(), rows.size() < 2);
+  std::vector<bool> is_used(widths.size(), rows.size() < 2);
   for (std::size_t r = 1; r < rows.size(); ++r) {
-    for (std::size_t c = 0; c < rows[r].size(); ++c) used[c] = used[c] || !rows[r][c].empty();
+    for (std::size_t c = 0; c < rows[r].size(); ++c) is_used[c] = is_used[c] || !rows[r][c].empty();
   }
   std::string text;
   for (const TextRow& row : rows) {
     std::string line(indent, ' ');
     for (std::size_t c = 0; c < row.size(); ++c) {
-      if (!used[c]) continue;
+      if (!is_used[c]) continue;
       line += row[c];
       line.append(widths[c] - row[c].size() + 2, ' ');
     }
@@ -46,25 +46,25 @@ std::string MarkdownRow(const TextRow& cells) {
 }
 
 std::string LatexText(const std::string& text) {
-  std::string safe;
+  std::string escaped;
   for (const char c : text) {
     if (c == '\\') {
-      safe += "\\textbackslash{}";
+      escaped += "\\textbackslash{}";
     } else if (c == '^' || c == '~') {
-      safe.append("\\") += c;
-      safe += "{}";
+      escaped.append("\\") += c;
+      escaped += "{}";
     } else {
-      if (std::string_view("_%&#${}").find(c) != std::string_view::npos) safe += '\\';
-      safe += c;
+      if (std::string_view("_%&#${}").find(c) != std::string_view::npos) escaped += '\\';
+      escaped += c;
     }
   }
-  return safe;
+  return escaped;
 }
 
 std::string LatexRow(const TextRow& cells) {
-  TextRow safe;
-  for (const std::string& cell : cells) safe.push_back(LatexText(cell));
-  return Join(safe, " & ") + " \\\\\n";
+  TextRow escaped;
+  for (const std::string& cell : cells) escaped.push_back(LatexText(cell));
+  return Join(escaped, " & ") + " \\\\\n";
 }
 
 std::string RightAlignedTable(const std::vector<std::string>& names,

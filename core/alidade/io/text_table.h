@@ -8,30 +8,30 @@ namespace alidade::internal {
 
 using TextRow = std::vector<std::string>;
 
-/// Rows as lines of left-aligned columns, two blanks apart, `indent` blanks in front. A column that
-/// is empty in every row but the first is left out.
+/// Formats rows as left-aligned columns, separated by two blanks and indented by `indent`. Omits a
+/// column that is empty below the first row.
 std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent = 0);
 
-/// `| a | b |`, a line of a table of Markdown, without what would end a cell.
+/// Returns a row of a Markdown table, `| a | b |`, with special characters escaped.
 std::string MarkdownRow(const TextRow& cells);
 
-/// `text` without what LaTeX would obey.
+/// Returns `text` with LaTeX's special characters escaped.
 std::string LatexText(const std::string& text);
-/// `a & b \\`, a line of a tabular, each cell as LatexText.
+/// Returns a row of a LaTeX tabular, `a & b \\`, with special characters escaped.
 std::string LatexRow(const TextRow& cells);
 
-/// One line of a table: a label with its unit, and a cell for each column, `-` if it has no value.
+/// Row of a table: a label with its unit, and a cell for each column, `-` for a missing value.
 struct TableRow {
   std::string label;
   std::vector<std::string> cells;
 };
-/// Rows below the names of the columns, aligned to the right. Columns that do not fit next to the
-/// others in a line of 100 characters go into a table below.
+/// Formats rows below the names of the columns, aligned to the right. Columns that do not fit into
+/// 100 characters continue in a table below.
 std::string RightAlignedTable(const std::vector<std::string>& names,
                               const std::vector<TableRow>& rows);
-/// The label of a row, then its cells.
+/// Returns the label of a row, followed by its cells.
 std::vector<std::string> CellsOf(const TableRow& row);
-/// The rows as a table of Markdown, `corner` above their labels.
+/// Formats rows as a Markdown table, with `corner` above the labels.
 std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
                           const std::vector<TableRow>& rows);
 

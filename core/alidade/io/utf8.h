@@ -8,8 +8,8 @@
 
 namespace alidade::internal {
 
-/// Bytes of the UTF-8 character that `text` starts with; 0 where there is none (Unicode 15,
-/// table 3-7).
+/// Returns the size in bytes of the UTF-8 character at the start of `text`, or 0 if the bytes are
+/// invalid (Unicode 15, table 3-7).
 inline std::size_t Utf8Length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned lead = byte(0);
@@ -29,7 +29,7 @@ inline std::size_t Utf8Length(std::string_view text) {
   return size;
 }
 
-/// Whether `text` is UTF-8 throughout.
+/// Returns true if all of `text` is valid UTF-8.
 inline bool IsUtf8(std::string_view text) {
   while (!text.empty()) {
     const std::size_t size = Utf8Length(text);
@@ -39,24 +39,25 @@ inline bool IsUtf8(std::string_view text) {
   return true;
 }
 
-/// Whether the character of UTF-8 that `text` starts with is a control character, those from U+0080
-/// on too.
+/// Returns true if the UTF-8 character at the start of `text` is a control character, including
+/// U+0080 to U+009F.
 inline bool IsControl(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   return byte(0) < ' ' || byte(0) == 0x7F || (byte(0) == 0xC2 && byte(1) < 0xA0);
 }
 
-/// `text` as it may be shown, whatever is in it: `?` in place of each byte that is not of UTF-8 and
-/// of each control character that is not among `kept`.
-inline std::string ShownUtf8(std::string_view text, std::string_view kept) {
-  std::string shown;
+/// Returns `text` in printable form: `?` replaces each invalid byte, and each control character
+/// that is not in `allowed_controls`.
+inline std::string PrintableUtf8(std::string_view text, std::string_view allowed_controls) {
+  std::string printable;
   while (!text.empty()) {
     const std::size_t size = Utf8Length(text);
-    const bool plain = size > 0 && (!IsControl(text) || kept.find(text[0]) != kept.npos);
-    shown += plain ? text.substr(0, size) : "?";
+    const bool is_printable =
+        size > 0 && (!IsControl(text) || allowed_controls.find(text[0]) != allowed_controls.npos);
+    printable += is_printable ? text.substr(0, size) : "?";
     text.remove_prefix(std::max<std::size_t>(size, 1));
   }
-  return shown;
+  return printable;
 }
 
 }  // namespace alidade::internal

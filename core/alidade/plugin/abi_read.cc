@@ -24,7 +24,7 @@ std::string TextDefect(const char* text) {
 
 std::string ShownText(const char* text) {
   if (text == nullptr) return {};
-  return ShownUtf8({text, strnlen(text, ALIDADE_MAX_TEXT)}, "");
+  return PrintableUtf8({text, strnlen(text, ALIDADE_MAX_TEXT)}, "");
 }
 
 bool GoodName(const char* name) {

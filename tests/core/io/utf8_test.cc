@@ -6,17 +6,17 @@
 namespace alidade::internal {
 namespace {
 
-TEST(ShownUtf8, ReplacesWhatIsNoTextOfUtf8) {
-  EXPECT_EQ(ShownUtf8("", ""), "");
-  EXPECT_EQ(ShownUtf8("a \xC3\xA9 \xF0\x9F\x98\x80", ""), "a \xC3\xA9 \xF0\x9F\x98\x80");
-  EXPECT_EQ(ShownUtf8("a\xFF\x9B[\xC3[\xE2\x82", ""), "a??[?[??");
+TEST(PrintableUtf8, ReplacesWhatIsNoTextOfUtf8) {
+  EXPECT_EQ(PrintableUtf8("", ""), "");
+  EXPECT_EQ(PrintableUtf8("a \xC3\xA9 \xF0\x9F\x98\x80", ""), "a \xC3\xA9 \xF0\x9F\x98\x80");
+  EXPECT_EQ(PrintableUtf8("a\xFF\x9B[\xC3[\xE2\x82", ""), "a??[?[??");
 }
 
-TEST(ShownUtf8, ReplacesControlCharactersButThoseThatAreKept) {
-  EXPECT_EQ(ShownUtf8("\x1B[1m\t\n\x7F", ""), "?[1m???");
-  EXPECT_EQ(ShownUtf8("\x1B[1m\t\n\x7F", "\n\t"), "?[1m\t\n?");
-  EXPECT_EQ(ShownUtf8("\xC2\x9B\xC2\xA0", "\n"), "?\xC2\xA0");  // U+009B and U+00A0
-  EXPECT_EQ(ShownUtf8(std::string_view("\0", 1), "\n"), "?");
+TEST(PrintableUtf8, ReplacesControlCharactersButThoseThatAreKept) {
+  EXPECT_EQ(PrintableUtf8("\x1B[1m\t\n\x7F", ""), "?[1m???");
+  EXPECT_EQ(PrintableUtf8("\x1B[1m\t\n\x7F", "\n\t"), "?[1m\t\n?");
+  EXPECT_EQ(PrintableUtf8("\xC2\x9B\xC2\xA0", "\n"), "?\xC2\xA0");  // U+009B and U+00A0
+  EXPECT_EQ(PrintableUtf8(std::string_view("\0", 1), "\n"), "?");
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ std::vector<std::string> EntriesOf(const fs::path& folder) {
 void LeavePartial(const fs::path& target, const std::string& text = "rows\n") {
   OutputFolder folder(target, false);
   folder.Write("ekf/a.csv", text);
-  folder.Keep();
+  folder.Retain();
 }
 
 void Complete(const fs::path& target, bool force, const std::string& text) {
@@ -147,8 +147,8 @@ TEST(OutputFolder, ForceSparesWhatWasNotWrittenWithIt) {
       std::string text;
       const fs::path target = folder == out ? out : temporary / "left";
       EXPECT_EQ(CodeOf([&] { OutputFolder(target, true); }, &text), 73);
-      EXPECT_EQ(text, folder.string() + ": holds files that alidade did not write: " + names +
-                          "; move that elsewhere, or choose another folder");
+      EXPECT_EQ(text, folder.string() + ": contains files that alidade did not write: " + names +
+                          "; move them, or choose another folder");
     };
     Complete(folder / "ekf/run", false, "another\n");
     expect("'ekf/run'");
@@ -195,7 +195,7 @@ TEST(OutputFolder, ForceReplacesWhatWasAddedToIt) {
     OutputFolder folder(temporary / "out", false);
     std::ofstream(folder.Add("images/left/") / "000001.png") << "x";
     std::ofstream(folder.Add("videos/run.avi")) << "x";
-    folder.Keep();
+    folder.Retain();
   }
   Complete(temporary / "out", true, "new\n");
   EXPECT_EQ(EntriesOf(temporary / "out"),

@@ -81,7 +81,7 @@ class BundleCursor {
     const int column = static_cast<int>(word_start_ - line_start_) + 1;
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{name_, line_, column}, {},
-                          '\'' + cell::Harmless(word) + "' " + problem, expected));
+                          '\'' + cell::PrintableStart(word) + "' " + problem, expected));
   }
 
   std::string_view text_;

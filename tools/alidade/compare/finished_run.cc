@@ -78,9 +78,9 @@ Timestamp TimestampOf(std::string_view row, const fs::path& file, int line) {
   const std::string_view text = row.substr(0, row.find(','));
   double value = 0.0;
   if (const char* const defect = cell::ParseNumber(text, value))
-    FailFile(file, line, std::string("t_s '") + cell::Harmless(text) + "' " + defect);
+    FailFile(file, line, std::string("t_s '") + cell::PrintableStart(text) + "' " + defect);
   if (!(std::abs(value) < cell::kTimeLimit))
-    FailFile(file, line, "t_s '" + cell::Harmless(text) + "' is out of range");
+    FailFile(file, line, "t_s '" + cell::PrintableStart(text) + "' is out of range");
   return cell::ParseTimestamp(text, value, 9);
 }
 

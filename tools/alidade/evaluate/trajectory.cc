@@ -202,10 +202,10 @@ class TrajectoryReader {
     }
     for (std::size_t i = 0; i < seconds_.size(); ++i) {
       if (!(std::abs(seconds_[i]) * unit.seconds() < cell::kTimeLimit)) {
-        throw Error(ExitCode::kBadData,
-                    ErrorLine({rows_.name(), lines_[i], 0}, "t",
-                              '\'' + cell::Harmless(timestamp_texts_[i]) + "' is beyond 292 years",
-                              expected));
+        throw Error(ExitCode::kBadData, ErrorLine({rows_.name(), lines_[i], 0}, "t",
+                                                  '\'' + cell::PrintableStart(timestamp_texts_[i]) +
+                                                      "' is beyond 292 years",
+                                                  expected));
       }
       trajectory_.timestamps.push_back(
           cell::ParseTimestamp(timestamp_texts_[i], seconds_[i], unit.digits));

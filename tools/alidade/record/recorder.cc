@@ -190,7 +190,7 @@ void Recorder::Begin(const Experiment& experiment) {
 
 void Recorder::OnFrame(const SourceFrame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
-  impl_->folder.Keep();
+  impl_->folder.Retain();
   impl_->source->Add(frame);
   impl_->data->Add(frame);
   impl_->timing->Add(frame);

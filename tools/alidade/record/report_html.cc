@@ -127,7 +127,7 @@ std::string Estimator(const EstimatorResult& result, std::size_t index, const Re
 
 std::string HtmlEscaped(std::string_view text) {
   std::string escaped;
-  for (const char c : ShownUtf8(text, "\n\t")) {
+  for (const char c : PrintableUtf8(text, "\n\t")) {
     switch (c) {
       case '&':
         escaped += "&amp;";

@@ -23,7 +23,7 @@ struct Report {
 /// One page with all in it but figure `timing`: no script, no other file, no clock.
 std::string ReportHtml(const RunResult& result, const Report& report);
 
-/// `text`, as ShownUtf8, with the characters that HTML takes for its own replaced.
+/// `text`, as PrintableUtf8, with the characters that HTML takes for its own replaced.
 std::string HtmlEscaped(std::string_view text);
 
 }  // namespace alidade::internal

@@ -41,7 +41,7 @@ const SweepRun* FinishedRuns::Find(const std::string& value, std::uint64_t seed)
 void FinishedRuns::Add(const std::string& value, const SweepRun& run) {
   const std::string line = RunLine(value, run);
   const std::lock_guard lock(mutex_);
-  folder_.Keep();
+  folder_.Retain();
   file_->Write(line);
   file_->Flush();  // the next run may take hours
 }

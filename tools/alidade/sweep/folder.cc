@@ -294,7 +294,7 @@ void SweepFolder::Impl::Complete(const Parts& parts, bool stopped, const Config&
 
 void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummary>& summaries,
                         const Config& config) {
-  impl_->folder.Keep();
+  impl_->folder.Retain();
   const OutputFolder& folder = impl_->folder;
   folder.Write("sweep.json", SweepJson(result, summaries));
   const Parts parts = {{&result, ""}};
@@ -306,7 +306,7 @@ void SweepFolder::Write(const SweepResult& result, const std::vector<SweepSummar
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
-  impl_->folder.Keep();
+  impl_->folder.Retain();
   const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
   folder.Write("sweep.json", SweepJson(sweep));

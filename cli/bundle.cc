@@ -20,8 +20,8 @@ constexpr const char* kBundleFooter = R"(Examples:
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
-Reads problems of BAL, Bundler v0.3 and libmv, distinguished by their beginning, and tracks as
-`simulate` writes them. Ctrl-C ends after the iteration and keeps the result so far.
+Reads BAL, Bundler v0.3 and libmv problems, whose format is detected from the first bytes, and
+tracks that `simulate` writes. Ctrl-C stops after the current iteration and keeps the result so far.
 Exit codes: 0 converged, 1 out of iterations, 75 stopped, 79 the solver failed.)";
 
 struct BundleArguments {
@@ -40,7 +40,7 @@ std::string Short(double value) {
   return text;
 }
 
-/// `huber`, `cauchy=2`
+/// Parses a loss such as `huber` or `cauchy=2`. Returns false if `text` is not valid.
 bool ParseLoss(const std::string& text, RobustLoss& loss) {
   const std::size_t equals = std::min(text.find('='), text.size());
   const std::string name = text.substr(0, equals);
@@ -51,8 +51,8 @@ bool ParseLoss(const std::string& text, RobustLoss& loss) {
   if (equals == text.size()) return true;
   if (loss.kind == LossKind::kNone) return false;
   const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data() + equals + 1, end, loss.scale);
-  return error == std::errc() && rest == end;
+  const auto [parsed_end, error] = std::from_chars(text.data() + equals + 1, end, loss.scale);
+  return error == std::errc() && parsed_end == end;
 }
 
 std::string IsLoss(const std::string& text) {
@@ -66,8 +66,8 @@ std::string IsLoss(const std::string& text) {
          ", or NAME=SCALE, in standard deviations";
 }
 
-/// `k1,k2` as its names.
-std::vector<std::string> Names(const std::string& text) {
+/// Splits `k1,k2` into its names.
+std::vector<std::string> SplitNames(const std::string& text) {
   std::vector<std::string> names(1);
   for (const char c : text) {
     if (c == ',') {
@@ -80,9 +80,9 @@ std::vector<std::string> Names(const std::string& text) {
 }
 
 std::string AreNames(const std::string& text) {
-  const std::vector<std::string> names = Names(text);
+  const std::vector<std::string> names = SplitNames(text);
   if (std::ranges::find(names, "") == names.end()) return {};
-  return "'" + text + "' has an empty name; expected names with a comma between them, as k1,k2";
+  return "'" + text + "' has an empty name; expected comma-separated names, such as k1,k2";
 }
 
 BundleFile Read(const BundleArguments& arguments, const PluginHost& host) {
@@ -93,7 +93,7 @@ BundleFile Read(const BundleArguments& arguments, const PluginHost& host) {
   return ReadBundleTracks(tracks, host);
 }
 
-/// Whether the format's camera sees points behind it too.
+/// Returns true if the camera model of the format also projects points behind the camera.
 bool IsProjective(BundleFormat format) {
   return format == BundleFormat::kBal || format == BundleFormat::kBundler;
 }
@@ -105,18 +105,19 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0) {
-    text += "; " + std::to_string(left_out) + " left out, not " +
-            (IsProjective(file.format) ? "defined or not finite at the start: in the camera's plane"
-                                       : "defined or not finite at the start: behind the camera");
+    text += "; " + std::to_string(left_out) + " left out, undefined or not finite at the start: " +
+            (IsProjective(file.format) ? "in the camera's plane" : "behind the camera");
   }
   if (file.invalid_observations > 0)
-    text += "; " + std::to_string(file.invalid_observations) + " not valid, as outside the image";
+    text +=
+        "; " + std::to_string(file.invalid_observations) + " not valid, such as outside the image";
   if (file.frames_left_out > 0)
     text += "; " + std::to_string(file.frames_left_out) + " frames without a pose left out";
   if (file.points_left_out > 0)
     text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
   if (file.unplaced_observations > 0)
-    text += "; " + std::to_string(file.unplaced_observations) + " observations of these left out";
+    text += "; " + std::to_string(file.unplaced_observations) +
+            " observations of these frames and points left out";
   return text;
 }
 
@@ -135,8 +136,8 @@ ExitCode CodeOf(BundleEnd end) {
 }
 
 ExitCode RunBundle(const BundleArguments& arguments) {
-  KeepInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
-                                arguments.tracks.start.string()});
+  ProtectInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
+                                   arguments.tracks.start.string()});
   const PluginHost host(Absolute(arguments.plugin_paths));
   StopOnSignals();
   std::optional<BundleFolder> folder;
@@ -158,7 +159,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   options.max_iterations = arguments.iterations;
   options.function_tolerance = arguments.tolerance;
   for (const std::string& list : arguments.fixed)
-    for (const std::string& name : Names(list)) options.fixed.push_back(name);
+    for (const std::string& name : SplitNames(list)) options.fixed.push_back(name);
   options.stop = StopRequested;
   options.progress = [&](int done) { progress.Show(done, -1); };
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
@@ -190,37 +191,38 @@ ExitCode RunBundle(const BundleArguments& arguments) {
 
 void AddBundle(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
-      "bundle", "Adjust cameras and the points that they see: BAL, Bundler, libmv, tracks");
+      "bundle",
+      "Adjust cameras and points to minimise the reprojection error: BAL, Bundler, libmv, tracks");
   const auto arguments = std::make_shared<BundleArguments>();
-  command.add_option("PROBLEM", arguments->problem, "the problem, a file; `-`: standard input")
+  command.add_option("PROBLEM", arguments->problem, "file of the problem; `-` for standard input")
       ->option_text(" ")
       ->required()
-      ->check(IsNamed);
-  AddOutput(command, arguments->folder, "folder for the solution; default: none is written");
+      ->check(IsNonEmpty);
+  AddOutput(command, arguments->folder, "folder for the solution; default: nothing is written");
   const auto add = [&](const char* name, auto& value, const char* text, const std::string& help) {
     return command.add_option(name, value, help)->option_text(text);
   };
   add("--loss", arguments->loss, "LOSS",
       internal::Join(internal::NamesOf(kLosses)) +
-          "; huber=2: from 2 standard deviations on; default none")
+          "; NAME=SCALE sets the scale in standard deviations, such as huber=2; default none")
       ->check(IsLoss);
   add("--fix", arguments->fixed, "NAME,...",
-      "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")
+      "keep intrinsics constant: `intrinsics` for all, or elements such as k1,k2")
       ->check(AreNames)
       ->allow_extra_args(false);
-  add("--max-iterations", arguments->iterations, "N", "at most; default 500")
+  add("--max-iterations", arguments->iterations, "N", "maximum number of iterations; default 500")
       ->check(IsInteger(0, 1000000));
   add("--tolerance", arguments->tolerance, "X",
-      "converged where a step changes the cost by no more than this fraction; default 1e-8")
+      "largest relative change of the cost in a step that counts as converged; default 1e-8")
       ->check(IsNumber(0.0, 1.0));
   CLI::Option* const camera =
-      add("--camera", arguments->tracks.camera, "FILE", "of tracks: YAML with `camera`");
+      add("--camera", arguments->tracks.camera, "FILE", "for tracks: YAML file with `camera`");
   CLI::Option* const start =
-      add("--start", arguments->tracks.start, "FILE", "of tracks: trajectory to start from, TUM");
+      add("--start", arguments->tracks.start, "FILE", "for tracks: initial trajectory, TUM");
   camera->needs(start);
   start->needs(camera);
   AddPluginPath(command, arguments->plugin_paths);
-  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kBundleFooter);
   command.callback(

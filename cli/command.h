@@ -17,16 +17,16 @@
 /// The commands of the program. Each one reads its arguments, calls core and prints.
 namespace alidade::cli {
 
-/// What a command does once the command line has been read; gives the exit code.
+/// Action of a command after its arguments have been parsed. Returns the exit code.
 using Action = std::function<ExitCode()>;
 
-/// `command_line` is what the record of the run shows.
+/// Adds the command `run`. The record of the run contains `command_line`.
 void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddCompare(CLI::App& program, Action& action, const std::string& command_line);
 void AddSweep(CLI::App& program, Action& action);
 void AddMerge(CLI::App& program, Action& action);
-/// `execute` runs a command: its words, without the name of the program.
+/// `execute` runs a command from its arguments, without the name of the program.
 void AddReplay(CLI::App& program, Action& action,
                const std::function<ExitCode(const std::vector<std::string>&)>& execute);
 void AddBundle(CLI::App& program, Action& action);
@@ -45,56 +45,62 @@ struct Input {
 
   void AddTo(CLI::App& command);
   Config Load() const;
-  /// The plugins that `config` and the command line name, then the usual places.
+  /// Returns the host of the plugins in the paths of `config` and of the command line, and in the
+  /// default folders.
   PluginHost Host(const Config& config) const;
-  /// Of the usual places those alone that `config`, or one of `others`, may need.
-  PluginHost HostFor(const Config& config, const std::vector<Config>& others = {}) const;
-  /// The text of inputs.json for a command with these arguments, as internal::CommandInputs has
-  /// them; `runs` are the configs of its runs, `plugins` those that they use.
+  /// Like Host, but ignores plugins of the default folders that neither `config` nor
+  /// `other_configs` need.
+  PluginHost HostFor(const Config& config, const std::vector<Config>& other_configs = {}) const;
+  /// Returns the text of inputs.json for a command with these arguments (internal::CommandInputs).
+  /// `runs` are the configs of its runs, `plugins` are the plugins that these use.
   std::string InputsText(const Config& config, const std::vector<std::string>& arguments,
                          const std::vector<Config>& runs,
                          const internal::PluginHashes& plugins) const;
 };
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
-/// The option --set; `help` says what it sets.
+/// Adds the option --set. `help` is its help text.
 void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help);
-/// A validator of CLI11: the path is not empty.
-std::string IsNamed(const std::string& path);
-/// The option -o, a folder; "" where it is not given.
+/// Validator of CLI11: rejects an empty path.
+std::string IsNonEmpty(const std::string& path);
+/// Adds the option -o, a folder. `folder` stays "" if the option is absent.
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
-/// The option --seed.
+/// Adds the option --seed.
 CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed);
 std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);
 
-/// A check of an option: says what is wrong with its text, or "".
-std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most);
-std::function<std::string(const std::string&)> IsNumber(double least, double most);
+/// Returns a validator of an option. It returns an error text, or "" if the value is in
+/// [minimum, maximum].
+std::function<std::string(const std::string&)> IsInteger(std::int64_t minimum,
+                                                         std::int64_t maximum);
+std::function<std::string(const std::string&)> IsNumber(double minimum, double maximum);
 
-/// Reports that a sweep was stopped, and `more`.
-void TellStopped(std::size_t done, std::int64_t runs, const std::string& more = "");
+/// Prints that a sweep was stopped after `done` of `runs` runs, followed by `more`.
+void ReportStopped(std::size_t done, std::int64_t runs, const std::string& more = "");
 
-/// Absolute, links followed as far as they can be: the same for two names of one file.
+/// Returns the absolute path with links resolved as far as possible. Two names of one file have the
+/// same result.
 std::filesystem::path Resolved(const std::string& path);
 
-/// Refuses an output that, with its `.partial`, is or holds what the command reads: --force would
-/// remove it. Paths may be empty. Error: kCannotCreate.
-void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
+/// Rejects an output folder if it or its `.partial` is or contains an input of the command, because
+/// --force would delete the input. Paths may be empty. Error: kCannotCreate.
+void ProtectInputs(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Where output goes, and where it would if nothing were there.
+/// Output folder of a command. `preferred` is the folder that is used if it does not exist yet.
 struct Output {
-  std::filesystem::path folder, named;
+  std::filesystem::path folder, preferred;
 };
-/// Named is `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name of the
-/// config: of its folder where it is called config.yaml, else of the file. If nothing is given, and
-/// that or its `.partial` exists without `force`, the folder is the first of NAME-2, NAME-3, ... of
-/// which neither does.
-/// Errors: kCannotCreate where `given` is runs/ itself, or it would replace the config or what that
-/// reads; kNotTrusted, kBadConfig.
-Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,
-                    const std::string& prefix = "");
-/// Says so where the folder is not the one that is named. To be called once the config is known to
-/// be right.
-void TellOutput(const Output& output);
+/// Chooses the output folder. `preferred` is `requested`, else the config's `output:` inside runs/,
+/// else runs/PREFIX and the name of the config. That name is the folder's name if the file is
+/// called config.yaml, else the file's stem. If `requested` is empty, `force` is false, and the
+/// preferred folder or its `.partial` exists, the function chooses the first of NAME-2, NAME-3, ...
+/// for which neither exists.
+/// Errors: kCannotCreate if `requested` is runs/ itself, or if the output would replace the config
+/// or its inputs; kNotTrusted, kBadConfig.
+Output OutputFolder(const std::string& requested, const Config& config, const Input& input,
+                    bool force, const std::string& prefix = "");
+/// Prints a note if the output folder is not the preferred one. To be called after the config has
+/// been validated.
+void ReportOutput(const Output& output);
 
 }  // namespace alidade::cli

@@ -22,19 +22,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kCompareFooter = R"(Examples:
-  alidade compare config.yaml                      run it, and decompose the error of a filter
+  alidade compare config.yaml                      run the config and decompose a filter's error
   alidade compare config.yaml --runs 100           over seeds 1 to 100
-  alidade compare config.yaml --runs 200 --budget 600   as many of them as ten minutes allow
+  alidade compare config.yaml --runs 200 --budget 600   as many runs as ten minutes allow
   alidade compare config.yaml --no-decomposition --reference batch
   alidade compare runs/a runs/b                    finished runs over the same data
 
-Exit code 1: there was no reference, or no measurement, to compare with; 65: runs over different
-data.)";
+Exit code 1: no reference or no measurement was available for the comparison; 65: the runs are over
+different data.)";
 
 struct CompareArguments {
-  std::string command;          ///< the whole line
-  Input input;                  ///< without its config
-  std::vector<std::string> of;  ///< a config, or folders
+  std::string command;             ///< the whole command line
+  Input input;                     ///< without its config
+  std::vector<std::string> paths;  ///< of a config, or of folders
   std::string folder;
   std::optional<std::uint64_t> seed;
   SweepOptions sweep;
@@ -44,7 +44,7 @@ struct CompareArguments {
   bool force = false, quiet = false, figures = false;
 };
 
-std::string Shown(const Comparison& comparison, const CompareArguments& arguments) {
+std::string FormatComparison(const Comparison& comparison, const CompareArguments& arguments) {
   if (arguments.json) return CompareJson(comparison);
   if (arguments.markdown) return CompareReport(comparison, TableStyle::kMarkdown);
   if (arguments.latex) return CompareReport(comparison, TableStyle::kLatex);
@@ -52,32 +52,32 @@ std::string Shown(const Comparison& comparison, const CompareArguments& argument
                        arguments.all ? ReportRows::kAll : ReportRows::kMain);
 }
 
-/// Prints the comparison, and where it lies.
+/// Prints the comparison and the folder that contains it.
 void Report(const Comparison& comparison, const CompareArguments& arguments,
             const fs::path& folder) {
-  Print(Shown(comparison, arguments));
+  Print(FormatComparison(comparison, arguments));
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
-/// That a comparison is withheld counts for more than an estimator or a seed that failed, and for
-/// less than anything else that ended a run.
-ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
-  const bool more =
-      of_run == ExitCode::kOk || of_run == ExitCode::kDiverged || of_run == ExitCode::kFound;
-  if (comparison.withheld.empty() || !more) return of_run;
+/// Returns the exit code. A withheld comparison takes precedence over an estimator or a seed that
+/// failed. Any other failure of the run takes precedence over a withheld comparison.
+ExitCode CodeOf(const Comparison& comparison, ExitCode run_code) {
+  const bool is_minor =
+      run_code == ExitCode::kOk || run_code == ExitCode::kDiverged || run_code == ExitCode::kFound;
+  if (comparison.withheld.empty() || !is_minor) return run_code;
   PrintErrors(comparison.withheld);
   return ExitCode::kFound;
 }
 
-/// Whether what ended the run was an estimator that was added, of which the comparison tells.
+/// Returns true if only added estimators failed. The comparison reports their failures.
 bool OnlyAddedFailed(const RunResult& result, const ComparedExperiment& compared) {
   return result.code == ExitCode::kDiverged &&
-         std::ranges::all_of(result.estimators, [&](const EstimatorResult& one) {
-           return !one.failed || std::ranges::count(compared.added, one.name) > 0;
+         std::ranges::all_of(result.estimators, [&](const EstimatorResult& estimator) {
+           return !estimator.failed || std::ranges::count(compared.added, estimator.name) > 0;
          });
 }
 
-/// What a folder, of a run or a sweep, has besides.
+/// Adds the files of the comparison to the folder of a run or a sweep.
 void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.json", CompareJson(comparison));
   folder.AddFile("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
@@ -91,7 +91,7 @@ std::string DurationText(double s) {
                     : internal::RoundedText(s / 3600.0, 2) + " h";
 }
 
-/// Foretells once, from what is done, how long all takes, where that is worth a word.
+/// Forecast of the total duration, printed once if it is at least 10 s.
 class Forecast {
  public:
   Forecast(const CompareArguments& arguments, std::int64_t jobs, Progress& progress)
@@ -100,37 +100,37 @@ class Forecast {
         budget_s_(arguments.options.budget_s),
         jobs_(jobs) {}
 
-  /// From the first of several runs.
-  void OfRuns(std::int64_t total) {
+  /// Computes the forecast when the first of several runs is done.
+  void UpdateFromRuns(std::int64_t total) {
     const double rounds = std::ceil(static_cast<double>(total) / static_cast<double>(jobs_));
-    Tell(rounds * elapsed_s(), "the first of " + std::to_string(total) + " runs took " +
-                                   DurationText(elapsed_s()) + ": all may take ");
+    Report(rounds * elapsed_s(), "the first of " + std::to_string(total) + " runs took " +
+                                     DurationText(elapsed_s()) + ": all runs may take ");
   }
-  /// From the frames of the first seconds. One frame may take longer than another: a batch that
-  /// solves at each has more data each time, one of all data comes after the last.
-  void OfFrames(std::int64_t done, std::int64_t total) {
+  /// Computes the forecast after the first seconds. It is a lower bound: a batch that solves at
+  /// each frame has more data each time, and a batch of all data is solved after the last frame.
+  void UpdateFromFrames(std::int64_t done, std::int64_t total) {
     if (total <= 0 || elapsed_s() < 2.0) return;
-    Tell(elapsed_s() * static_cast<double>(total) / static_cast<double>(done),
-         std::to_string(done) + " of " + std::to_string(total) + " frames took " +
-             DurationText(elapsed_s()) + ": all take at least ");
+    Report(elapsed_s() * static_cast<double>(total) / static_cast<double>(done),
+           std::to_string(done) + " of " + std::to_string(total) + " frames took " +
+               DurationText(elapsed_s()) + ": all frames take at least ");
   }
 
  private:
   double elapsed_s() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   }
-  void Tell(double foretold_s, const std::string& words) {
-    constexpr double kWorthAWord_s = 10.0;
-    if (told_ || quiet_) return;
-    told_ = true;
-    if (foretold_s < kWorthAWord_s) return;
+  void Report(double forecast_s, const std::string& prefix) {
+    constexpr double kMinReported_s = 10.0;
+    if (is_reported_ || quiet_) return;
+    is_reported_ = true;
+    if (forecast_s < kMinReported_s) return;
     progress_.Clear();
-    PrintNote(words + DurationText(foretold_s) +
+    PrintNote(prefix + DurationText(forecast_s) +
               (budget_s_ ? ", the budget is " + DurationText(*budget_s_) : ""));
   }
 
   Progress& progress_;
-  bool quiet_, told_ = false;
+  bool quiet_, is_reported_ = false;
   std::optional<double> budget_s_;
   std::int64_t jobs_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
@@ -149,18 +149,18 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   options.observers = {&recorder, &comparer};
   Forecast forecast(arguments, 1, progress);
   options.progress = [&](std::int64_t done, std::int64_t total) {
-    forecast.OfFrames(done, total);
+    forecast.UpdateFromFrames(done, total);
     progress.Show(done, total);
   };
   options.stop = StopRequested;
   const RunResult result = Run(compared.experiment, options);
   progress.Clear();
-  CompareOptions of_run = arguments.options;
-  of_run.filter = compared.filter;
+  CompareOptions run_options = arguments.options;
+  run_options.filter = compared.filter;
   Comparison comparison;
   try {
-    comparison = comparer.Finish(result, of_run);
-  } catch (const Error&) {  // the run is kept, with its own reason where it has one
+    comparison = comparer.Finish(result, run_options);
+  } catch (const Error&) {  // keep the run, and report its own reason if it has one
     recorder.Finish(result);
     if (result.status == RunStatus::kOk) throw;
     if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
@@ -195,11 +195,11 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   const std::int64_t jobs = options.jobs > 0 ? options.jobs : internal::UsableProcessors();
   Forecast forecast(arguments, std::min(jobs, options.runs), progress);
   options.progress = [&](std::int64_t done, std::int64_t total) {
-    forecast.OfRuns(total);
+    forecast.UpdateFromRuns(total);
     progress.Show(done, total);
   };
   options.stop = StopRequested;
-  SweepFolder out(folder, arguments.force);
+  SweepFolder sweep_folder(folder, arguments.force);
   ComparedSeeds seeds = CompareSeeds(compared, host, options, arguments.options);
   progress.Clear();
   Comparison& comparison = seeds.comparison;
@@ -210,15 +210,16 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
     if (failed++ == 0) PrintErrors("seed " + std::to_string(run.seed) + ": " + run.reason);
   }
   if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
-  const bool any = !comparison.estimators.empty();  // else no run came to its end
-  std::string no_figure;
-  if (any) AddFiles(out, comparison);
-  if (any) no_figure = WriteSeedReport(out.files(), comparison, compared.config, StopRequested);
-  if (!no_figure.empty()) Log(LogLevel::kWarning, "figures: " + no_figure);
-  out.Write(seeds.sweep, Summarise(seeds.sweep), compared.config);
-  if (any) Report(comparison, arguments, folder);
+  const bool has_results = !comparison.estimators.empty();  // false if no run finished
+  std::string figure_note;
+  if (has_results) AddFiles(sweep_folder, comparison);
+  if (has_results)
+    figure_note = WriteSeedReport(sweep_folder.files(), comparison, compared.config, StopRequested);
+  if (!figure_note.empty()) Log(LogLevel::kWarning, "figures: " + figure_note);
+  sweep_folder.Write(seeds.sweep, Summarise(seeds.sweep), compared.config);
+  if (has_results) Report(comparison, arguments, folder);
   if (seeds.sweep.stopped && seeds.beyond_budget == 0) {
-    TellStopped(seeds.sweep.done.size(), options.runs);
+    ReportStopped(seeds.sweep.done.size(), options.runs);
     return ExitCode::kStopped;
   }
   return CodeOf(comparison, failed > 0 ? ExitCode::kFound : ExitCode::kOk);
@@ -226,22 +227,22 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
 
 ExitCode CompareConfig(const CompareArguments& arguments) {
   Input input = arguments.input;
-  input.config = arguments.of.front();
+  input.config = arguments.paths.front();
   Config config = input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, input, arguments.force, "compare-");
   const PluginHost host = input.Host(config);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
-  if (!arguments.quiet) TellOutput(output);
+  if (!arguments.quiet) ReportOutput(output);
   return arguments.options.over_seeds ? CompareOverSeeds(arguments, compared, host, output.folder)
                                       : CompareRun(arguments, compared, host, output.folder);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {
-  KeepInputs(arguments.folder, arguments.of);
+  ProtectInputs(arguments.folder, arguments.paths);
   std::vector<fs::path> folders;
-  for (const std::string& folder : arguments.of) folders.emplace_back(folder);
+  for (const std::string& folder : arguments.paths) folders.emplace_back(folder);
   const Comparison comparison = CompareFolders(folders, arguments.options);
   if (!arguments.folder.empty()) {
     WriteComparison(comparison, arguments.folder, arguments.force);
@@ -250,45 +251,47 @@ ExitCode CompareFinished(const CompareArguments& arguments) {
   return CodeOf(comparison, ExitCode::kOk);
 }
 
-/// Whether these are run folders; what is neither all folders nor one config is refused.
-bool AreFolders(const std::vector<std::string>& of) {
+/// Returns true if all paths are folders. Rejects paths that are neither all folders nor one
+/// config.
+bool AreFolders(const std::vector<std::string>& paths) {
   const auto is_folder = [](const std::string& path) {
     std::error_code error;
     return fs::is_directory(path, error);
   };
-  if (std::ranges::all_of(of, is_folder)) return true;
-  if (of.size() == 1) return false;
-  const auto file = std::ranges::find_if_not(of, is_folder);
+  if (std::ranges::all_of(paths, is_folder)) return true;
+  if (paths.size() == 1) return false;
+  const auto file = std::ranges::find_if_not(paths, is_folder);
   throw CLI::ValidationError(
       "CONFIG | DIR...", "'" + *file + "' is not a folder; expected one config, or run folders");
 }
 
-/// Of finished runs.
-void CheckOptions(const CLI::App& command) {
+/// Rejects the options that finished runs do not support.
+void RejectRunOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
                              "--allow-outside", "--figures", "--budget"}) {
     if (command.count(option) == 0) continue;
-    throw CLI::ValidationError(option, "a finished run is not run again; expected a config");
+    throw CLI::ValidationError(option, "not supported for finished runs; expected a config");
   }
 }
 
 void AddOptions(CLI::App& command, CompareArguments& arguments) {
-  command.add_option("CONFIG | DIR", arguments.of, "a config to run, or folders of finished runs")
+  command
+      .add_option("CONFIG | DIR", arguments.paths, "a config to run, or folders of finished runs")
       ->option_text(" ")
       ->required()
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
   command
       .add_option("--reference", arguments.options.reference,
-                  "take errors from truth, or from an estimator; default: truth where it is known, "
-                  "else the batch")
+                  "compute errors from truth, or from an estimator; default: truth if it is "
+                  "known, else the batch")
       ->option_text("truth|NAME");
   command
       .add_option("--filter", arguments.options.filter,
                   "the filter whose error is decomposed; default: the first")
       ->option_text("NAME");
   command.add_flag("--no-decomposition", arguments.no_decomposition,
-                   "decompose no error, and add no estimators for it");
-  command.add_option("--runs", arguments.sweep.runs, "compare over that many seeds")
+                   "do not decompose the error, and add no estimators for it");
+  command.add_option("--runs", arguments.sweep.runs, "compare over N seeds")
       ->option_text("N")
       ->check(IsInteger(1, 1'000'000));
   command
@@ -298,13 +301,14 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->needs("--runs");
   command
       .add_option("--jobs", arguments.sweep.jobs,
-                  "threads; default: all processors that may be used")
+                  "number of threads; default: all available processors")
       ->option_text("J")
       ->check(IsInteger(1, 1024))
       ->needs("--runs");
   command
       .add_option("--budget", arguments.options.budget_s,
-                  "begin no run that would end later; of one run, add nothing that takes longer")
+                  "start no run that would end later; in one run, add no estimator that takes "
+                  "longer")
       ->option_text("SECONDS")
       ->check(IsNumber(1e-9, 1e9));
   AddSeed(command, arguments.seed)->excludes("--first-seed");
@@ -312,11 +316,11 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
           "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, arguments.input.plugin_paths);
   command.add_flag("--allow-outside", arguments.input.allow_outside,
-                   "let `include:` and `output:` of the config leave their folders");
+                   "allow `include:` and `output:` of the config outside their folders");
   AddOutput(command, arguments.folder,
-            "folder; default of a config: its `output:`, or compare-NAME, in runs/; of folders: "
-            "none is written");
-  command.add_flag("--force", arguments.force, "replace the folder if it is there");
+            "folder; default for a config: its `output:`, or compare-NAME, in runs/; for folders: "
+            "nothing is written");
+  command.add_flag("--force", arguments.force, "replace the folder if it exists");
   command.add_flag("--all", arguments.all, "print all rows of the tables");
   command.add_flag("--json", arguments.json, "print all values as JSON");
   command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")
@@ -324,7 +328,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
   command.add_flag("--latex", arguments.latex, "print the tables as LaTeX")
       ->excludes("--json")
       ->excludes("--markdown");
-  command.add_flag("--figures", arguments.figures, "draw the figures of the run too")
+  command.add_flag("--figures", arguments.figures, "also draw the figures of the run")
       ->excludes("--runs");
   command.add_flag("--quiet", arguments.quiet, "print the comparison and errors only");
 }
@@ -339,8 +343,8 @@ void AddCompare(CLI::App& program, Action& action, const std::string& command_li
   AddOptions(command, *arguments);
   command.footer(kCompareFooter);
   command.callback([&action, &command, arguments] {
-    const bool folders = AreFolders(arguments->of);
-    if (folders) CheckOptions(command);
+    const bool folders = AreFolders(arguments->paths);
+    if (folders) RejectRunOptions(command);
     arguments->options.decompose = !arguments->no_decomposition;
     arguments->options.over_seeds = command.count("--runs") > 0;
     action = [arguments, folders] {

@@ -28,7 +28,7 @@ extern "C" void HandleStop(int signal_number) {
   ::raise(signal_number);
 }
 
-/// Writes all of it; false with errno where that fails.
+/// Writes the whole text. Returns false and sets errno on failure.
 bool WriteAll(int fd, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(fd, text.data(), text.size());
@@ -39,10 +39,10 @@ bool WriteAll(int fd, std::string_view text) {
   return true;
 }
 
-/// `text` as a terminal may have it: it obeys none of it but the line ends.
-std::string Harmless(std::string_view text) { return internal::PrintableUtf8(text, "\n\t"); }
+/// Returns `text` without control characters that a terminal obeys, except line ends and tabs.
+std::string Sanitise(std::string_view text) { return internal::PrintableUtf8(text, "\n\t"); }
 
-/// What cannot be said on standard error cannot be said.
+/// Writes to standard error. A failure is ignored, because it cannot be reported.
 void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }
 
 bool IsSet(const char* variable) {
@@ -50,26 +50,26 @@ bool IsSet(const char* variable) {
   return value != nullptr && *value != '\0';
 }
 
-/// A terminal that moves its cursor.
-bool OnTerminal() {
+/// Returns true if standard error is a terminal that can move its cursor.
+bool IsTerminal() {
   const char* terminal = std::getenv("TERM");
   const bool dumb = terminal == nullptr || std::strcmp(terminal, "dumb") == 0;
   return !dumb && ::isatty(STDERR_FILENO) == 1;
 }
 
-bool TakesColour() { return OnTerminal() && !IsSet("NO_COLOR"); }
+bool SupportsColour() { return IsTerminal() && !IsSet("NO_COLOR"); }
 
-/// `warning: `, in that colour of a terminal.
-std::string Marked(const char* word, const char* colour, bool coloured) {
-  const std::string mark = std::string(word) + ':';
-  return (coloured ? "\033[1;" + std::string(colour) + 'm' + mark + "\033[0m" : mark) + ' ';
+/// Returns `label: `, with the label in `colour` if `coloured`.
+std::string FormatLabel(const char* label, const char* colour, bool coloured) {
+  const std::string text = std::string(label) + ':';
+  return (coloured ? "\033[1;" + std::string(colour) + 'm' + text + "\033[0m" : text) + ' ';
 }
 
-/// What stands on the line of progress: messages of any thread go above it.
+/// State of the progress line. Messages of any thread are printed above the line.
 std::mutex progress_mutex;
 std::size_t progress_width = 0;
 
-/// Takes the line of progress off the terminal. The mutex is locked.
+/// Removes the progress line from the terminal. The mutex must be locked.
 void ClearProgress() {
   if (progress_width > 0) WriteError('\r' + std::string(progress_width, ' ') + '\r');
   progress_width = 0;
@@ -81,7 +81,7 @@ void WriteMessage(LogLevel level, std::string_view text, bool coloured) {
                                                            : "36";
   const std::lock_guard lock(progress_mutex);
   ClearProgress();
-  WriteError(Marked(ToString(level), colour, coloured) + Harmless(text) + '\n');
+  WriteError(FormatLabel(ToString(level), colour, coloured) + Sanitise(text) + '\n');
 }
 
 }  // namespace
@@ -98,29 +98,29 @@ void Print(std::string_view text) {
 }
 
 void PrintErrors(std::string_view text) {
-  const bool colour = TakesColour();
+  const bool colour = SupportsColour();
   std::string lines;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.empty()) continue;
-    if (line[0] != ' ') lines += Marked("error", "31", colour);
-    lines.append(Harmless(line)).append("\n");
+    if (line[0] != ' ') lines += FormatLabel("error", "31", colour);
+    lines.append(Sanitise(line)).append("\n");
   }
   WriteError(lines);
 }
 
-void PrintNote(std::string_view text) { WriteError(Harmless(text) + '\n'); }
+void PrintNote(std::string_view text) { WriteError(Sanitise(text) + '\n'); }
 
-void ShowLog(LogLevel least) {
+void ShowLog(LogLevel minimum_level) {
   static const LogSubscription terminal(
-      least, [coloured = TakesColour()](LogLevel level, std::string_view text) {
+      minimum_level, [coloured = SupportsColour()](LogLevel level, std::string_view text) {
         WriteMessage(level, text, coloured);
       });
 }
 
-Progress::Progress(const char* unit, bool quiet) : unit_(unit), enabled_(!quiet && OnTerminal()) {}
+Progress::Progress(const char* unit, bool quiet) : unit_(unit), enabled_(!quiet && IsTerminal()) {}
 
 void Progress::Show(std::int64_t done, std::int64_t total) {
   if (!enabled_) return;
@@ -131,7 +131,7 @@ void Progress::Show(std::int64_t done, std::int64_t total) {
   if (total > 0) line += " of " + std::to_string(total);
   line.append(" ").append(unit_);
   if (total > 0) line += ", " + std::to_string(100 * done / total) + " %";
-  // Blanks, not an escape sequence, cover what a longer line left.
+  // Blanks, not an escape sequence, overwrite the end of a longer previous line.
   const std::lock_guard lock(progress_mutex);
   const std::size_t width = line.size();
   if (width < progress_width) line.append(progress_width - width, ' ');
@@ -148,7 +148,7 @@ void StopOnSignals() {
   struct sigaction action {};
   action.sa_handler = HandleStop;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = 0;  // a read that waits for data ends
+  action.sa_flags = 0;  // interrupts a read that waits for data
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   struct sigaction hangup {};

@@ -10,25 +10,24 @@
 
 namespace alidade::cli {
 
-/// A write to a closed pipe, or beyond the size limit of a file, becomes an error instead of a
+/// Turns a write to a closed pipe, or beyond the size limit of a file, into an error instead of a
 /// signal that ends the process.
 void PrepareConsole();
 
-/// Writes to standard output, every byte checked. Error: kIo.
+/// Writes `text` to standard output. Error: kIo if a byte cannot be written.
 void Print(std::string_view text);
 
-/// `error: LINE` on standard error for each line; a line that is indented continues the one above.
-/// Control characters and bytes that are not UTF-8, as a file may hold them, are shown as `?`; in
-/// notes too.
+/// Prints `error: LINE` on standard error for each line. An indented line continues the line above.
+/// Prints `?` for control characters and for bytes that are not UTF-8; PrintNote does the same.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
 
-/// From now on messages of the log, of level `least` and above, are lines `LEVEL: TEXT` on standard
-/// error, the level in colour on a terminal.
-void ShowLog(LogLevel least);
+/// Prints each later log message of level `minimum_level` or above on standard error, as a line
+/// `LEVEL: TEXT`. The level is in colour on a terminal.
+void ShowLog(LogLevel minimum_level);
 
-/// A line on the terminal of standard error that says how far a command is; nothing where that is
-/// no terminal, or where `quiet`.
+/// Progress line of a command on the terminal of standard error. It is not printed if standard
+/// error is not a terminal, or if `quiet`.
 class Progress {
  public:
   Progress(const char* unit, bool quiet);
@@ -36,7 +35,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `total` < 0: not known.
+  /// `total` is negative if it is unknown.
   void Show(std::int64_t done, std::int64_t total);
   void Clear();
 
@@ -46,8 +45,8 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// From now on SIGINT, SIGTERM and, unless it is ignored, SIGHUP request the command to stop; a
-/// second one ends the process at once.
+/// Installs handlers for SIGINT, SIGTERM and, unless it is ignored, SIGHUP. The first signal
+/// requests a stop of the command; a second one ends the process at once.
 void StopOnSignals();
 bool StopRequested();
 

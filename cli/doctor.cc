@@ -22,24 +22,24 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kDoctorFooter =
-    R"(Each line is ok, warn or fail, with a remedy where one is needed. The exit code is 1 where a
-line says fail, else 0.)";
+    R"(Each line is ok, warn or fail, with a remedy if one is needed. The exit code is 1 if a line
+is fail, else 0.)";
 
-/// The lines that the doctor says.
+/// Lines that the doctor prints.
 class Diagnosis {
  public:
-  void Ok(const std::string& what) { text_ += "ok    " + what + '\n'; }
-  void Warn(const std::string& what, const std::string& remedy) { Add("warn  ", what, remedy); }
-  void Fail(const std::string& what, const std::string& remedy) {
+  void Ok(const std::string& text) { text_ += "ok    " + text + '\n'; }
+  void Warn(const std::string& text, const std::string& remedy) { Add("warn  ", text, remedy); }
+  void Fail(const std::string& text, const std::string& remedy) {
     failed_ = true;
-    Add("fail  ", what, remedy);
+    Add("fail  ", text, remedy);
   }
   const std::string& text() const { return text_; }
   bool failed() const { return failed_; }
 
  private:
-  void Add(const char* level, const std::string& what, const std::string& remedy) {
-    text_ += level + what + '\n';
+  void Add(const char* level, const std::string& text, const std::string& remedy) {
+    text_ += level + text + '\n';
     if (!remedy.empty()) text_ += "      remedy: " + remedy + '\n';
   }
   std::string text_;
@@ -88,10 +88,10 @@ std::string RemedyFor(const Refusal& refusal) {
   if (refusal.code == ExitCode::kNotTrusted) {
     return "if you trust it: chmod go-w '" + file + "' and the folders above it, chown to yourself";
   }
-  return "build it anew against this alidade, or remove it";
+  return "rebuild it for this alidade, or remove it";
 }
 
-/// A filter is compared with a batch, which is built only if its solver is installed.
+/// Reports whether the batch estimator is built; it is only built if its solver is installed.
 void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
   const auto is_batch = [](const PluginEntry& entry) {
     return entry.kind == kEstimatorKind && EstimatorOf(entry).kind == EstimatorKind::kBatch;
@@ -117,36 +117,36 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   const int sources = count(kSourceKind);
   const int estimators = count(kEstimatorKind);
   const int models = static_cast<int>(host.entries().size()) - sources - estimators;
-  const auto counted = [](int n, const char* what) {
-    return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");
+  const auto count_text = [](int n, const char* text) {
+    return std::to_string(n) + ' ' + text + (n == 1 ? "" : "s");
   };
-  const std::string found = counted(models, "model") + ", " + counted(sources, "source") + " and " +
-                            counted(estimators, "estimator") + " of plugins";
+  const std::string found = count_text(models, "model") + ", " + count_text(sources, "source") +
+                            " and " + count_text(estimators, "estimator") + " in plugins";
   if (models > 0 && sources > 0) {
     diagnosis.Ok(found);
   } else {
     diagnosis.Fail("plugins: " + found,
-                   "build or install them all, or name their folder: ALIDADE_PLUGIN_PATH=FOLDER");
+                   "build or install the plugins, or set ALIDADE_PLUGIN_PATH=FOLDER");
   }
   CheckBatch(host, diagnosis);
 }
 
-bool OnPath(const char* program) {
+bool IsOnPath(const char* program) {
   const char* path = std::getenv("PATH");
-  std::string rest = path == nullptr ? "" : path;
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find(':'), rest.size());
-    if (::access((fs::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
-    rest.erase(0, end + 1);
+  std::string remaining = path == nullptr ? "" : path;
+  while (!remaining.empty()) {
+    const std::size_t end = std::min(remaining.find(':'), remaining.size());
+    if (::access((fs::path(remaining.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
+    remaining.erase(0, end + 1);
   }
   return false;
 }
 
-void CheckSurroundings(Diagnosis& diagnosis) {
-  if (OnPath("gnuplot")) {
-    diagnosis.Ok("gnuplot: runs get figures");
+void CheckEnvironment(Diagnosis& diagnosis) {
+  if (IsOnPath("gnuplot")) {
+    diagnosis.Ok("gnuplot: runs have figures");
   } else {
-    diagnosis.Warn("gnuplot is not installed: runs get no figures", "apt-get install gnuplot-nox");
+    diagnosis.Warn("gnuplot is not installed: runs have no figures", "apt-get install gnuplot-nox");
   }
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::string remedy = "export ALIDADE_DATA=FOLDER, the folder that holds kitti-depth-pairs";
@@ -160,24 +160,24 @@ void CheckSurroundings(Diagnosis& diagnosis) {
   }
 }
 
-/// Tries it: permissions do not tell of a file system that is read-only or full.
+/// Creates a folder: permissions do not show that a file system is read-only or full.
 void CheckCurrentFolder(Diagnosis& diagnosis) {
   std::string name = ".alidade-doctor-XXXXXX";
   if (::mkdtemp(name.data()) != nullptr) {
     ::rmdir(name.c_str());
-    diagnosis.Ok("the current folder can be written: runs/ goes there");
+    diagnosis.Ok("the current folder is writable: runs/ is created there");
     return;
   }
   const std::string reason = std::generic_category().message(errno);
-  diagnosis.Fail("the current folder cannot be written: " + reason,
-                 "change to another folder, or name one: alidade run CONFIG -o DIR");
+  diagnosis.Fail("the current folder is not writable: " + reason,
+                 "change to another folder, or choose one: alidade run CONFIG -o DIR");
 }
 
-ExitCode Examine(const std::vector<std::string>& paths) {
+ExitCode RunDoctor(const std::vector<std::string>& paths) {
   Diagnosis diagnosis;
   CheckVersions(diagnosis);
   CheckPlugins(paths, diagnosis);
-  CheckSurroundings(diagnosis);
+  CheckEnvironment(diagnosis);
   CheckCurrentFolder(diagnosis);
   Print(diagnosis.text());
   return diagnosis.failed() ? ExitCode::kFound : ExitCode::kOk;
@@ -186,11 +186,11 @@ ExitCode Examine(const std::vector<std::string>& paths) {
 }  // namespace
 
 void AddDoctor(CLI::App& program, Action& action) {
-  CLI::App& command = *program.add_subcommand("doctor", "Check that everything is in place");
+  CLI::App& command = *program.add_subcommand("doctor", "Check the installation");
   const auto paths = std::make_shared<std::vector<std::string>>();
   AddPluginPath(command, *paths);
   command.footer(kDoctorFooter);
-  command.callback([&action, paths] { action = [paths] { return Examine(*paths); }; });
+  command.callback([&action, paths] { action = [paths] { return RunDoctor(*paths); }; });
 }
 
 }  // namespace alidade::cli

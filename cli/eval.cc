@@ -14,17 +14,17 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kEvalFooter = R"(Examples:
-  alidade eval runs/slam                           all estimators of a run against its truth
+  alidade eval runs/slam                           compare a run's estimators with its truth
   alidade eval truth.tum estimate.tum -a           ATE and RPE after se3 alignment
-  alidade eval truth.tum mono.tum -as              and scale, as a single camera needs it
+  alidade eval truth.tum mono.tum -as              with scale too, for a single camera
   alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
 
 Files: TUM (8 columns, or 20 with covariances), KITTI (12, and times.txt), EuRoC (csv). A folder
-is a run, an estimator in one, or a sequence of EuRoC. Warnings go to standard error. Options have
-the names of evo; underscores, as in --t_max_diff, mean the same.)";
+is a run, an estimator of a run, or an EuRoC sequence. Warnings are printed on standard error.
+Options have the names of evo; underscores, as in --t_max_diff, are accepted.)";
 
-enum class Form { kText, kJson, kMarkdown, kLatex };
+enum class OutputFormat { kText, kJson, kMarkdown, kLatex };
 
 struct EvalArguments {
   std::string reference;
@@ -33,15 +33,15 @@ struct EvalArguments {
   EvaluateOptions options;
   bool se3 = false, scale = false, origin = false;
   double max_diff_s = 0.01, offset_s = 0.0;
-  Form form = Form::kText;
+  OutputFormat output_format = OutputFormat::kText;
 };
 
-/// An option takes the name of one of `values`.
+/// Validator of CLI11: accepts the name of one of `values`, and replaces it by its number.
 template <class T>
 CLI::Validator OneOf(std::initializer_list<T> values) {
-  const auto choose = [all = std::vector<T>(values)](std::string& text) -> std::string {
+  const auto choose = [choices = std::vector<T>(values)](std::string& text) -> std::string {
     std::string names;
-    for (const T value : all) {
+    for (const T value : choices) {
       if (text == ToString(value)) {
         text = std::to_string(static_cast<int>(value));
         return {};
@@ -53,14 +53,14 @@ CLI::Validator OneOf(std::initializer_list<T> values) {
   return {choose, ""};
 }
 
-/// What -a, -s and --align-origin mean for --align-mode.
-Alignment Chosen(const EvalArguments& arguments) {
+/// Returns the alignment that -a, -s, --align-origin and --align-mode select.
+Alignment SelectedAlignment(const EvalArguments& arguments) {
   if (arguments.origin) return Alignment::kOrigin;
   if (arguments.se3) return arguments.scale ? Alignment::kSim3 : Alignment::kSe3;
   return arguments.scale ? Alignment::kScale : arguments.options.alignment;
 }
 
-void WarnOf(const std::vector<std::string>& warnings) {
+void LogWarnings(const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) Log(LogLevel::kWarning, warning);
 }
 
@@ -75,30 +75,30 @@ Evaluation EvaluateFile(const Trajectory& reference, const TrajectoryFile& file,
   return evaluation;
 }
 
-std::string Text(const std::vector<Evaluation>& evaluations, Form form) {
-  switch (form) {
-    case Form::kJson:
+std::string Text(const std::vector<Evaluation>& evaluations, OutputFormat output_format) {
+  switch (output_format) {
+    case OutputFormat::kJson:
       return EvaluationJson(evaluations);
-    case Form::kMarkdown:
+    case OutputFormat::kMarkdown:
       return EvaluationMarkdown(evaluations);
-    case Form::kLatex:
+    case OutputFormat::kLatex:
       return EvaluationLatex(evaluations);
-    case Form::kText:
+    case OutputFormat::kText:
       break;
   }
   return EvaluationText(evaluations);
 }
 
-/// Labels that two estimates have, as of two runs, give way to the files.
+/// Replaces each label that several estimates have by the name of the estimate's file.
 void MakeUnique(std::vector<Evaluation>& evaluations) {
-  std::map<std::string, int> times;
-  for (const Evaluation& one : evaluations) ++times[one.label];
-  for (Evaluation& one : evaluations) {
-    if (times[one.label] > 1) one.label = one.estimate.name;
+  std::map<std::string, int> counts;
+  for (const Evaluation& evaluation : evaluations) ++counts[evaluation.label];
+  for (Evaluation& evaluation : evaluations) {
+    if (counts[evaluation.label] > 1) evaluation.label = evaluation.estimate.name;
   }
 }
 
-/// An estimate without figures, for its row in the table.
+/// Returns an evaluation without metrics, for the row of a failed estimate.
 Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
                   const EvaluateOptions& options, const Error& error) {
   Evaluation failed;
@@ -110,38 +110,39 @@ Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
   return failed;
 }
 
-/// A run that stands alone is compared with its own truth.
-bool IsOfOneRun(const EvalArguments& arguments) { return arguments.estimates.empty(); }
+/// Returns true if the only argument is a run, which is compared with its own truth.
+bool IsSingleRun(const EvalArguments& arguments) { return arguments.estimates.empty(); }
 
 std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
   std::vector<std::string> paths = arguments.estimates;
-  if (IsOfOneRun(arguments)) paths = {arguments.reference};
+  if (IsSingleRun(arguments)) paths = {arguments.reference};
   std::vector<TrajectoryFile> files;
   for (const std::string& path : paths) {
-    const std::vector<TrajectoryFile> more = EstimatesAt(path);
-    files.insert(files.end(), more.begin(), more.end());
+    const std::vector<TrajectoryFile> found = EstimatesAt(path);
+    files.insert(files.end(), found.begin(), found.end());
   }
   return files;
 }
 
-/// Of several estimates one that fails leaves the others theirs; the exit code is the first one's.
+/// Evaluates all estimates. If one of several fails, the others are still evaluated, and the exit
+/// code is that of the first failure.
 ExitCode RunEval(const EvalArguments& arguments) {
   EvaluateOptions options = arguments.options;
-  options.alignment = Chosen(arguments);
+  options.alignment = SelectedAlignment(arguments);
   options.max_diff = TimestampFromSeconds(arguments.max_diff_s);
   options.offset = TimestampFromSeconds(arguments.offset_s);
   const TrajectoryFile truth =
-      IsOfOneRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
+      IsSingleRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
   const std::vector<TrajectoryFile> files = FilesOf(arguments);
   const Trajectory reference = ReadTrajectory(truth.file, arguments.format);
-  WarnOf(reference.warnings);
+  LogWarnings(reference.warnings);
   std::vector<Evaluation> evaluations;
   ExitCode code = ExitCode::kOk;
   for (const TrajectoryFile& file : files) {
     try {
       evaluations.push_back(EvaluateFile(reference, file, options, arguments.format));
       std::vector<std::string>& warnings = evaluations.back().warnings;
-      WarnOf(warnings);
+      LogWarnings(warnings);
       warnings.insert(warnings.begin(), reference.warnings.begin(), reference.warnings.end());
     } catch (const Error& error) {
       if (files.size() == 1) throw;
@@ -151,21 +152,21 @@ ExitCode RunEval(const EvalArguments& arguments) {
     }
   }
   MakeUnique(evaluations);
-  Print(Text(evaluations, arguments.form));
+  Print(Text(evaluations, arguments.output_format));
   return code;
 }
 
-/// Says what is wrong with options that fit one by one, but not together.
-void CheckTogether(const EvalArguments& arguments) {
+/// Rejects options that exclude each other.
+void CheckCombinations(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
-    throw CLI::ValidationError("--delta: frames are a whole number");
+    throw CLI::ValidationError("--delta: not a whole number of frames; expected an integer");
   }
-  const Alignment chosen = Chosen(arguments);
+  const Alignment alignment = SelectedAlignment(arguments);
   if (arguments.options.align_poses > 0 &&
-      (chosen == Alignment::kNone || chosen == Alignment::kOrigin)) {
-    throw CLI::ValidationError("--n-to-align: " + std::string(ToString(chosen)) +
-                               " aligns no N poses; expected -a, -s or --align-mode too");
+      (alignment == Alignment::kNone || alignment == Alignment::kOrigin)) {
+    throw CLI::ValidationError("--n-to-align: " + std::string(ToString(alignment)) +
+                               " does not use N poses; expected -a, -s or --align-mode too");
   }
 }
 
@@ -175,7 +176,7 @@ void AddAlignment(CLI::App& command, EvalArguments& a) {
   CLI::Option* scale =
       command.add_flag("-s,--correct-scale", a.scale, "align by scale; with -a by sim3");
   CLI::Option* origin =
-      command.add_flag("--align-origin", a.origin, "align so that the first poses are the same");
+      command.add_flag("--align-origin", a.origin, "align the first poses with each other");
   CLI::Option* mode =
       command
           .add_option("--align-mode", a.options.alignment,
@@ -185,7 +186,7 @@ void AddAlignment(CLI::App& command, EvalArguments& a) {
                              Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}));
   mode->excludes(origin)->excludes(se3)->excludes(scale);
   origin->excludes(se3)->excludes(scale);
-  command.add_option("--n-to-align", a.options.align_poses, "align by the first N poses alone")
+  command.add_option("--n-to-align", a.options.align_poses, "use only the first N poses to align")
       ->option_text("N")
       ->check(IsInteger(3, 1'000'000'000));
 }
@@ -222,30 +223,30 @@ void AddErrors(CLI::App& command, EvalArguments& a) {
 void AddTimes(CLI::App& command, EvalArguments& a) {
   command
       .add_option("--t-max-diff", a.max_diff_s,
-                  "largest time difference of two poses that match, s; default 0.01")
+                  "largest time difference of matched poses in seconds; default 0.01")
       ->option_text("S")
       ->check(IsNumber(0.0, 1e9));
-  command.add_option("--t-offset", a.offset_s, "is added to the timestamps of the estimate, s")
+  command.add_option("--t-offset", a.offset_s, "seconds to add to the timestamps of the estimate")
       ->option_text("S")
       ->check(IsNumber(-9e9, 9e9));
   command
-      .add_option("--format", a.format, "of files: tum, kitti, euroc; default: by their first row")
+      .add_option("--format", a.format, "tum, kitti or euroc; default: detected from the first row")
       ->option_text("NAME")
       ->transform(
           OneOf({TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}));
 }
 
-void AddForms(CLI::App& command, EvalArguments& a) {
-  const auto add = [&](const char* name, Form form, const char* help) {
+void AddOutputFormats(CLI::App& command, EvalArguments& a) {
+  const auto add = [&](const char* name, OutputFormat output_format, const char* help) {
     return command.add_flag_callback(
-        name, [&a, form] { a.form = form; }, help);
+        name, [&a, output_format] { a.output_format = output_format; }, help);
   };
-  CLI::Option* json = add("--json", Form::kJson, "print JSON");
-  CLI::Option* markdown = add("--markdown", Form::kMarkdown, "print a table of Markdown");
-  CLI::Option* latex = add("--latex", Form::kLatex, "print a table of LaTeX");
+  CLI::Option* json = add("--json", OutputFormat::kJson, "print JSON");
+  CLI::Option* markdown = add("--markdown", OutputFormat::kMarkdown, "print a Markdown table");
+  CLI::Option* latex = add("--latex", OutputFormat::kLatex, "print a LaTeX table");
   json->excludes(markdown)->excludes(latex);
   markdown->excludes(latex);
-  command.add_flag("--quiet")->description("no warnings");
+  command.add_flag("--quiet")->description("print no warnings");
 }
 
 }  // namespace
@@ -256,21 +257,21 @@ void AddEval(CLI::App& program, Action& action) {
   const auto arguments = std::make_shared<EvalArguments>();
   command
       .add_option("REF", arguments->reference,
-                  "the reference: a file, or the folder of a run; without EST a run, compared with "
-                  "its truth")
+                  "the reference: a file or a run folder; without EST, a run folder, which is "
+                  "compared with its own truth")
       ->option_text(" ")
       ->required()
-      ->check(IsNamed);
-  command.add_option("EST", arguments->estimates, "the estimates: files, or folders of runs")
+      ->check(IsNonEmpty);
+  command.add_option("EST", arguments->estimates, "the estimates: files or run folders")
       ->option_text(" ")
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
   AddAlignment(command, *arguments);
   AddErrors(command, *arguments);
   AddTimes(command, *arguments);
-  AddForms(command, *arguments);
+  AddOutputFormats(command, *arguments);
   command.footer(kEvalFooter);
   command.callback([&action, arguments] {
-    CheckTogether(*arguments);
+    CheckCombinations(*arguments);
     action = [arguments] { return RunEval(*arguments); };
   });
 }

@@ -25,7 +25,7 @@ ExitCode ExplainConfig(const Input& input) {
 
 void AddExplain(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
-      "explain", "Describe what a config does: state, models, roles, unobservable directions");
+      "explain", "Describe a config: state, models, roles, unobservable directions");
   const auto input = std::make_shared<Input>();
   input->AddTo(command);
   command.footer(kExplainFooter);

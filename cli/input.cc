@@ -22,7 +22,7 @@ std::string IsAssignment(const std::string& text) {
   return "'" + text + "' is not an assignment; expected key=value, as in source.seed=7";
 }
 
-/// The full path, in its shortest form.
+/// Returns the absolute path in its shortest form.
 fs::path FullPath(const fs::path& path) {
   std::error_code error;
   const fs::path full = fs::absolute(path, error).lexically_normal();
@@ -30,13 +30,13 @@ fs::path FullPath(const fs::path& path) {
   if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   throw Error(ExitCode::kCannotCreate,
               ErrorLine(Place{path.string()}, {},
-                        "the current folder is gone; change to one that exists, or give full "
-                        "paths"));
+                        "the current folder no longer exists; change to an existing folder, or "
+                        "use full paths"));
 }
 
-/// Where output goes that nothing else places: its name is that of the config, of which one that is
-/// called config.yaml goes by its folder.
-std::string NameOf(const fs::path& config) {
+/// Returns the default name of an output folder: the name of the config's folder if the file is
+/// called config.yaml, else the stem of the file.
+std::string DefaultOutputName(const fs::path& config) {
   const std::string folder = FullPath(config).parent_path().filename().string();
   const bool by_folder = config.filename() == "config.yaml" && !folder.empty();
   return by_folder ? folder : config.stem().string();
@@ -44,8 +44,8 @@ std::string NameOf(const fs::path& config) {
 
 constexpr const char* kRuns = "runs";
 
-/// True of the folder that holds all the others: replaced, they would be gone.
-bool HoldsAllRuns(const fs::path& folder) {
+/// Returns true if `folder` is runs/ itself, which contains all runs: --force would delete them.
+bool IsRunsFolder(const fs::path& folder) {
   std::error_code error;
   const fs::path runs = fs::absolute(kRuns, error) / "";
   return !error && FullPath(folder / "") == runs;
@@ -53,35 +53,37 @@ bool HoldsAllRuns(const fs::path& folder) {
 
 }  // namespace
 
-std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most) {
-  return [least, most](const std::string& text) -> std::string {
+std::function<std::string(const std::string&)> IsInteger(std::int64_t minimum,
+                                                         std::int64_t maximum) {
+  return [minimum, maximum](const std::string& text) -> std::string {
     std::int64_t value = 0;
     const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, value);
-    const bool whole = error == std::errc() && rest == end;
-    // Later it is read as C does, where 010 is 8.
+    const auto [parsed_end, error] = std::from_chars(text.data(), end, value);
+    const bool is_integer = error == std::errc() && parsed_end == end;
+    // CLI11 later parses the text as C does: 010 is 8.
     const std::size_t first = text.starts_with('-') ? 1 : 0;
-    if (whole && text.size() > first + 1 && text[first] == '0')
+    if (is_integer && text.size() > first + 1 && text[first] == '0')
       return "'" + text + "' has a leading zero";
-    if (whole && value >= least && value <= most) return {};
-    return "'" + text + "' is not an integer from " + std::to_string(least) + " to " +
-           std::to_string(most);
+    if (is_integer && value >= minimum && value <= maximum) return {};
+    return "'" + text + "' is not an integer from " + std::to_string(minimum) + " to " +
+           std::to_string(maximum);
   };
 }
 
-std::function<std::string(const std::string&)> IsNumber(double least, double most) {
-  return [least, most](const std::string& text) -> std::string {
+std::function<std::string(const std::string&)> IsNumber(double minimum, double maximum) {
+  return [minimum, maximum](const std::string& text) -> std::string {
     double value = 0.0;
     const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, value);
-    if (error == std::errc() && rest == end && value >= least && value <= most) return {};
+    const auto [parsed_end, error] = std::from_chars(text.data(), end, value);
+    if (error == std::errc() && parsed_end == end && value >= minimum && value <= maximum)
+      return {};
     char range[64];
-    std::snprintf(range, sizeof range, "%g to %g", least, most);
+    std::snprintf(range, sizeof range, "%g to %g", minimum, maximum);
     return "'" + text + "' is not a number from " + range;
   };
 }
 
-std::string IsNamed(const std::string& path) { return path.empty() ? "empty path" : ""; }
+std::string IsNonEmpty(const std::string& path) { return path.empty() ? "empty path" : ""; }
 
 void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help) {
   command.add_option("--set", sets, help)
@@ -96,28 +98,28 @@ void AddPluginPath(CLI::App& command, std::vector<std::string>& paths) {
       ->option_text("PATH")
       ->type_name("PATH")
       ->allow_extra_args(false)
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
 }
 
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help) {
-  command.add_option("-o,--output", folder, help)->option_text("DIR")->check(IsNamed);
+  command.add_option("-o,--output", folder, help)->option_text("DIR")->check(IsNonEmpty);
 }
 
 CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed) {
-  return command.add_option("--seed", seed, "seed of the source; overrides the config")
+  return command.add_option("--seed", seed, "seed of the source instead of the config's")
       ->option_text("N")
       ->check(IsInteger(0, INT64_MAX));
 }
 
 void Input::AddTo(CLI::App& command) {
-  command.add_option("CONFIG", config, "the config, a YAML file")
+  command.add_option("CONFIG", config, "the config file (YAML)")
       ->option_text(" ")
       ->required()
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
   AddSets(command, sets, "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, plugin_paths);
   command.add_flag("--allow-outside", allow_outside,
-                   "let `include:` and `output:` of the config leave their folders");
+                   "allow `include:` and `output:` of the config outside their folders");
 }
 
 Config Input::Load() const {
@@ -137,8 +139,8 @@ std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {
 
 namespace {
 
-/// What the config and the command line name.
-std::vector<fs::path> PlacesOf(const Input& input, const Config& loaded) {
+/// Returns the plugin paths of the config and of the command line.
+std::vector<fs::path> PluginPathsOf(const Input& input, const Config& loaded) {
   std::vector<fs::path> places;
   for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));
   for (const fs::path& path : Absolute(input.plugin_paths)) places.push_back(path);
@@ -147,12 +149,14 @@ std::vector<fs::path> PlacesOf(const Input& input, const Config& loaded) {
 
 }  // namespace
 
-PluginHost Input::Host(const Config& loaded) const { return PluginHost(PlacesOf(*this, loaded)); }
+PluginHost Input::Host(const Config& loaded) const {
+  return PluginHost(PluginPathsOf(*this, loaded));
+}
 
-PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& others) const {
-  std::set<std::string> words = WordsOf(loaded);
-  for (const Config& other : others) words.merge(WordsOf(other));
-  return PluginHost(PlacesOf(*this, loaded), OnRefusal::kThrow, words);
+PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& other_configs) const {
+  std::set<std::string> names = WordsOf(loaded);
+  for (const Config& other : other_configs) names.merge(WordsOf(other));
+  return PluginHost(PluginPathsOf(*this, loaded), OnRefusal::kThrow, names);
 }
 
 std::string Input::InputsText(const Config& loaded, const std::vector<std::string>& arguments,
@@ -166,7 +170,7 @@ std::string Input::InputsText(const Config& loaded, const std::vector<std::strin
   return internal::InputsJson(command, loaded, runs, plugins);
 }
 
-void TellStopped(std::size_t done, std::int64_t runs, const std::string& more) {
+void ReportStopped(std::size_t done, std::int64_t runs, const std::string& more) {
   PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs" +
             more);
 }
@@ -178,73 +182,76 @@ fs::path Resolved(const std::string& path) {
   return error ? absolute.lexically_normal() : resolved;
 }
 
-void KeepInputs(const std::string& output, const std::vector<std::string>& inputs) {
+void ProtectInputs(const std::string& output, const std::vector<std::string>& inputs) {
   if (output.empty()) return;
-  const fs::path taken = Resolved(output), partial = internal::PartialOf(taken);
-  const auto lies_in = [](const fs::path& path, const fs::path& folder) {
+  const fs::path destination = Resolved(output), partial = internal::PartialOf(destination);
+  const auto is_inside = [](const fs::path& path, const fs::path& folder) {
     return std::ranges::mismatch(folder, path).in1 == folder.end();
   };
   for (const std::string& input : inputs) {
     const fs::path path = input.empty() ? fs::path() : Resolved(input);
-    if (!lies_in(path, taken) && !lies_in(path, partial)) continue;
-    throw Error(ExitCode::kCannotCreate, ErrorLine(Place{output}, {},
-                                                   std::string(path == taken ? "is" : "holds") +
-                                                       " the input '" + input + "'",
-                                                   "another place"));
+    if (!is_inside(path, destination) && !is_inside(path, partial)) continue;
+    throw Error(ExitCode::kCannotCreate,
+                ErrorLine(Place{output}, {},
+                          std::string(path == destination ? "is" : "contains") + " the input '" +
+                              input + "'",
+                          "another folder"));
   }
 }
 
 namespace {
 
-fs::path NamedFolder(const std::string& given, const Config& config, const Input& input,
-                     const std::string& prefix) {
-  constexpr const char* kHoldsAll = "is the folder that holds the runs";
-  if (!given.empty()) {
-    if (!HoldsAllRuns(given)) return given;
-    throw Error(ExitCode::kCannotCreate, ErrorLine(Place{given}, {}, kHoldsAll, "runs/NAME"));
+fs::path PreferredFolder(const std::string& requested, const Config& config, const Input& input,
+                         const std::string& prefix) {
+  constexpr const char* kIsRunsFolder = "is the folder that contains all runs";
+  if (!requested.empty()) {
+    if (!IsRunsFolder(requested)) return requested;
+    throw Error(ExitCode::kCannotCreate,
+                ErrorLine(Place{requested}, {}, kIsRunsFolder, "runs/NAME"));
   }
   if (const auto output = config.root().Find("output")) {
     const std::string name = output->Text();
     if (name.empty()) output->Fail("empty path", "a name inside runs/");
-    FullPath(name);  // or the current folder is gone
+    FullPath(name);  // throws if the current folder no longer exists
     const fs::path folder =
         ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());
-    if (HoldsAllRuns(folder)) output->Fail("'" + name + "' " + kHoldsAll, "a name inside runs/");
+    if (IsRunsFolder(folder))
+      output->Fail("'" + name + "' " + kIsRunsFolder, "a name inside runs/");
     return folder;
   }
-  return fs::path(kRuns) / (prefix + NameOf(input.config));
+  return fs::path(kRuns) / (prefix + DefaultOutputName(input.config));
 }
 
 /// `folder`, or the first of FOLDER-2, FOLDER-3, ... that neither exists nor is being written.
 fs::path FreeFolder(const fs::path& folder) {
-  const auto is_there = [](const fs::path& path) {
+  const auto exists = [](const fs::path& path) {
     std::error_code error;
     return fs::exists(fs::symlink_status(path, error)) ||
            fs::exists(fs::symlink_status(internal::PartialOf(path), error));
   };
   fs::path free = folder;
-  for (int n = 2; is_there(free); ++n) free = folder.string() + '-' + std::to_string(n);
+  for (int n = 2; exists(free); ++n) free = folder.string() + '-' + std::to_string(n);
   return free;
 }
 
 }  // namespace
 
-Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,
-                    const std::string& prefix) {
-  const fs::path named = NamedFolder(given, config, input, prefix);
-  FullPath(named);  // or the current folder is gone
-  const fs::path folder = given.empty() && !force ? FreeFolder(named) : named;
-  KeepInputs(folder.string(), config.inputs());
-  return {folder, named};
+Output OutputFolder(const std::string& requested, const Config& config, const Input& input,
+                    bool force, const std::string& prefix) {
+  const fs::path preferred = PreferredFolder(requested, config, input, prefix);
+  FullPath(preferred);  // throws if the current folder no longer exists
+  const fs::path folder = requested.empty() && !force ? FreeFolder(preferred) : preferred;
+  ProtectInputs(folder.string(), config.inputs());
+  return {folder, preferred};
 }
 
-void TellOutput(const Output& output) {
-  if (output.folder == output.named) return;
+void ReportOutput(const Output& output) {
+  if (output.folder == output.preferred) return;
   std::error_code error;
-  const bool is_there = fs::exists(fs::symlink_status(output.named, error));
-  const fs::path taken = is_there ? output.named : internal::PartialOf(output.named);
-  PrintNote(taken.string() + " exists: the output is " + output.folder.string() +
-            " (--force replaces " + taken.string() + ')');
+  const bool exists = fs::exists(fs::symlink_status(output.preferred, error));
+  const fs::path existing = exists ? output.preferred : internal::PartialOf(output.preferred);
+  PrintNote(existing.string() + " exists: the output is " + output.folder.string() +
+            " (--force replaces " + existing.string() + ')');
 }
 
 }  // namespace alidade::cli

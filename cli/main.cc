@@ -13,17 +13,17 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kProgramFooter = R"(Examples:
-  alidade doctor                                   is everything in place?
+  alidade doctor                                   check the installation
   alidade plugins list                             sensors, motion models, sources, estimators
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
-  alidade replay runs/first                        does it give the same bytes again?
+  alidade replay runs/first                        repeat the run and compare every byte
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
   alidade eval runs/slam                           trajectories against truth: ATE, RPE, NEES
   alidade compare examples/08_depth_all_estimators/config.yaml
 
-`alidade COMMAND --help` describes each. Exit codes: 0 ok, 1 something found wrong, 2 usage,
+`alidade COMMAND --help` describes a command. Exit codes: 0 ok, 1 problem found, 2 usage,
 65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
 74 input/output, 75 stopped by a signal, 77 not trusted, 78 bad config, 79 diverged.)";
 
@@ -36,7 +36,7 @@ class Format : public CLI::Formatter {
   }
 };
 
-/// `text` as one word of a shell.
+/// Returns `text` as one word of a shell, quoted if necessary.
 std::string ShellQuoted(const std::string& text) {
   constexpr const char* kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
@@ -47,17 +47,17 @@ std::string ShellQuoted(const std::string& text) {
   return quoted + '\'';
 }
 
-using Words = std::vector<std::string>;
+using ArgumentList = std::vector<std::string>;
 
-std::string CommandLine(const Words& arguments) {
+std::string CommandLine(const ArgumentList& arguments) {
   std::string line = "alidade";
   for (const std::string& argument : arguments) line += ' ' + ShellQuoted(argument);
   return line;
 }
 
-/// The arguments, the last one first, as CLI11 takes them. An underscore in the name of an option
-/// means a hyphen: `--t_max_diff` of evo is `--t-max-diff`. What follows `--` is left as it is.
-Words Reversed(Words arguments) {
+/// Returns the arguments in reverse order, as CLI11 expects them. Replaces underscores in the names
+/// of options by hyphens: `--t_max_diff` of evo is `--t-max-diff`. Keeps arguments after `--`.
+ArgumentList ReversedArguments(ArgumentList arguments) {
   for (std::string& argument : arguments) {
     if (argument == "--") break;
     if (!argument.starts_with("--")) continue;
@@ -74,10 +74,10 @@ std::string IsLogLevel(const std::string& text) {
   return LogLevelOf(text) ? "" : "'" + text + "' is not a level; expected " + kLogLevels;
 }
 
-/// What the terminal shows of the log: `given` by --log-level, else errors under --quiet, else
-/// ALIDADE_LOG, else warnings.
-LogLevel LogLevelFor(const CLI::App& command, const std::string& given) {
-  if (!given.empty()) return *LogLevelOf(given);
+/// Returns the log level of the terminal: `log_level` of --log-level, else error under --quiet,
+/// else the level in ALIDADE_LOG, else warning.
+LogLevel LogLevelFor(const CLI::App& command, const std::string& log_level) {
+  if (!log_level.empty()) return *LogLevelOf(log_level);
   const CLI::Option* quiet = command.get_option_no_throw("--quiet");
   if (quiet != nullptr && quiet->count() > 0) return LogLevel::kError;
   const char* const variable = std::getenv("ALIDADE_LOG");
@@ -86,13 +86,13 @@ LogLevel LogLevelFor(const CLI::App& command, const std::string& given) {
   throw Error(ExitCode::kUsage, "ALIDADE_LOG: " + IsLogLevel(variable));
 }
 
-ExitCode Execute(const Words& arguments);
+ExitCode Execute(const ArgumentList& arguments);
 
 void Describe(CLI::App& program, Action& action, const std::string& command_line,
               std::string& log_level) {
   program.formatter(std::make_shared<Format>());
   program.footer(kProgramFooter);
-  program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
+  program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and exit");
   program.require_subcommand(1);
   AddRun(program, action, command_line);
   AddCompare(program, action, command_line);
@@ -107,10 +107,10 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddEval(program, action);
   AddDoctor(program, action);
   const auto polish = [&log_level](const auto& self, CLI::App& app) -> void {
-    app.get_help_ptr()->description("print this help and leave");
+    app.get_help_ptr()->description("print this help and exit");
     if (app.get_subcommands({}).empty()) {
       app.add_option("--log-level", log_level,
-                     std::string("least level of messages on standard error: ") + kLogLevels)
+                     std::string("minimum level of messages on standard error: ") + kLogLevels)
           ->option_text("LEVEL")
           ->check(IsLogLevel);
     }
@@ -122,13 +122,13 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   polish(polish, program);
 }
 
-/// The innermost command that the line names.
-const CLI::App& Named(const CLI::App& app) {
+/// Returns the innermost command on the command line.
+const CLI::App& InnermostCommand(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
-  return chosen.empty() ? app : Named(*chosen.front());
+  return chosen.empty() ? app : InnermostCommand(*chosen.front());
 }
 
-/// The command or option nearest to a word that is none, as ` did you mean '...'?`.
+/// Returns `; did you mean '...'?` with the command or option closest to an unknown word, or "".
 std::string Suggestion(const CLI::App& app, const std::string& word) {
   std::vector<std::string> names;
   if (word.starts_with('-')) {
@@ -142,32 +142,32 @@ std::string Suggestion(const CLI::App& app, const std::string& word) {
   return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
 }
 
-/// What is wrong with a command line that CLI11 refuses.
-std::string Complaint(const CLI::App& command, const CLI::ParseError& error) {
+/// Returns the error message for a command line that CLI11 rejects.
+std::string UsageErrorText(const CLI::App& command, const CLI::ParseError& error) {
   const std::vector<std::string> extra = command.remaining();
-  const bool wants_command = !command.get_subcommands({}).empty();
-  if (extra.empty()) return wants_command ? "no command" : error.what();
+  const bool needs_command = !command.get_subcommands({}).empty();
+  if (extra.empty()) return needs_command ? "missing command" : error.what();
   const std::string& word = extra.front();
-  const char* const what = word.starts_with('-') ? "no option '"
-                           : wants_command       ? "no command '"
-                                                 : "unexpected argument '";
-  return what + word + "'" + Suggestion(command, word);
+  const char* const problem = word.starts_with('-') ? "unknown option '"
+                              : needs_command       ? "unknown command '"
+                                                    : "unexpected argument '";
+  return problem + word + "'" + Suggestion(command, word);
 }
 
-/// `alidade plugins info`
+/// Returns the name of a command with those of its parents, such as `alidade plugins info`.
 std::string FullName(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent == nullptr ? command.get_name() : FullName(*parent) + ' ' + command.get_name();
 }
 
-ExitCode UsageError(const CLI::App& command, const std::string& complaint) {
-  PrintErrors(complaint);
+ExitCode UsageError(const CLI::App& command, const std::string& message) {
+  PrintErrors(message);
   PrintNote("see `" + FullName(command) + " --help`");
   return ExitCode::kUsage;
 }
 
 ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
-  const CLI::App& command = Named(program);
+  const CLI::App& command = InnermostCommand(program);
   if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr) {
     Print(program.help());
     return ExitCode::kOk;
@@ -176,31 +176,33 @@ ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
     Print(std::string(error.what()) + '\n');
     return ExitCode::kOk;
   }
-  return UsageError(command, Complaint(command, error));
+  return UsageError(command, UsageErrorText(command, error));
 }
 
-ExitCode Execute(const Words& arguments) {
-  CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
+ExitCode Execute(const ArgumentList& arguments) {
+  CLI::App program(
+      "Compare Kalman filters, smoothers and batch estimators on one model. Write h(x) once.",
+      "alidade");
   Action action;
   std::string log_level;
   Describe(program, action, CommandLine(arguments), log_level);
   try {
-    program.parse(Reversed(arguments));
+    program.parse(ReversedArguments(arguments));
   } catch (const CLI::ParseError& error) {
     return Fail(program, error);
   }
   try {
-    ShowLog(LogLevelFor(Named(program), log_level));
+    ShowLog(LogLevelFor(InnermostCommand(program), log_level));
     return action();
   } catch (const Error& error) {
     if (error.code() != ExitCode::kUsage) throw;
-    return UsageError(Named(program), error.what());
+    return UsageError(InnermostCommand(program), error.what());
   }
 }
 
-ExitCode Guarded(int argc, char** argv) {
+ExitCode RunGuarded(int argc, char** argv) {
   try {
-    return Execute(Words(argv + 1, argv + std::max(argc, 1)));
+    return Execute(ArgumentList(argv + 1, argv + std::max(argc, 1)));
   } catch (...) {
     const Failure failure = CaughtFailure();
     PrintErrors(failure.reason);
@@ -212,9 +214,9 @@ ExitCode Guarded(int argc, char** argv) {
 }  // namespace alidade::cli
 
 int main(int argc, char** argv) {
-  // Ceres logs by glog, which is loaded with the plugins of Ceres and then reads this: nothing
-  // below a fatal error. What the solver reports is in its results. A value set by the user stays.
+  // Ceres logs with glog, which reads this variable when the Ceres plugins load it: print only
+  // fatal errors. The solver's reports are in its results. A value set by the user is kept.
   setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
-  return static_cast<int>(alidade::cli::Guarded(argc, argv));
+  return static_cast<int>(alidade::cli::RunGuarded(argc, argv));
 }

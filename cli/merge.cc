@@ -16,8 +16,8 @@ constexpr const char* kMergeFooter = R"(Examples:
   alidade sweep config.yaml --runs 1000 --shard 2/2 -o runs/shard-2
   alidade merge runs/shard-1 runs/shard-2 -o runs/whole
 
-The folder has the bytes of one sweep over all runs. Exit code 1: some runs failed; 65: a shard is
-missing, comes twice, is not finished, or is of another sweep.)";
+The folder is byte for byte that of one sweep over all runs. Exit code 1: some runs failed; 65: a
+shard is missing, occurs twice, is not finished, or belongs to another sweep.)";
 
 struct MergeArguments {
   std::vector<std::string> shards;
@@ -26,7 +26,7 @@ struct MergeArguments {
 };
 
 ExitCode Merge(const MergeArguments& arguments) {
-  KeepInputs(arguments.folder, arguments.shards);
+  ProtectInputs(arguments.folder, arguments.shards);
   const std::filesystem::path path = arguments.folder;
   StopOnSignals();
   const internal::MergedSweep merged =
@@ -42,15 +42,15 @@ ExitCode Merge(const MergeArguments& arguments) {
 }  // namespace
 
 void AddMerge(CLI::App& program, Action& action) {
-  CLI::App& command = *program.add_subcommand("merge", "Put the shards of a sweep together");
+  CLI::App& command = *program.add_subcommand("merge", "Merge the shards of a sweep");
   const auto arguments = std::make_shared<MergeArguments>();
   command.add_option("DIR", arguments->shards, "the folders of all shards of a sweep")
       ->option_text("...")
       ->required()
-      ->check(IsNamed);
-  AddOutput(command, arguments->folder, "the folder of the whole sweep");
+      ->check(IsNonEmpty);
+  AddOutput(command, arguments->folder, "the folder of the merged sweep");
   command.get_option("--output")->required();
-  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kMergeFooter);
   command.callback([&action, arguments] { action = [arguments] { return Merge(*arguments); }; });

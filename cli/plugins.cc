@@ -17,7 +17,7 @@ constexpr const char* kPluginsFooter = R"(Examples:
   alidade plugins info ekf
   alidade plugins where --plugin-path build/lib
 
-Plugins are looked for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
+Plugins are searched for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
 data folder ($XDG_DATA_HOME/alidade/plugins) and next to the program.)";
 
 struct PluginsArguments {
@@ -28,7 +28,7 @@ struct PluginsArguments {
 
 using Listing = std::string (*)(const PluginHost&, const PluginsArguments&);
 
-/// A subcommand that prints what `listing` makes of the plugins.
+/// Adds the options of a subcommand that prints the text of `listing`.
 std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, Listing listing,
                                              OnRefusal on_refusal = OnRefusal::kThrow) {
   const auto arguments = std::make_shared<PluginsArguments>();
@@ -46,7 +46,8 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
 
 std::string List(const PluginHost& host, const PluginsArguments& arguments) {
   if (const std::size_t count = host.refusals().size(); count > 0) {
-    PrintNote(std::to_string(count) + " refused: `alidade plugins where` names the reasons");
+    PrintNote(std::to_string(count) +
+              " plugins refused: `alidade plugins where` lists the reasons");
   }
   return arguments.json ? PluginListJson(host) : PluginList(host, arguments.files);
 }
@@ -60,23 +61,24 @@ std::string Where(const PluginHost& host, const PluginsArguments&) { return Plug
 }  // namespace
 
 void AddPlugins(CLI::App& program, Action& action) {
-  CLI::App& plugins = *program.add_subcommand("plugins", "List plugins and describe one");
+  CLI::App& plugins = *program.add_subcommand("plugins", "List plugins or describe one");
   plugins.require_subcommand(1);
   plugins.footer(kPluginsFooter);
   CLI::App& list =
-      *plugins.add_subcommand("list", "List the models, sources and estimators on offer");
+      *plugins.add_subcommand("list", "List the models, sources and estimators that are available");
   const auto list_arguments = AddListing(list, action, List);
   list.add_flag("-v,--verbose", list_arguments->files, "print the file of each plugin too");
   list.add_flag("--json", list_arguments->json, "print JSON");
-  CLI::App& info = *plugins.add_subcommand("info", "Describe one of them");
+  CLI::App& info = *plugins.add_subcommand("info", "Describe a model, source or estimator");
   const auto info_arguments = AddListing(info, action, Info);
-  info.add_option("NAME", info_arguments->name, "of a sensor, motion model, source or estimator")
+  info.add_option("NAME", info_arguments->name,
+                  "name of a sensor, motion model, source or estimator")
       ->option_text(" ")
       ->required();
   info.add_flag("--json", info_arguments->json, "print JSON");
-  CLI::App& where =
-      *plugins.add_subcommand("where", "List the places searched, what they have, what is refused");
-  AddListing(where, action, Where, OnRefusal::kList);
+  CLI::App& places = *plugins.add_subcommand(
+      "where", "List the searched folders, their plugins, and the refused ones with reasons");
+  AddListing(places, action, Where, OnRefusal::kList);
 }
 
 }  // namespace alidade::cli

@@ -20,18 +20,18 @@ namespace fs = std::filesystem;
 
 constexpr const char* kReplayFooter = R"(Examples:
   alidade replay runs/first
-  alidade replay runs/first -o runs/again          keeps what is made again
+  alidade replay runs/first -o runs/again          keep the repeated run
 
-DIR is a folder of `alidade run` or `alidade sweep`. What it was made from is in its inputs.json and
-config.resolved.yaml. All files are compared but those with the wall clock, as timing.json. Exit
-code 1: something differs.)";
+DIR is a folder of `alidade run` or `alidade sweep`. Its inputs.json and config.resolved.yaml record
+the inputs. All files are compared, except files with wall-clock times such as timing.json. Exit
+code 1: a file differs.)";
 
 struct ReplayArguments {
   std::string folder, output;
   bool json = false, quiet = false;
 };
 
-/// A folder that is gone with its owner.
+/// Temporary folder, removed by the destructor.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -39,7 +39,7 @@ class ScratchFolder {
     const fs::path temporary = fs::temp_directory_path(error);
     if (error) {
       throw Error(ExitCode::kCannotCreate,
-                  "TMPDIR: no folder for temporary files; expected one that is there");
+                  "TMPDIR: not a folder for temporary files; expected an existing folder");
     }
     std::string name = (temporary / "alidade-replay-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) internal::FailCreate(name, errno);
@@ -57,11 +57,11 @@ class ScratchFolder {
   fs::path path_;
 };
 
-/// Does the recorded command again, into `output`, and gives its exit code.
-ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& folder,
-                   const fs::path& scratch, const fs::path& output,
-                   const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
-  // A config gives its name to the title; in a folder of its own it is in nobody's way.
+/// Repeats the recorded command into `output`. Returns its exit code.
+ExitCode RepeatCommand(const internal::RecordedInputs& recorded, const fs::path& folder,
+                       const fs::path& scratch, const fs::path& output,
+                       const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
+  // The title contains the name of the config file. A folder of its own avoids a clash of names.
   const fs::path config = scratch / "config" / fs::path(recorded.config).filename();
   std::error_code error;
   fs::create_directory(config.parent_path(), error);
@@ -72,17 +72,18 @@ ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& fol
                 ErrorLine(Place{(folder / internal::kResolvedConfig).string()}, {},
                           "cannot be copied: " + error.message()));
   }
-  std::vector<std::string> words = recorded.command.arguments;
-  words.insert(words.end(), {config.string(), "-o", output.string(), "--quiet"});
+  std::vector<std::string> arguments = recorded.command.arguments;
+  arguments.insert(arguments.end(), {config.string(), "-o", output.string(), "--quiet"});
   for (const fs::path& path : recorded.command.plugin_paths) {
-    if (fs::exists(path, error)) words.insert(words.end(), {"--plugin-path", path.string()});
+    if (fs::exists(path, error))
+      arguments.insert(arguments.end(), {"--plugin-path", path.string()});
   }
   std::string folders;
   for (const fs::path& path : recorded.command.plugin_folders) {
     folders += (folders.empty() ? "" : ":") + path.string();
   }
   ::setenv("ALIDADE_PLUGIN_PATH", folders.c_str(), 1);
-  return execute(words);
+  return execute(arguments);
 }
 
 ExitCode Replay(const ReplayArguments& arguments,
@@ -90,14 +91,14 @@ ExitCode Replay(const ReplayArguments& arguments,
   const fs::path folder = Resolved(arguments.folder);
   const internal::RecordedInputs recorded = internal::ReadReplayable(arguments.folder);
   const ScratchFolder scratch;
-  const fs::path again =
+  const fs::path repeated =
       arguments.output.empty() ? scratch.path() / "made/again" : fs::path(arguments.output);
-  const ExitCode code = MakeAgain(recorded, folder, scratch.path(), again, execute);
-  if (StopRequested()) return ExitCode::kStopped;  // some figures may not be drawn
+  const ExitCode code = RepeatCommand(recorded, folder, scratch.path(), repeated, execute);
+  if (StopRequested()) return ExitCode::kStopped;  // figures may be missing
   std::error_code ignored;
-  const bool made = fs::exists(again / internal::kInputsFile, ignored);
-  if (code == ExitCode::kStopped || code == ExitCode::kUsage || !made) return code;
-  const internal::ReplayResult result = internal::CompareReplay(folder, again);
+  const bool is_complete = fs::exists(repeated / internal::kInputsFile, ignored);
+  if (code == ExitCode::kStopped || code == ExitCode::kUsage || !is_complete) return code;
+  const internal::ReplayResult result = internal::CompareReplay(folder, repeated);
   if (arguments.json) {
     Print(internal::ReplayJson(result));
   } else if (!arguments.quiet || !result.equal()) {
@@ -111,14 +112,14 @@ ExitCode Replay(const ReplayArguments& arguments,
 void AddReplay(CLI::App& program, Action& action,
                const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
   CLI::App& command = *program.add_subcommand(
-      "replay", "Make a run folder again, and compare every byte or name what differs");
+      "replay", "Repeat a run or a sweep, compare every byte, and list the files that differ");
   const auto arguments = std::make_shared<ReplayArguments>();
   command.add_option("DIR", arguments->folder, "the folder of a run or sweep")
       ->option_text(" ")
       ->required()
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
   AddOutput(command, arguments->output,
-            "keep what is made again in that folder; default: a temporary one");
+            "keep the repeated run in this folder; default: a temporary folder");
   command.add_flag("--json", arguments->json, "print the result as JSON");
   command.add_flag("--quiet", arguments->quiet, "print differences and errors only");
   command.footer(kReplayFooter);

@@ -26,14 +26,15 @@ constexpr const char* kRunFooter = R"(Examples:
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
-  alidade run images.yaml --save-video run.avi     what a person sees: features, gates, the estimate
+  alidade run images.yaml --save-video run.avi     annotated video: features, gates, estimate
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
-DIR is DIR.partial until the run ends. Ctrl-C finishes the frame, writes all that is done and ends
-with exit code 75; twice: at once. While figures are drawn it leaves out the rest of them.)";
+The folder is called DIR.partial until the run ends. Ctrl-C finishes the frame, writes the results
+so far and exits with code 75; a second Ctrl-C exits at once. While figures are drawn, Ctrl-C skips
+the remaining figures.)";
 
 struct RunArguments {
-  std::string command;  ///< the whole line
+  std::string command;  ///< the whole command line
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
@@ -42,7 +43,7 @@ struct RunArguments {
   std::string video;
 };
 
-/// Events of one estimator and one kind.
+/// Events of one estimator with the same kind.
 struct EventGroup {
   std::string kind;
   std::vector<const Event*> events;
@@ -67,21 +68,21 @@ std::string EventLine(const Event& event) {
   return line.str() + event.text;
 }
 
-/// What happened to the estimators, a few lines for each kind of event.
+/// Returns a summary of the estimators' events: a few lines for each kind.
 std::string EventSummary(const RunResult& result) {
   constexpr std::size_t kShown = 3;
   std::string text;
-  for (const EstimatorResult& one : result.estimators) {
-    for (const EventGroup& group : Group(one.events)) {
+  for (const EstimatorResult& estimator : result.estimators) {
+    for (const EventGroup& group : Group(estimator.events)) {
       const std::size_t count = group.events.size();
-      text += one.name + ": " + group.kind;
+      text += estimator.name + ": " + group.kind;
       if (count > 1) text += ", " + std::to_string(count) + " times";
       text += '\n';
       for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
         text += "  " + EventLine(*group.events[i]) + '\n';
       }
       if (count > kShown) {
-        text += "  ... and " + std::to_string(count - kShown) + " more, in " + one.name +
+        text += "  ... and " + std::to_string(count - kShown) + " more, in " + estimator.name +
                 "/events.csv\n";
       }
     }
@@ -101,13 +102,13 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
   return text;
 }
 
-/// What shows the run in a video or a window, if that is asked for.
+/// Returns the viewer for the video and the window, or null if neither is requested.
 std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experiment& experiment,
                                     const Config& config) {
   if (arguments.video.empty() && !arguments.view) return nullptr;
   const std::filesystem::path video(arguments.video);
-  KeepInputs(video, config.inputs());
-  KeepInputs(video.parent_path() / (video.stem().string() + ".partial.avi"), config.inputs());
+  ProtectInputs(video, config.inputs());
+  ProtectInputs(video.parent_path() / (video.stem().string() + ".partial.avi"), config.inputs());
   const auto title = config.root().Find("title");
   auto viewer = std::make_unique<RunViewer>(experiment, title ? title->Text() : "alidade run");
   if (!arguments.video.empty()) viewer->AddVideo(arguments.video, arguments.force);
@@ -115,7 +116,7 @@ std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experim
   return viewer;
 }
 
-/// Of the options those that a byte of the run folder depends on.
+/// Returns the options that affect the bytes of the run folder.
 std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
   std::vector<std::string> list = {"run"};
   if (arguments.no_figures) list.emplace_back("--no-figures");
@@ -139,11 +140,11 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
   const PluginHost host = arguments.input.HostFor(config);
-  StopOnSignals();  // before a source that waits for its pipe is made
+  StopOnSignals();  // before BuildExperiment, which may wait for a pipe
   Experiment experiment = BuildExperiment(config, host);
   const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
   Recorder recorder(RecordOf(arguments, config, output.folder, host), config);
-  if (!arguments.quiet) TellOutput(output);
+  if (!arguments.quiet) ReportOutput(output);
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -178,21 +179,20 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   AddOutput(command, arguments->folder,
             "run folder; default: the config's `output:`, or its name, in runs/");
   AddSeed(command, arguments->seed);
-  command.add_flag("--force", arguments->force, "replace the run folder if it is there");
-  command.add_flag("--all", arguments->all, "print all rows of the table, not ten");
+  command.add_flag("--force", arguments->force, "replace the run folder if it exists");
+  command.add_flag("--all", arguments->all, "print all rows of the table, not only ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
-                   "print each estimate as it is made, a line of JSON, in place of the table");
+                   "print each estimate at once as a line of JSON, instead of the table");
   command
       .add_option("--save-video", arguments->video,
-                  "writes the images of the source, with what was measured in them and the "
-                  "estimate, as a video; needs OpenCV")
+                  "save an annotated video (features, gates, estimate); needs OpenCV")
       ->option_text("FILE")
       ->check(IsAvi);
-  command.add_flag("--view", arguments->view, "shows the same in a window while it runs");
+  command.add_flag("--view", arguments->view, "show the same in a window during the run");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
-                   "write P of every estimate, for `alidade compare`");
+                   "write the covariance of every estimate, for `alidade compare`");
   command.footer(kRunFooter);
   command.callback(
       [&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });

@@ -18,10 +18,11 @@ constexpr const char* kSimulateFooter = R"(Examples:
   alidade simulate config.yaml -o data/scene --video video.avi --images images
   alidade run other.yaml --set source.path=data/scene   with source.type: tracks
 
-No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
-as frame,t_s and their values; next to them timestamps.csv, truth, map.csv and calibration.yaml.
-Images show the textured surfaces of a source that has them, of a pair in DIR/left and DIR/right;
-else an equal disc at the pixel of each landmark's measurement.)";
+No estimator runs. Landmark measurements are written to STREAM.csv as frame,feature,dim,value, other
+measurements as frame,t_s and their values. The folder also contains timestamps.csv, truth, map.csv
+and calibration.yaml. Images show the source's textured surfaces; the images of a stereo pair are in
+DIR/left and DIR/right. Without surfaces, images show an equal disc at the pixel of each landmark's
+measurement.)";
 
 struct SimulateArguments {
   Input input;
@@ -34,7 +35,7 @@ struct SimulateArguments {
 std::string IsInside(const std::string& name) {
   const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
   if (!path.empty() && path != "." && path != "./") return {};
-  return "'" + name + "' is the folder itself; expected a name in it, like images";
+  return "'" + name + "' is the folder itself; expected a name inside it, such as images";
 }
 
 ExitCode RunSimulate(const SimulateArguments& arguments) {
@@ -48,7 +49,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
   const SimulateResult result =
       Simulate(config, host, path, arguments.force, StopRequested, arguments.images);
   if (!arguments.quiet) {
-    TellOutput(output);
+    ReportOutput(output);
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
     Print(text);
@@ -62,7 +63,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
 
 void AddSimulate(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
-      "simulate", "Write what the source of a config gives, as files to be read again");
+      "simulate", "Write the measurements of a config's source to files, which `run` can read");
   const auto arguments = std::make_shared<SimulateArguments>();
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
@@ -70,16 +71,16 @@ void AddSimulate(CLI::App& program, Action& action) {
   AddSeed(command, arguments->seed);
   command
       .add_option("--video", arguments->images.video,
-                  "writes what the camera sees as a video, FILE.avi in the folder; needs OpenCV")
+                  "write the camera's images as a video, FILE.avi in the folder; needs OpenCV")
       ->option_text("FILE")
       ->check(IsAvi);
   command
       .add_option("--images", arguments->images.folder,
-                  "writes it as a PNG for each frame, in DIR in the folder; needs OpenCV")
+                  "write one PNG for each frame, to DIR in the folder; needs OpenCV")
       ->option_text("DIR")
-      ->check(IsNamed)
+      ->check(IsNonEmpty)
       ->check(IsInside);
-  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kSimulateFooter);
   command.callback(

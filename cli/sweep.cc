@@ -24,10 +24,10 @@ constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
   alidade sweep config.yaml --runs 200 -o runs/test --resume
 
-The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The
+The folder contains sweep.json, runs.csv and table.md; with --vary also sweep.csv and a figure. The
 number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
-signal. Until all runs are finished the folder is FOLDER.partial; a sweep that was stopped or killed
-leaves it, and --resume makes the runs that it lacks. `alidade merge` puts shards together.)";
+signal. Until all runs are finished the folder is called FOLDER.partial. A sweep that was stopped or
+killed leaves this folder, and --resume adds the missing runs. `alidade merge` merges shards.)";
 
 struct SweepArguments {
   Input input;
@@ -38,21 +38,22 @@ struct SweepArguments {
 };
 
 void ReadShard(const std::string& text, SweepOptions& options) {
-  const auto read = [](const std::string& part, int& number) {
+  const auto parse_number = [](const std::string& part, int& number) {
     const char* const end = part.data() + part.size();
-    const auto [rest, error] = std::from_chars(part.data(), end, number);
-    return error == std::errc() && rest == end && !part.starts_with('0');
+    const auto [parsed_end, error] = std::from_chars(part.data(), end, number);
+    return error == std::errc() && parsed_end == end && !part.starts_with('0');
   };
   const std::size_t slash = text.find('/');
   Shard& shard = options.shard.emplace();
-  const bool two = slash != std::string::npos && read(text.substr(0, slash), shard.index) &&
-                   read(text.substr(slash + 1), shard.count);
-  if (two && shard.index >= 1 && shard.index <= shard.count) return;
+  const bool is_valid = slash != std::string::npos &&
+                        parse_number(text.substr(0, slash), shard.index) &&
+                        parse_number(text.substr(slash + 1), shard.count);
+  if (is_valid && shard.index >= 1 && shard.index <= shard.count) return;
   throw CLI::ValidationError("--shard",
                              "'" + text + "' is not a shard; expected i/n with 1 <= i <= n");
 }
 
-/// Every shard has a run, so that each gives a result.
+/// Requires at least one run for each shard.
 void CheckShards(const SweepOptions& options) {
   if (!options.shard || options.shard->count <= options.runs) return;
   throw CLI::ValidationError("--shard", std::to_string(options.shard->count) + " shards of " +
@@ -60,7 +61,7 @@ void CheckShards(const SweepOptions& options) {
                                             " runs; expected a run for each shard");
 }
 
-/// What both kinds of sweep start from.
+/// Common inputs of both kinds of sweep.
 struct Task {
   const SweepArguments& arguments;
   const Config& config;
@@ -70,7 +71,7 @@ struct Task {
   Progress& progress;
 };
 
-/// The folder of the sweep, and the runs of it that are finished already.
+/// Opens the folder of the sweep. Reads the runs that are already finished into `options`.
 std::unique_ptr<SweepFolder> OpenFolder(const Task& task, SweepOptions& options) {
   const SweepArguments& arguments = task.arguments;
   auto folder = std::make_unique<SweepFolder>(
@@ -100,8 +101,8 @@ ExitCode SweepValues(const Task& task, SweepOptions options) {
   return FinishSweep(*folder, task.path, sweep, task.config, task.arguments.quiet);
 }
 
-/// Of --resume: whether `folder` is a finished sweep of this config and these inputs. Error:
-/// kCannotCreate if it was made from others.
+/// Returns true if `folder` is a finished sweep of this config and these inputs, for --resume.
+/// Error: kCannotCreate if the folder was made from other inputs.
 bool IsFinished(const std::filesystem::path& folder, const Config& config,
                 const std::string& inputs) {
   if (!std::filesystem::exists(folder / internal::kInputsFile)) return false;
@@ -114,24 +115,24 @@ bool IsFinished(const std::filesystem::path& folder, const Config& config,
                   "; to replace it, leave out --resume and add --force");
 }
 
-/// The config of the runs, or one for each value that is varied, but for those that cannot be set:
-/// the sweep says what is wrong with them.
+/// Returns the config of the runs, or one config for each varied value. It omits values that cannot
+/// be set; the sweep reports them.
 std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& config) {
   if (arguments.vary.empty()) return {config};
   const Variation variation = Variation::FromText(arguments.vary);
   std::vector<Config> configs;
   for (const std::string& value : variation.values) {
     try {
-      Config with = config.Copy();
-      variation.Set(with, value);
-      configs.push_back(std::move(with));
+      Config varied_config = config.Copy();
+      variation.Set(varied_config, value);
+      configs.push_back(std::move(varied_config));
     } catch (const Error&) {
     }
   }
   return configs;
 }
 
-/// The options that a byte of the folder depends on.
+/// Returns the options that affect the bytes of the folder.
 std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
   const SweepOptions& options = arguments.options;
   std::vector<std::string> list = {"sweep", "--runs", std::to_string(options.runs), "--first-seed",
@@ -161,9 +162,9 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   }
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
-  bool told = arguments.quiet;
+  bool is_reported = arguments.quiet;
   options.progress = [&](std::int64_t done, std::int64_t total) {
-    if (!std::exchange(told, true)) TellOutput(output);  // the config is right
+    if (!std::exchange(is_reported, true)) ReportOutput(output);  // the config is valid
     progress.Show(done, total);
   };
   options.stop = StopRequested;
@@ -177,17 +178,18 @@ void AddSweep(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("sweep", "Run a config with many seeds");
   const auto arguments = std::make_shared<SweepArguments>();
   arguments->input.AddTo(command);
-  command.add_option("--runs", arguments->options.runs, "number of runs, of all shards together")
+  command.add_option("--runs", arguments->options.runs, "total number of runs of all shards")
       ->option_text("N")
       ->required()
       ->check(IsInteger(1, 1'000'000));
   command
-      .add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
+      .add_option("--first-seed", arguments->options.first_seed,
+                  "first seed; the others count up from it; default 1")
       ->option_text("S")
       ->check(IsInteger(0, std::int64_t{1} << 62));
   command
       .add_option("--jobs", arguments->options.jobs,
-                  "threads; default: all processors that may be used")
+                  "number of threads; default: all available processors")
       ->option_text("J")
       ->check(IsInteger(1, 1024));
   const auto read_shard = [arguments](const std::string& text) {
@@ -195,19 +197,19 @@ void AddSweep(CLI::App& program, Action& action) {
   };
   command
       .add_option_function<std::string>("--shard", read_shard,
-                                        "run shard i of n equal ones of the seeds only")
+                                        "run only the seeds of shard i of n equal shards")
       ->option_text("i/n");
   command
       .add_option("--vary", arguments->vary,
                   "run all seeds with each of these values of a key, or of KEY+KEY, and compare")
       ->option_text("KEY=v1,v2,...")
-      ->check(IsNamed);
+      ->check(IsNonEmpty);
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
-  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--force", arguments->force, "replace the folder if it exists");
   command
       .add_flag("--resume", arguments->resume,
-                "continue what an ended sweep left in FOLDER.partial: make the runs that it lacks")
+                "continue an ended sweep from FOLDER.partial: add the missing runs")
       ->needs(command.get_option("--output"))
       ->excludes(command.get_option("--force"));
   command.add_flag("--quiet", arguments->quiet, "print errors only");

@@ -2,6 +2,7 @@
 #include "sweep_report.h"
 
 #include "alidade/io/output_folder.h"
+#include "command.h"
 #include "console.h"
 
 namespace alidade::cli {
@@ -9,24 +10,24 @@ namespace {
 
 constexpr const char* kResume = "; --resume continues it";
 
-/// Tells of the runs that failed, the first few in full, each after `where`; true where there are
-/// any.
-bool ReportFailures(const SweepResult& result, const std::string& where) {
+/// Prints the reasons of the failed runs, the first few in full, each after `prefix`. Returns true
+/// if a run failed.
+bool ReportFailures(const SweepResult& result, const std::string& prefix) {
   constexpr int kShown = 5;
   int failed = 0;
   for (const SweepRun& run : result.done) {
     if (run.status != RunStatus::kFailed) continue;
     if (++failed <= kShown)
-      PrintErrors(where + "seed " + std::to_string(run.seed) + ": " + run.reason);
+      PrintErrors(prefix + "seed " + std::to_string(run.seed) + ": " + run.reason);
   }
   if (failed > kShown)
-    PrintErrors(where + std::to_string(failed) + " runs failed: see failures.csv");
+    PrintErrors(prefix + std::to_string(failed) + " runs failed: see failures.csv");
   return failed > 0;
 }
 
-/// The table of a sweep, and the names of its main files.
-void TellWritten(const std::filesystem::path& path, const std::string& table,
-                 const std::vector<std::string>& names) {
+/// Prints the table of a sweep and the names of its main files.
+void PrintWritten(const std::filesystem::path& path, const std::string& table,
+                  const std::vector<std::string>& names) {
   std::string text = table + "\nwrote " + path.string() + '\n';
   for (const std::string& name : names) text += "  " + (path / name).string() + '\n';
   Print(text);
@@ -42,12 +43,12 @@ ExitCode CodeOf(bool stopped, bool failed) {
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, bool quiet) {
   const bool failed = ReportFailures(result, "");
-  if (result.stopped) TellStopped(result.done.size(), result.runs, kResume);
+  if (result.stopped) ReportStopped(result.done.size(), result.runs, kResume);
   const std::vector<SweepSummary> summaries = Summarise(result);
   folder.Write(result, summaries, config);
   if (!quiet) {
-    TellWritten(result.stopped ? internal::PartialOf(path) : path, SweepTable(result, summaries),
-                {"table.md", "sweep.json", "runs.csv"});
+    PrintWritten(result.stopped ? internal::PartialOf(path) : path, SweepTable(result, summaries),
+                 {"table.md", "sweep.json", "runs.csv"});
   }
   return CodeOf(result.stopped, failed);
 }
@@ -58,12 +59,12 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
   bool failed = false;
   std::size_t done = 0;
   for (std::size_t v = 0; v < sweep.results.size(); ++v) {
-    const std::string where = variation.key + '=' + variation.values[v] + ", ";
-    failed = ReportFailures(sweep.results[v], where) || failed;
+    const std::string prefix = variation.key + '=' + variation.values[v] + ", ";
+    failed = ReportFailures(sweep.results[v], prefix) || failed;
     done += sweep.results[v].done.size();
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
-  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs, kResume);
+  if (sweep.stopped()) ReportStopped(done, values * sweep.results.front().runs, kResume);
   const std::string note = folder.Write(sweep, config, StopRequested);
   if (!quiet) {
     const std::filesystem::path written = sweep.stopped() ? internal::PartialOf(path) : path;
@@ -71,7 +72,7 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
     const std::string reprojection = "figures/reprojection.svg";
     if (std::filesystem::exists(written / reprojection)) names.insert(names.begin(), reprojection);
-    TellWritten(written, SweepTable(sweep), names);
+    PrintWritten(written, SweepTable(sweep), names);
   }
   if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
   return CodeOf(sweep.stopped(), failed);

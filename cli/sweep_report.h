@@ -9,12 +9,11 @@
 #include "alidade/config/config.h"
 #include "alidade/sweep/sweep.h"
 
-/// How commands that make the folder of a sweep end.
+/// Completion of the commands that write the folder of a sweep.
 namespace alidade::cli {
 
-/// Writes a sweep into its folder, which is to be `path`, and says how its runs went: those that
-/// failed, the tables unless `quiet`, where it lies. Gives the exit code. Errors: those of
-/// SweepFolder::Write.
+/// Writes a sweep into its folder, which finally is `path`. Prints the reasons of failed runs and,
+/// unless `quiet`, the tables and the folder. Returns the exit code. Errors: as SweepFolder::Write.
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
                      const SweepResult& result, const Config& config, bool quiet);
 ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,

@@ -6,10 +6,10 @@
 
 namespace alidade::cli {
 
-/// A validator of CLI11: it is the name of a video that can be written.
+/// Validator of CLI11: accepts the name of an AVI file.
 inline std::string IsAvi(const std::string& name) {
   if (std::filesystem::path(name).extension() == ".avi") return {};
-  return "'" + name + "' is not a video that can be written; expected a name like video.avi";
+  return "'" + name + "' is not the name of an AVI file; expected a name such as video.avi";
 }
 
 }  // namespace alidade::cli

@@ -237,7 +237,7 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
   const std::string start = Read("data/truth.tum");
   const Outcome over = Bundle("data/tracks.csv", "data/truth.tum", {"-o", "data", "--force"});
   EXPECT_EQ(over.code, 73);
-  EXPECT_TRUE(Contains(over.err, "data: holds the input 'data/tracks.csv'")) << over.err;
+  EXPECT_TRUE(Contains(over.err, "data: contains the input 'data/tracks.csv'")) << over.err;
   EXPECT_EQ(Read("data/truth.tum"), start);
   const std::string times = Read("data/timestamps.csv");
   Write("data/timestamps.csv", "");
@@ -301,7 +301,7 @@ TEST_F(BundleCli, CountsWhatIsLeftOut) {
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out,
-                       "2 observations; 1 left out, not defined or not finite at the "
+                       "2 observations; 1 left out, undefined or not finite at the "
                        "start: in the camera's plane"))
       << made.out;
   const Config json = Json("out/bundle.json");

@@ -89,7 +89,7 @@ TEST_F(CheckProgram, TakesParametersFromTheConfigOfARun) {
   const Outcome none = Call({"check", "scale_2d", "--config", "table.yaml"});
   EXPECT_EQ(none.code, 78);
   EXPECT_TRUE(Contains(none.err, "error: table.yaml")) << none.err;
-  EXPECT_TRUE(Contains(none.err, "has a model of the plugin; expected one with model: "))
+  EXPECT_TRUE(Contains(none.err, "has a model of the plugin; expected an entry with model: "))
       << none.err;
   EXPECT_EQ(Call(With(kStereo, {"--config", "config.yaml"})).code, 2);
 }
@@ -99,7 +99,8 @@ TEST_F(CheckProgram, SetsParametersOfSeveralModelsByTheirNames) {
   if (!fs::exists(several)) GTEST_SKIP() << "built for test_plugins";
   const Outcome plain = Call({"check", several, "--set", "gain=1"});
   EXPECT_EQ(plain.code, 78);
-  EXPECT_TRUE(Contains(plain.err, "error: --set gain: of which model?; expected MODEL.key=value"))
+  EXPECT_TRUE(
+      Contains(plain.err, "error: --set gain: the model is missing; expected MODEL.key=value"))
       << plain.err;
   const Outcome one = Call({"check", several, "matrix_sensor", "--set", "gain=1"});
   EXPECT_EQ(one.code, 0) << one.out << one.err;

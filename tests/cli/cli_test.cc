@@ -29,12 +29,13 @@ TEST_F(Cli, HelpNamesEveryCommandAndExitsWithZero) {
 TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
   const Outcome mistyped = Call({"rnu"});
   EXPECT_EQ(mistyped.code, 2);
-  EXPECT_EQ(mistyped.err, "error: no command 'rnu'; did you mean 'run'?\nsee `alidade --help`\n");
+  EXPECT_EQ(mistyped.err,
+            "error: unknown command 'rnu'; did you mean 'run'?\nsee `alidade --help`\n");
   EXPECT_EQ(mistyped.out, "");
 
-  EXPECT_EQ(Call({}).err, "error: no command\nsee `alidade --help`\n");
+  EXPECT_EQ(Call({}).err, "error: missing command\nsee `alidade --help`\n");
   EXPECT_EQ(Call({"run", "config.yaml", "--forec"}).err,
-            "error: no option '--forec'; did you mean '--force'?\nsee `alidade run --help`\n");
+            "error: unknown option '--forec'; did you mean '--force'?\nsee `alidade run --help`\n");
   EXPECT_EQ(Call({"plugins", "info"}).err,
             "error: NAME is required\nsee `alidade plugins info --help`\n");
   for (const Arguments& bad : {Arguments{},

@@ -466,7 +466,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
   fails({"compare"}, 2, "CONFIG | DIR is required");
   fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is not a folder");
-  fails({"compare", "a", "--runs", "3"}, 2, "a finished run is not run again");
+  fails({"compare", "a", "--runs", "3"}, 2, "not supported for finished runs");
   fails({"compare", "a", "--reference", "bath"}, 2, "no estimator 'bath'; expected one of ekf");
   fails({"compare", "config.yaml", "--reference", "turth"}, 2, "did you mean 'truth'");
   fails({"compare", "a", "./a/"}, 2, "./a/: is given twice; expected folders of different runs");
@@ -486,14 +486,14 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     fails({"compare", "config.yaml", "--budget", budget}, 2,
           "--budget: '" + std::string(budget) + "' is not a number from 1e-09 to 1e+09");
   }
-  fails({"compare", "a", "--budget", "3"}, 2, "a finished run is not run again");
+  fails({"compare", "a", "--budget", "3"}, 2, "not supported for finished runs");
   fails({"compare", "config.yaml", "--runs", "2", "--seed", "7", "--first-seed", "20"}, 2,
         "--first-seed");
   fails({"compare", "a", "--json", "--markdown"}, 2, "--json");
   fails({"compare", "a", "--latex", "--json"}, 2, "--json");
   fails({"compare", "a", "--latex", "--markdown"}, 2, "--markdown");
-  fails({"compare", "a", "-o", "a", "--force"}, 73, "a: is the input 'a'; expected another place");
-  fails({"compare", "a", "-o", ".", "--force"}, 73, ".: holds the input 'a'");
+  fails({"compare", "a", "-o", "a", "--force"}, 73, "a: is the input 'a'; expected another folder");
+  fails({"compare", "a", "-o", ".", "--force"}, 73, ".: contains the input 'a'");
   EXPECT_TRUE(Exists("a/ekf/estimates.csv"));
   fails({"compare", "config.yaml", "--runs", "2", "--figures"}, 2, "--figures");
   const std::string whole = Read("a/ekf/estimates.csv");

@@ -48,7 +48,7 @@ TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
       EXPECT_EQ(outcome.err, "error: " + text + '\n');
     }
   };
-  const std::string holds = " is the folder that holds the runs; expected ";
+  const std::string holds = " is the folder that contains all runs; expected ";
   for (const std::string folder : {"runs", "./runs/", "runs/a/.."}) {
     expect({"-o", folder, "--force"}, 73, folder + ':' + holds + "runs/NAME");
   }
@@ -229,7 +229,8 @@ TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {
     fs::create_directory(folder_ / "gone");
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 73) << outcome.err;
-    EXPECT_TRUE(Contains(outcome.err, ": the current folder is gone; change to one that exists"))
+    EXPECT_TRUE(
+        Contains(outcome.err, ": the current folder no longer exists; change to an existing"))
         << outcome.err;
   };
   expect({"run", config});

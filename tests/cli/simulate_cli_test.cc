@@ -105,7 +105,7 @@ TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   ASSERT_EQ(Call({"simulate", "again.yaml", "-o", "again"}).code, 0);
   const Outcome included = Call({"simulate", "lens.yaml", "-o", "data", "--force"});
   EXPECT_EQ(included.code, 73);
-  EXPECT_TRUE(Contains(included.err, "data: holds the input '")) << included.err;
+  EXPECT_TRUE(Contains(included.err, "data: contains the input '")) << included.err;
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   EXPECT_EQ(Call({"simulate", "out/config.resolved.yaml", "-o", "out", "--force"}).code, 73);
 }

@@ -8,7 +8,7 @@
 
 namespace alidade::ceres_batch {
 
-/// d = z (-) h and, where j is not null, dd/dh (row-major) in the tangent at h.
+/// Computes d = z (-) h and, if j is not null, dd/dh (row-major) in the tangent at h.
 template <class G>
 void Difference(const double* z, const double* h, double* d, double* j) {
   using Jet = alidade::Jet<double, G::kTangent>;

@@ -9,7 +9,7 @@
 
 namespace alidade::ceres_batch {
 
-/// A RobustLoss as Ceres takes it, on s = d^2, with half of it in the cost:
+/// RobustLoss as a loss function of Ceres, on s = d^2. Ceres counts half of it in the cost:
 ///
 ///   rho_c(s) = 2 rho(d),   rho_c'(s) = w(d),   rho_c''(s) = w'(d) / 2 d
 class Loss : public ceres::LossFunction {

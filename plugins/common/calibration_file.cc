@@ -19,9 +19,9 @@ namespace {
 class CalibrationFile {
  public:
   explicit CalibrationFile(const std::filesystem::path& file)
-      : from_(Config::FromText(PlainYaml(file), file.string())),
-        to_(Config::FromText("calibration: {}", file.string())) {
-    const Node root = from_.root();
+      : input_(Config::FromText(PlainYaml(file), file.string())),
+        output_(Config::FromText("calibration: {}", file.string())) {
+    const Node root = input_.root();
     root.Declare("sigma_px");
     if (root.Find("camera_matrix")) {
       ReadOpenCv(root);
@@ -30,14 +30,14 @@ class CalibrationFile {
     } else if (root.Find("intrinsics")) {
       ReadKalibr(root, "distortion_coefficients");
     } else {
-      ReadOwn(root);
+      ReadAlidade(root);
     }
   }
 
-  Config calibration() && { return std::move(to_); }
+  Config calibration() && { return std::move(output_); }
 
  private:
-  void ReadOwn(const Node& root) {
+  void ReadAlidade(const Node& root) {
     if (const auto camera = root.Find("camera")) {
       for (const auto& [key, value] : camera->Entries()) Copy(value, "camera." + key);
       if (!camera->Find("model")) Set("camera.model", "pinhole", camera->place());
@@ -47,14 +47,14 @@ class CalibrationFile {
     root.RejectUnread();
   }
 
-  /// OpenCV writes a directive and tags that are not of YAML; blanks in their place.
+  /// Returns the text with blanks instead of OpenCV's directive and tags, which are not YAML.
   static std::string PlainYaml(const std::filesystem::path& file) {
     std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
       throw Error(code, ErrorLine({file.string()}, {}, std::strerror(error)));
     });
-    for (const std::string_view odd : {"%YAML:1.0", "!!opencv-matrix"}) {
-      for (std::size_t at = 0; (at = text.find(odd, at)) != text.npos;) {
-        text.replace(at, odd.size(), odd.size(), ' ');
+    for (const std::string_view directive : {"%YAML:1.0", "!!opencv-matrix"}) {
+      for (std::size_t offset = 0; (offset = text.find(directive, offset)) != text.npos;) {
+        text.replace(offset, directive.size(), directive.size(), ' ');
       }
     }
     return text;
@@ -98,25 +98,25 @@ class CalibrationFile {
     for (std::size_t i = 0; i < 4; ++i) SetNumber(kKeys[i], fx_fy_cx_cy[i], place);
   }
 
-  /// k1 k2 p1 p2 [k3], or k1 to k4 of an equidistant camera; more of them must be 0.
+  /// Sets k1 k2 p1 p2 [k3], or k1 to k4 of an equidistant camera. Further coefficients must be 0.
   void SetDistortion(const Node& node, bool equidistant) {
     constexpr const char* kRadtan[] = {"camera.k1", "camera.k2", "camera.p1", "camera.p2",
                                        "camera.k3"};
     constexpr const char* kEquidistant[] = {"camera.k1", "camera.k2", "camera.k3", "camera.k4"};
     std::vector<double> values = node.Numbers();
-    const std::size_t most = equidistant ? 4 : 5;
-    for (std::size_t i = most; i < values.size(); ++i) {
+    const std::size_t max_count = equidistant ? 4 : 5;
+    for (std::size_t i = max_count; i < values.size(); ++i) {
       if (values[i] != 0.0) {
-        node.Fail("a coefficient beyond the first " + std::to_string(most) + " that is not 0",
+        node.Fail("a coefficient beyond the first " + std::to_string(max_count) + " that is not 0",
                   equidistant ? "k1, k2, k3, k4" : "k1, k2, p1, p2, k3");
       }
     }
-    values.resize(most, 0.0);
+    values.resize(max_count, 0.0);
     if (std::ranges::all_of(values, [](double value) { return value == 0.0; }) && !equidistant) {
       return Set("camera.model", "pinhole", node.place());
     }
     Set("camera.model", equidistant ? "equidistant" : "radtan", node.place());
-    for (std::size_t i = 0; i < most; ++i) {
+    for (std::size_t i = 0; i < max_count; ++i) {
       SetNumber(equidistant ? kEquidistant[i] : kRadtan[i], values[i], node.place());
     }
   }
@@ -151,10 +151,10 @@ class CalibrationFile {
 
   void Copy(const Node& value, const std::string& key) { Set(key, value.ToYaml(), value.place()); }
   void Set(const std::string& key, const std::string& yaml, const Place& place) {
-    to_.Set("calibration." + key, yaml, ToString(place));
+    output_.Set("calibration." + key, yaml, ToString(place));
   }
 
-  Config from_, to_;
+  Config input_, output_;
 };
 
 }  // namespace
@@ -165,7 +165,7 @@ Config ReadCalibrationFile(const std::filesystem::path& file) {
   } catch (const Error& error) {
     if (error.code() != ExitCode::kBadConfig) throw;
     throw Error(ExitCode::kBadData,
-                std::string(error.what()) + "; 'source.calibration: ignore' does without it");
+                std::string(error.what()) + "; 'source.calibration: ignore' skips the calibration");
   }
 }
 

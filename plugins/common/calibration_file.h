@@ -7,28 +7,28 @@
 
 namespace alidade {
 
-/// The `calibration.yaml` next to tracks or images, under the keys by which models ask. It has one
-/// of these forms:
+/// Reads the `calibration.yaml` next to tracks or images, and converts it to the keys that models
+/// use. The file has one of these forms:
 ///
-///   written as                                        key
+///   in the file                                       key
 ///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it
 ///
 ///   image: {width, height}                            camera.width, camera.height
-///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx and so on, of a pinhole
+///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx, ..., of a pinhole camera
 ///   baseline_m                                        camera.baseline_m, of a rectified pair
 ///   vehicle_from_cam: {position_m, quaternion}        vehicle_from_cam.position, .orientation
 ///
 ///   camera_matrix, distortion_coefficients: {data}, image_width, image_height, [distortion_model:
-///   plumb_bob, rational_polynomial or equidistant]           of OpenCV and ROS
+///   plumb_bob, rational_polynomial or equidistant]           OpenCV and ROS
 ///
 ///   cam0: {camera_model: pinhole, intrinsics, distortion_model: radtan or equidistant,
-///   distortion_coeffs, resolution}                           of Kalibr
+///   distortion_coeffs, resolution}                           Kalibr
 ///
 ///   camera_model: pinhole, intrinsics, distortion_model: radial-tangential or equidistant,
-///   distortion_coefficients, resolution                      of a sensor of EuRoC
+///   distortion_coefficients, resolution                      sensor of EuRoC
 ///
-/// Of the last three what is not of the camera itself is left out, and so is `sigma_px`, for
-/// `alidade bundle`.
+/// The last three forms omit everything that does not belong to the camera itself. All forms omit
+/// `sigma_px`, which is for `alidade bundle`.
 ///
 /// Errors       kBadData with file, line and column; kInputMissing.
 Config ReadCalibrationFile(const std::filesystem::path& file);

@@ -22,12 +22,12 @@ bool TimestampRows::Next(std::int64_t& frame, Timestamp& timestamp) {
   rows_.ExpectColumns(2, "frame,t_s");
   frame = rows_.Index(0, "frame");
   timestamp = rows_.Time(1, "t_s");
-  const std::string before = " line " + std::to_string(line_);
+  const std::string previous = " line " + std::to_string(line_);
   if (line_ > 0 && frame <= frame_) {
-    rows_.FailCell(0, "frame", "is not after that of" + before, "frames in order, each once");
+    rows_.FailCell(0, "frame", "is not larger than in" + previous, "increasing frames");
   }
   if (line_ > 0 && timestamp <= timestamp_) {
-    rows_.FailCell(1, "t_s", "is not after that of" + before, "times that increase");
+    rows_.FailCell(1, "t_s", "is not later than in" + previous, "increasing times");
   }
   frame_ = frame;
   timestamp_ = timestamp;
@@ -72,8 +72,9 @@ void OdometryRows::Advance() {
   rows_.ExpectColumns(columns_, "as in the header");
   const std::int64_t frame = rows_.Index(place_[0], kNames[0]);
   if (!first && frame <= next_frame_) {
-    rows_.FailCell(place_[0], kNames[0], "is not after that of line " + std::to_string(line_before),
-                   "frames in order, each once");
+    rows_.FailCell(place_[0], kNames[0],
+                   "is not larger than in line " + std::to_string(line_before),
+                   "increasing frames");
   }
   next_frame_ = frame;
   for (std::size_t k = 0; k < next_.size(); ++k) {
@@ -83,12 +84,12 @@ void OdometryRows::Advance() {
 
 Pose Pose::In(const Pose& c) const {
   Pose pose{};
-  const double away[3] = {position[0] - c.position[0], position[1] - c.position[1],
-                          position[2] - c.position[2]};
-  UnitQuaternion::RotateBack(c.orientation.data(), away, pose.position.data());
-  const double back[4] = {c.orientation[0], -c.orientation[1], -c.orientation[2],
-                          -c.orientation[3]};
-  UnitQuaternion::Multiply(back, orientation.data(), pose.orientation.data());
+  const double offset[3] = {position[0] - c.position[0], position[1] - c.position[1],
+                            position[2] - c.position[2]};
+  UnitQuaternion::RotateBack(c.orientation.data(), offset, pose.position.data());
+  const double inverse[4] = {c.orientation[0], -c.orientation[1], -c.orientation[2],
+                             -c.orientation[3]};
+  UnitQuaternion::Multiply(inverse, orientation.data(), pose.orientation.data());
   return pose;
 }
 
@@ -98,17 +99,17 @@ TumRows::TumRows(const std::filesystem::path& path, const Place& place, const st
 }
 
 std::optional<Pose> TumRows::At(Timestamp timestamp, Timestamp tolerance) {
-  // Two timestamps may be further apart than one can be.
-  const auto off = [timestamp](Timestamp other) {
-    const auto [least, most] = std::minmax(timestamp, other);
-    return static_cast<std::uint64_t>(most) - static_cast<std::uint64_t>(least);
+  // The difference of two timestamps can exceed the range of a timestamp.
+  const auto distance = [timestamp](Timestamp candidate) {
+    const auto [earlier, later] = std::minmax(timestamp, candidate);
+    return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
   };
-  while (has_next_ && (!nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
+  while (has_next_ && (!nearest_ || distance(timestamp_) < distance(nearest_timestamp_))) {
     nearest_ = pose_;
     nearest_timestamp_ = timestamp_;
     Advance();
   }
-  return nearest_ && off(nearest_timestamp_) <= static_cast<std::uint64_t>(tolerance)
+  return nearest_ && distance(nearest_timestamp_) <= static_cast<std::uint64_t>(tolerance)
              ? nearest_
              : std::nullopt;
 }
@@ -116,14 +117,14 @@ std::optional<Pose> TumRows::At(Timestamp timestamp, Timestamp tolerance) {
 void TumRows::Advance() {
   const int line_before = rows_.line();
   const bool first = !has_next_;
-  const Timestamp before = timestamp_;
+  const Timestamp previous = timestamp_;
   has_next_ = rows_.Next();
   if (!has_next_) return;
   rows_.ExpectColumns(8, "t x y z qx qy qz qw");
   timestamp_ = rows_.Time(0, "t");
-  if (!first && timestamp_ <= before) {
-    rows_.FailCell(0, "t", "is not after that of line " + std::to_string(line_before),
-                   "times that increase");
+  if (!first && timestamp_ <= previous) {
+    rows_.FailCell(0, "t", "is not later than in line " + std::to_string(line_before),
+                   "increasing times");
   }
   const std::array<double, 7> values = PoseNumbers(rows_, kTumPose);
   pose_ = {{values[0], values[1], values[2]}, {values[6], values[3], values[4], values[5]}};

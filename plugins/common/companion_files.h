@@ -9,17 +9,17 @@
 
 #include "alidade/io/number_rows.h"
 
-/// The files next to a file of tracks, read along with it.
+/// Files next to a file of tracks, which are read together with it.
 namespace alidade {
 
-/// `frame,t_s` of each frame, both increasing; a header may stand first.
+/// Rows `frame,t_s`, one for each frame, with both increasing. A header line is optional.
 class TimestampRows {
  public:
   TimestampRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
   const std::string& name() const { return rows_.name(); }
   int line() const { return rows_.line(); }
-  /// The next frame; false at the end.
+  /// Reads the next frame. Returns false at the end.
   bool Next(std::int64_t& frame, Timestamp& timestamp);
 
  private:
@@ -29,16 +29,17 @@ class TimestampRows {
   int line_ = 0;
 };
 
-using OdometryValues = std::array<double, 6>;  ///< vx vy vz, m/s, wx wy wz, rad/s
+using OdometryValues = std::array<double, 6>;  ///< vx vy vz in m/s, wx wy wz in rad/s
 
-/// Rows with a frame and six velocities, under a header that names them, in any order of columns.
+/// Rows with a frame and six velocities. A header names the columns, which have any order.
 class OdometryRows {
  public:
   OdometryRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// The row of `frame`; none where it has none. Frames are asked for in order.
+  /// Returns the row of `frame`, or nullopt if it has no row. `frame` may not decrease between
+  /// calls.
   std::optional<OdometryValues> At(std::int64_t frame);
-  /// The first row after the one of the frame that was asked for last.
+  /// Returns the first row after the frame of the last call of At.
   std::optional<OdometryValues> Following() const;
 
  private:
@@ -58,23 +59,23 @@ class OdometryRows {
   OdometryValues values_{}, next_{};
 };
 
-/// Where a camera is: world_from_cam.
+/// Pose of a camera, world_from_cam.
 struct Pose {
   std::array<double, 3> position;
   std::array<double, 4> orientation;  ///< w x y z
 
-  /// The same in the frame of camera `c`: c_from_cam = world_from_c^-1 world_from_cam.
+  /// Returns the pose in the frame of camera `c`: c_from_cam = world_from_c^-1 world_from_cam.
   Pose In(const Pose& c) const;
 };
 
-/// A trajectory in the form of TUM: `t x y z qx qy qz qw`, times increasing. Quaternions are
-/// refused where they are not of unit length to 1e-3; the run normalises the others.
+/// Trajectory in TUM format: `t x y z qx qy qz qw`, with increasing times. A quaternion whose
+/// length differs from 1 by more than 1e-3 is rejected; the run normalises the others.
 class TumRows {
  public:
   TumRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// The pose nearest to `timestamp`, of two as near the earlier, where it is within `tolerance`.
-  /// Timestamps are asked for in order.
+  /// Returns the pose nearest to `timestamp` if it is within `tolerance`. If two are equally near,
+  /// it returns the earlier one. `timestamp` may not decrease between calls.
   std::optional<Pose> At(Timestamp timestamp, Timestamp tolerance);
 
  private:
@@ -82,9 +83,9 @@ class TumRows {
 
   NumberRows rows_;
   bool has_next_ = false;
-  Timestamp timestamp_ = 0;  ///< of the row that was read last
+  Timestamp timestamp_ = 0;  ///< of the last row
   Pose pose_{};
-  Timestamp nearest_timestamp_ = 0;  ///< of the row before it
+  Timestamp nearest_timestamp_ = 0;  ///< of the row before the last one
   std::optional<Pose> nearest_;
 };
 

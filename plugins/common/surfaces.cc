@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Uniform in [0, 1), the same for the same numbers.
+/// Returns a value that is uniform in [0, 1), and the same for the same arguments.
 double LatticeValue(std::uint64_t texture, std::uint64_t octave, std::int64_t x, std::int64_t y) {
   std::uint64_t bits = texture * 0x9e3779b97f4a7c15U + octave;
   for (const std::int64_t number : {x, y}) {
@@ -23,9 +23,9 @@ double LatticeValue(std::uint64_t texture, std::uint64_t octave, std::int64_t x,
   return 0x1p-53 * static_cast<double>((bits ^ (bits >> 31)) >> 11);
 }
 
-/// Brightness in [0, 1] of a texture at (x, y), m: a sum of lattice noises [Perlin1985], each of
-/// half the wavelength and 0.8 of the amplitude of the one before. Those that a sample `sample_m`
-/// wide cannot tell are faded out, so that nothing aliases.
+/// Returns the brightness in [0, 1] of a texture at (x, y), m: a sum of lattice noises
+/// [Perlin1985]. Each has half the wavelength and 0.8 of the amplitude of the previous one. Noises
+/// that a sample of width `sample_m` cannot resolve are faded out, which avoids aliasing.
 double Brightness(const Rectangle& rectangle, double x, double y, double sample_m) {
   constexpr double kFalloff = 0.8, kContrast = 0.9;
   double sum = 0.0, amplitude = 1.0, squares = 0.0, wavelength = rectangle.grain_m;
@@ -37,11 +37,11 @@ double Brightness(const Rectangle& rectangle, double x, double y, double sample_
     const auto smooth = [](double t) { return t * t * t * (t * (6.0 * t - 15.0) + 10.0); };
     const double a = smooth(u - u0), b = smooth(v - v0);
     const auto i = static_cast<std::int64_t>(u0), j = static_cast<std::int64_t>(v0);
-    const auto at = [&](std::int64_t k, std::int64_t l) {
+    const auto value_at = [&](std::int64_t k, std::int64_t l) {
       return LatticeValue(rectangle.texture, octave, i + k, j + l);
     };
-    const double value = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(1, 0)) +
-                         b * ((1.0 - a) * at(0, 1) + a * at(1, 1));
+    const double value = (1.0 - b) * ((1.0 - a) * value_at(0, 0) + a * value_at(1, 0)) +
+                         b * ((1.0 - a) * value_at(0, 1) + a * value_at(1, 1));
     sum += share * amplitude * (value - 0.5);
     squares += amplitude * amplitude;
     amplitude *= kFalloff;
@@ -51,13 +51,13 @@ double Brightness(const Rectangle& rectangle, double x, double y, double sample_
   return std::clamp(0.5 + kContrast * sum / std::sqrt(squares), 0.0, 1.0);
 }
 
-/// What one ray meets.
-struct Met {
+/// First surface on a ray.
+struct Hit {
   int surface = -1;  ///< -1: none
   double brightness = 0.0;
 };
 
-/// A camera at `position`, `orientation` (world_from_cam, w x y z), before surfaces.
+/// View of surfaces from a camera at `position`, `orientation` (world_from_cam, w x y z).
 class SurfaceView {
  public:
   SurfaceView(const std::vector<Rectangle>& surfaces, const Camera& camera, const double* position,
@@ -66,58 +66,59 @@ class SurfaceView {
         camera_(camera),
         eye_(position[0], position[1], position[2]),
         orientation_{orientation[0], orientation[1], orientation[2], orientation[3]} {
-    for (const Rectangle& one : surfaces) {
-      const Eigen::Vector3d normal = one.right.cross(one.down).normalized();
-      planes_.push_back({normal, one.right / one.right.squaredNorm(),
-                         one.down / one.down.squaredNorm(), normal.dot(one.corner - eye_),
-                         one.right.norm(), one.down.norm()});
+    for (const Rectangle& surface : surfaces) {
+      const Eigen::Vector3d normal = surface.right.cross(surface.down).normalized();
+      planes_.push_back({normal, surface.right / surface.right.squaredNorm(),
+                         surface.down / surface.down.squaredNorm(),
+                         normal.dot(surface.corner - eye_), surface.right.norm(),
+                         surface.down.norm()});
     }
   }
 
-  /// The nearest surface on the ray through pixel (u, v).
-  Met Look(double u, double v) const {
+  /// Returns the nearest surface on the ray through pixel (u, v).
+  Hit Trace(double u, double v) const {
     const double z[2] = {u, v};
     double h[3];
-    Met met;
-    if (!camera_.Unproject(z, h)) return met;
+    Hit hit;
+    if (!camera_.Unproject(z, h)) return hit;
     Eigen::Vector3d ray;
     UnitQuaternion::Rotate(orientation_.data(), h, ray.data());
     double nearest = std::numeric_limits<double>::infinity(), right = 0.0, down = 0.0;
     for (std::size_t i = 0; i < planes_.size(); ++i) {
       const Plane& plane = planes_[i];
-      const double along = plane.distance / plane.normal.dot(ray);
-      if (!(along > 0.0) || !(along < nearest)) continue;
-      const Eigen::Vector3d at = eye_ + along * ray - surfaces_[i].corner;
-      const double a = plane.right.dot(at), b = plane.down.dot(at);
+      const double range = plane.distance / plane.normal.dot(ray);
+      if (!(range > 0.0) || !(range < nearest)) continue;
+      const Eigen::Vector3d point = eye_ + range * ray - surfaces_[i].corner;
+      const double a = plane.right.dot(point), b = plane.down.dot(point);
       if (a < 0.0 || a > 1.0 || b < 0.0 || b > 1.0) continue;
-      nearest = along;
+      nearest = range;
       right = a * plane.width;
       down = b * plane.height;
-      met.surface = static_cast<int>(i);
+      hit.surface = static_cast<int>(i);
     }
-    if (met.surface < 0) return met;
-    const auto index = static_cast<std::size_t>(met.surface);
+    if (hit.surface < 0) return hit;
+    const auto index = static_cast<std::size_t>(hit.surface);
     const double length = ray.norm();
     const double cosine = std::max(std::abs(planes_[index].normal.dot(ray)) / length, 0.05);
-    met.brightness =
+    hit.brightness =
         Brightness(surfaces_[index], right, down, nearest * length / (camera_.fx * cosine));
-    return met;
+    return hit;
   }
 
-  /// Of the whole pixel, which an edge passes: the mean of 4 x 4 rays.
-  double Mean(int u, int v) const {
+  /// Returns the mean brightness of 4 x 4 rays through a pixel, for pixels on an edge.
+  double MeanBrightness(int u, int v) const {
     constexpr double kOffsets[] = {-0.375, -0.125, 0.125, 0.375};
     double sum = 0.0;
     for (const double du : kOffsets) {
-      for (const double dv : kOffsets) sum += Look(u + du, v + dv).brightness;
+      for (const double dv : kOffsets) sum += Trace(u + du, v + dv).brightness;
     }
     return sum / 16.0;
   }
 
  private:
   struct Plane {
-    Eigen::Vector3d normal, right, down;  ///< unit normal; edges by their squared length
-    double distance, width, height;       ///< of the camera, m, signed; m
+    Eigen::Vector3d normal, right, down;  ///< unit normal; edges divided by their squared length
+    double distance, width, height;       ///< signed distance of the camera, m; sides, m
   };
   const std::vector<Rectangle>& surfaces_;
   const Camera& camera_;
@@ -132,23 +133,23 @@ GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
                  const double* position, const double* orientation, double noise_grey,
                  Random& noise) {
   const SurfaceView view(surfaces, camera, position, orientation);
-  std::vector<Met> all;
+  std::vector<Hit> hits;
   for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) all.push_back(view.Look(u, v));
+    for (int u = 0; u < camera.width; ++u) hits.push_back(view.Trace(u, v));
   }
-  const auto at = [&](int u, int v) {
+  const auto hit_at = [&](int u, int v) {
     const auto column = static_cast<std::size_t>(std::clamp(u, 0, camera.width - 1));
     const auto row = static_cast<std::size_t>(std::clamp(v, 0, camera.height - 1));
-    return all[row * static_cast<std::size_t>(camera.width) + column];
+    return hits[row * static_cast<std::size_t>(camera.width) + column];
   };
   GreyImage image{camera.width, camera.height, {}};
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
-      const Met own = at(u, v);
-      const bool edge = at(u - 1, v).surface != own.surface ||
-                        at(u + 1, v).surface != own.surface ||
-                        at(u, v - 1).surface != own.surface || at(u, v + 1).surface != own.surface;
-      double grey = 255.0 * (edge ? view.Mean(u, v) : own.brightness);
+      const Hit hit = hit_at(u, v);
+      const bool edge =
+          hit_at(u - 1, v).surface != hit.surface || hit_at(u + 1, v).surface != hit.surface ||
+          hit_at(u, v - 1).surface != hit.surface || hit_at(u, v + 1).surface != hit.surface;
+      double grey = 255.0 * (edge ? view.MeanBrightness(u, v) : hit.brightness);
       if (noise_grey > 0.0) grey += noise_grey * noise.Normal();
       image.pixels.push_back(static_cast<std::uint8_t>(std::clamp(grey + 0.5, 0.0, 255.0)));
     }

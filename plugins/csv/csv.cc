@@ -41,16 +41,16 @@ class CsvSource : public Source {
     frame.timestamp = timestamp_;
     frame.truth.resize(layout_.truths.size());
     for (std::vector<double>& truth : frame.truth) truth.clear();
-    std::size_t used = 0;
+    std::size_t count = 0;
     do {
-      TakeRow(frame, used);
+      AppendRow(frame, count);
     } while (layout_.time_repeats && ReadRow() && timestamp_ == frame.timestamp);
-    frame.measurements.resize(used);
+    frame.measurements.resize(count);
     return true;
   }
 
  private:
-  /// The next row, whole, with its time in timestamp_; false at the end.
+  /// Reads the next row and its time. Returns false at the end.
   bool ReadRow() {
     has_row_ = NextRow();
     if (!has_row_) return false;
@@ -60,11 +60,11 @@ class CsvSource : public Source {
     return true;
   }
 
-  /// Puts the row into the frame, whose first `used` measurements are there.
-  void TakeRow(SourceFrame& frame, std::size_t& used) {
+  /// Appends the row to the frame, whose first `count` measurements are already filled.
+  void AppendRow(SourceFrame& frame, std::size_t& count) {
     for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
-      if (used == frame.measurements.size()) frame.measurements.emplace_back();
-      Measurement& measurement = frame.measurements[used];
+      if (count == frame.measurements.size()) frame.measurements.emplace_back();
+      Measurement& measurement = frame.measurements[count];
       if (!ReadField(layout_.streams[i], measurement.values)) continue;
       if (!ReadKnown(layout_.streams[i], measurement.known)) continue;
       if (layout_.streams[i].goes_blind && rows_ >= first_blind_row_) continue;
@@ -72,7 +72,7 @@ class CsvSource : public Source {
       measurement.stream = static_cast<int>(i);
       measurement.landmark = -1;
       measurement.covariance.clear();
-      ++used;
+      ++count;
     }
     for (std::size_t i = 0; i < frame.truth.size(); ++i) {
       if (frame.truth[i].empty()) ReadField(layout_.truths[i], frame.truth[i]);
@@ -93,12 +93,12 @@ class CsvSource : public Source {
     return path == "-" ? path : folder / path;
   }
 
-  /// The next line that is neither comment nor blank. A blank line is a row where it is the missing
-  /// value of a single column, and a row of too few columns where rows count the time.
+  /// Reads the next line that is neither a comment nor blank. A blank line is a row if the table
+  /// has a single column, because its cell may be missing, or if rows determine the time.
   bool NextRow() {
     while (reader_.Next(line_)) {
       if (line_.starts_with('#')) {
-        if (names_.empty()) calibration_.Note(line_, reader_.name(), reader_.number());
+        if (names_.empty()) calibration_.Record(line_, reader_.name(), reader_.number());
         continue;
       }
       const bool blank = line_.find_first_not_of(" \t") == std::string_view::npos;
@@ -108,14 +108,14 @@ class CsvSource : public Source {
     return false;
   }
 
-  /// Cuts line_ into cells_, each with its untrimmed start.
+  /// Splits line_ into cells_, which are not trimmed.
   void Split() {
     cells_.clear();
-    for (std::string_view rest = line_;;) {
-      const std::size_t end = std::min(rest.find(layout_.separator), rest.size());
-      cells_.push_back(rest.substr(0, end));
-      if (end == rest.size()) return;
-      rest.remove_prefix(end + 1);
+    for (std::string_view remaining = line_;;) {
+      const std::size_t end = std::min(remaining.find(layout_.separator), remaining.size());
+      cells_.push_back(remaining.substr(0, end));
+      if (end == remaining.size()) return;
+      remaining.remove_prefix(end + 1);
     }
   }
 
@@ -125,8 +125,8 @@ class CsvSource : public Source {
     header_line_ = last_line_ = reader_.number();
     constexpr std::string_view kGzip = "\x1F\x8B";
     if (line_.starts_with(kGzip) || line_.find('\0') != line_.npos) {
-      Fail(Place{reader_.name(), header_line_, 1}, {}, "bytes that are no text",
-           "a table; a compressed one by a pipe: zcat FILE | alidade run CONFIG --set "
+      Fail(Place{reader_.name(), header_line_, 1}, {}, "not a text file",
+           "a table; for a compressed one use a pipe: zcat FILE | alidade run CONFIG --set "
            "source.path=-");
     }
     Split();
@@ -139,8 +139,8 @@ class CsvSource : public Source {
   void CountRows() {
     if (any_order_) {
       layout_.blind_after_node->Fail(
-          "counts rows as the file has them, not as 'out_of_sequence.policy' puts them",
-          "'out_of_sequence.policy: reject', which asks for a file in the order of time");
+          "counts the rows in the order of the file, but 'out_of_sequence.policy' reorders them",
+          "'out_of_sequence.policy: reject', for a file in the order of time");
     }
     if (!reader_.is_regular()) {
       layout_.blind_after_node->Fail(
@@ -161,10 +161,10 @@ class CsvSource : public Source {
       return std::to_string(n) + (n == 1 ? " column" : " columns");
     };
     if (cells_.size() == names_.size()) return;
-    const bool few = cells_.size() < names_.size();
-    const std::size_t column = few ? line_.size() : Column(cells_[names_.size()]) - 1;
+    const bool is_too_short = cells_.size() < names_.size();
+    const std::size_t column = is_too_short ? line_.size() : Column(cells_[names_.size()]) - 1;
     Fail(Place{reader_.name(), reader_.number(), static_cast<int>(column) + 1}, {},
-         (few && reader_.is_unterminated() ? "the last line is cut short: " : "") +
+         (is_too_short && reader_.is_unterminated() ? "the last line is cut short: " : "") +
              count(cells_.size()),
          count(names_.size()) + ", as in line " + std::to_string(header_line_));
   }
@@ -173,7 +173,7 @@ class CsvSource : public Source {
     return std::find(layout_.missing.begin(), layout_.missing.end(), cell) != layout_.missing.end();
   }
 
-  /// Values of the field in this row; false, and none, where one of its cells says "missing".
+  /// Reads the values of a field. Returns false and no values if one of its cells is "missing".
   bool ReadField(const CsvField& field, std::vector<double>& values) const {
     values.clear();
     for (const CsvColumn& column : field.columns) {
@@ -190,7 +190,7 @@ class CsvSource : public Source {
     return !values.empty();
   }
 
-  /// What comes with a measurement of the field; false where one of its cells says "missing".
+  /// Reads the known values of a field. Returns false if one of its cells is "missing".
   bool ReadKnown(const CsvField& field, std::vector<double>& known) const {
     known.clear();
     for (const CsvColumn& column : field.known) {
@@ -203,12 +203,12 @@ class CsvSource : public Source {
   double ReadNumber(const CsvColumn& column, bool may_miss = true) const {
     double value = 0.0;
     const std::string_view text = cell::Trim(cells_[column.index]);
-    const char* const wrong = cell::ParseNumber(text, value);
-    if (wrong == nullptr) return value;
+    const char* const problem = cell::ParseNumber(text, value);
+    if (problem == nullptr) return value;
     std::string expected = "a finite number";
     if (may_miss && !std::isfinite(value))
       expected += ", or 'source.missing: " + cell::PrintableStart(text) + '\'';
-    FailCell(column, wrong, expected);
+    FailCell(column, problem, expected);
   }
 
   Timestamp ReadTimestamp() const {
@@ -227,10 +227,9 @@ class CsvSource : public Source {
         !(same && layout_.time_repeats)) {
       const bool late = timestamp < last_timestamp_;
       FailCell(
-          column,
-          (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
-          late ? "times that increase, or 'out_of_sequence.policy: buffer' or 'rollback'"
-               : "times that increase, 'time.repeats: true', by which rows of one time are one "
+          column, (late ? "is before line " : "is equal to line ") + std::to_string(last_line_),
+          late ? "increasing times, or 'out_of_sequence.policy: buffer' or 'rollback'"
+               : "increasing times, or 'time.repeats: true', which joins rows of one time into a "
                  "frame, or 'out_of_sequence.policy: buffer', which joins rows of different "
                  "streams");
     }
@@ -241,15 +240,15 @@ class CsvSource : public Source {
     return static_cast<std::size_t>(cell.data() - line_.data()) + 1;
   }
 
-  [[noreturn]] void FailCell(const CsvColumn& column, const std::string& what,
+  [[noreturn]] void FailCell(const CsvColumn& column, const std::string& problem,
                              std::string_view expected = "a finite number") const {
-    const int at = static_cast<int>(Column(cells_[column.index]));
-    Fail(Place{reader_.name(), reader_.number(), at}, column.name,
-         '\'' + cell::PrintableStart(cell::Trim(cells_[column.index])) + "' " + what, expected);
+    const int column_number = static_cast<int>(Column(cells_[column.index]));
+    Fail(Place{reader_.name(), reader_.number(), column_number}, column.name,
+         '\'' + cell::PrintableStart(cell::Trim(cells_[column.index])) + "' " + problem, expected);
   }
-  [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,
+  [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view problem,
                                 std::string_view expected) {
-    throw Error(ExitCode::kBadData, ErrorLine(place, key, what, expected));
+    throw Error(ExitCode::kBadData, ErrorLine(place, key, problem, expected));
   }
 
   CsvLayout layout_;
@@ -263,9 +262,9 @@ class CsvSource : public Source {
 
   std::string_view line_;
   std::vector<std::string_view> cells_;
-  bool has_row_ = false;     ///< that no frame has yet
-  Timestamp timestamp_ = 0;  ///< of the row
-  std::int64_t rows_ = 0;    ///< given out so far
+  bool has_row_ = false;     ///< a row has been read that is not in a frame yet
+  Timestamp timestamp_ = 0;  ///< of the row that was read last
+  std::int64_t rows_ = 0;    ///< rows in frames so far
   Timestamp last_timestamp_ = 0;
   int last_line_ = 0;
 };

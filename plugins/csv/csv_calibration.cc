@@ -8,45 +8,46 @@
 
 namespace alidade {
 
-void CsvCalibration::Note(std::string_view comment, const std::string& file, int line) {
-  constexpr std::string_view kBetween = " \t,;()";
-  for (std::size_t at = 0; at < comment.size();) {
-    const std::size_t end = std::min(comment.find_first_of(kBetween, at), comment.size());
-    const std::string_view word = comment.substr(at, end - at);
+void CsvCalibration::Record(std::string_view comment, const std::string& file, int line) {
+  constexpr std::string_view kSeparators = " \t,;()";
+  for (std::size_t offset = 0; offset < comment.size();) {
+    const std::size_t end = std::min(comment.find_first_of(kSeparators, offset), comment.size());
+    const std::string_view word = comment.substr(offset, end - offset);
     const std::size_t equals = std::min(word.find('='), word.size());
     const std::string_view name = word.substr(0, equals);
     if (equals < word.size() && (name == "focal_px" || name == "fx_px" || name == "baseline_m")) {
-      notes_.push_back({std::string(name == "fx_px" ? "focal_px" : name),
-                        std::string(word.substr(equals + 1)),
-                        {file, line, static_cast<int>(at + equals) + 2}});
+      entries_.push_back({std::string(name == "fx_px" ? "focal_px" : name),
+                          std::string(word.substr(equals + 1)),
+                          {file, line, static_cast<int>(offset + equals) + 2}});
     }
-    at = end + 1;
+    offset = end + 1;
   }
 }
 
 std::optional<Config> CsvCalibration::Get() const {
-  if (notes_.empty()) return std::nullopt;
+  if (entries_.empty()) return std::nullopt;
   Config config = Config::FromText("calibration: {}", "the comments of a table");
-  for (const Written& note : notes_) {
+  for (const Entry& entry : entries_) {
     double value = 0.0;
-    const char* const wrong = cell::ParseNumber(note.text, value);
-    if (wrong != nullptr) {
-      Fail(note, '\'' + cell::PrintableStart(note.text) + "' " + wrong, "a finite number");
+    const char* const problem = cell::ParseNumber(entry.text, value);
+    if (problem != nullptr) {
+      Fail(entry, '\'' + cell::PrintableStart(entry.text) + "' " + problem, "a finite number");
     }
-    const auto first = std::ranges::find(notes_, note.key, &Written::key);
-    if (&*first != &note) {
-      Fail(note, "is there twice, first in line " + std::to_string(first->place.line), "one");
+    const auto first = std::ranges::find(entries_, entry.key, &Entry::key);
+    if (&*first != &entry) {
+      Fail(entry, "occurs twice, first in line " + std::to_string(first->place.line), "one");
     }
-    const std::string origin = ToString(note.place);
-    config.Set("calibration." + note.key, note.text, origin);
-    const std::string camera = note.key == "focal_px" ? "fx" : note.key;
-    config.Set("calibration.camera." + camera, note.text, origin);
+    const std::string origin = ToString(entry.place);
+    config.Set("calibration." + entry.key, entry.text, origin);
+    const std::string camera = entry.key == "focal_px" ? "fx" : entry.key;
+    config.Set("calibration.camera." + camera, entry.text, origin);
   }
   return config;
 }
 
-void CsvCalibration::Fail(const Written& note, const std::string& what, std::string_view expected) {
-  throw Error(ExitCode::kBadData, ErrorLine(note.place, note.key, what, expected));
+void CsvCalibration::Fail(const Entry& entry, const std::string& problem,
+                          std::string_view expected) {
+  throw Error(ExitCode::kBadData, ErrorLine(entry.place, entry.key, problem, expected));
 }
 
 }  // namespace alidade

@@ -10,29 +10,30 @@
 
 namespace alidade {
 
-/// The calibration in the comments above the header of a table, as in
+/// Calibration in the comments above the header of a table, such as
 /// `# fx_px=721.5377 baseline_m=0.5371505882506209; points 55 and 144`.
 ///
-///   written as              unit  key by which models ask
+///   in the comment          unit  key that models use
 ///   focal_px= or fx_px=     px    focal_px, camera.fx
 ///   baseline_m=             m     baseline_m, camera.baseline_m
 class CsvCalibration {
  public:
-  /// Notes what a comment tells, which begins in column 1 of `line`.
-  void Note(std::string_view comment, const std::string& file, int line);
+  /// Records the numbers of a comment, which begins in column 1 of `line`.
+  void Record(std::string_view comment, const std::string& file, int line);
 
-  /// As of Source::Calibration. Errors: kBadData where a value is no number, or is there twice.
+  /// Returns the calibration, as Source::Calibration. Errors: kBadData if a value is not a number
+  /// or occurs twice.
   std::optional<Config> Get() const;
 
  private:
-  struct Written {
+  struct Entry {
     std::string key, text;
     Place place;
   };
-  [[noreturn]] static void Fail(const Written& note, const std::string& what,
+  [[noreturn]] static void Fail(const Entry& entry, const std::string& problem,
                                 std::string_view expected);
 
-  std::vector<Written> notes_;
+  std::vector<Entry> entries_;
 };
 
 }  // namespace alidade

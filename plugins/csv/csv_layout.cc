@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-CsvField ReadField(const std::string& name, const Node& node, bool takes_known) {
+CsvField ReadField(const std::string& name, const Node& node, bool has_known) {
   CsvField field;
   field.info.name = name;
   Node columns = node;
@@ -17,9 +17,9 @@ CsvField ReadField(const std::string& name, const Node& node, bool takes_known) 
     if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
     if (const auto gain = node.Find("gain")) {
       field.gain = gain->Number();
-      if (field.gain == 0.0) gain->Fail("0 leaves nothing of the column", "a number but 0");
+      if (field.gain == 0.0) gain->Fail("a gain of 0 erases the column", "a number other than 0");
     }
-    if (const auto known = takes_known ? node.Find("known") : std::nullopt) {
+    if (const auto known = has_known ? node.Find("known") : std::nullopt) {
       for (const Node& column : known->ItemsOrOne()) field.known.push_back({column.Text(), column});
     }
     node.RejectUnread();
@@ -31,10 +31,9 @@ CsvField ReadField(const std::string& name, const Node& node, bool takes_known) 
   return field;
 }
 
-std::vector<CsvField> ReadFields(const Node& map, bool take_known) {
+std::vector<CsvField> ReadFields(const Node& map, bool has_known) {
   std::vector<CsvField> fields;
-  for (const auto& [name, node] : map.Entries())
-    fields.push_back(ReadField(name, node, take_known));
+  for (const auto& [name, node] : map.Entries()) fields.push_back(ReadField(name, node, has_known));
   return fields;
 }
 
@@ -61,16 +60,17 @@ char ReadSeparator(const Node& node) {
   const std::string text = node.Text();
   const bool part_of_number = text.find_first_of("+-.#\"\r\n0123456789eE") != std::string::npos;
   if (text.size() != 1 || part_of_number) {
-    node.Fail("not a separator", "one character that numbers do not hold, as in ';' or \"\\t\"");
+    node.Fail("not a separator",
+              "one character that does not occur in numbers, such as ';' or \"\\t\"");
   }
   return text[0];
 }
 
-/// The text of a cell that says there is no value.
+/// Reads the text of a cell that marks a missing value.
 std::string ReadMissing(const Node& word) {
   const std::string text = word.Text();
   if (text == ".nan" || text == ".NaN" || text == ".NAN") {
-    word.Fail("'" + text + "' is not the text of a cell", "the text as the table has it",
+    word.Fail("'" + text + "' is not the text of a cell", "the text as it is in the table",
               text.substr(1));
   }
   return text;
@@ -80,7 +80,7 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> after = entry.Find("blind_after");
   const std::optional<Node> blind = entry.Find("blind");
   if (!after) {
-    if (blind) blind->Fail("without 'blind_after' no stream goes blind", "'blind_after' with it");
+    if (blind) blind->Fail("has no effect without 'blind_after'", "'blind_after' too");
     return;
   }
   layout.blind_after_node = after;
@@ -99,7 +99,7 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
   }
 }
 
-/// `, or 'source.separator: ";"'` where the one column that there seems to be is several; else "".
+/// Returns `, or 'source.separator: ";"'` if the only column appears to contain several, else "".
 std::string OtherSeparator(const std::vector<std::string>& names) {
   if (names.size() != 1) return {};
   for (const char separator : {';', '\t', '|', ',', ' '}) {
@@ -140,7 +140,8 @@ CsvLayout ReadCsvLayout(const Node& entry) {
   }
   const Node streams = entry.At("streams", "csv");
   layout.streams = ReadFields(streams, true);
-  if (layout.streams.empty()) streams.Fail("no streams", "a map, as in 'disparity: disparity_px'");
+  if (layout.streams.empty())
+    streams.Fail("no streams", "a map, such as 'disparity: disparity_px'");
   if (const auto truth = entry.Find("truth")) layout.truths = ReadFields(*truth, false);
   ReadTime(entry, layout);
   if (const auto separator = entry.Find("separator")) {

@@ -25,23 +25,23 @@ class DepthTarget : public Source {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     depth_mean_m_ = p.Positive("depth_mean_m", "m", "mean depth of the target", 0.3);
     amplitude_m_ = p.NonNegative("amplitude_m", "m", "amplitude; below depth_mean_m", 0.1);
-    frequency_hz_ = p.NonNegative("frequency_hz", "Hz", "frequency of the swing", 0.4);
-    step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples a second", {1e-6, 1e6}, 1.0 / 0.033);
+    frequency_hz_ = p.NonNegative("frequency_hz", "Hz", "frequency of the motion", 0.4);
+    step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples per second", {1e-6, 1e6}, 1.0 / 0.033);
     const double duration_s =
-        p.Number("duration_s", "s", "time of the last sample, at most", {0.0, 1e9}, 5.0);
+        p.Number("duration_s", "s", "upper limit of the time of the last sample", {0.0, 1e9}, 5.0);
     focal_px_ = p.Positive("focal_px", "px", "rectified focal length", 400.0);
     baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline", 0.065);
     bf_px_m_ = focal_px_ * baseline_m_;
     sigma_disparity_px_ =
         p.NonNegative("sigma_disparity_px", "px", "disparity noise, 1 sigma", 1.0);
-    missing_ = p.Number("missing", "1", "probability that there is no disparity: poor texture",
+    missing_ = p.Number("missing", "1", "probability that the disparity is missing (poor texture)",
                         {0.0, 1.0}, 0.0);
     outlier_share_ =
         p.Number("outliers.share", "1",
-                 "probability that a disparity is anything from 0 to the largest: poor texture",
+                 "probability that a disparity is uniform from 0 to the largest (poor texture)",
                  {0.0, 1.0}, 0.0);
     const double min_range_m =
-        p.NonNegative("min_range_m", "m", "stereo is blind to what is nearer; 0: to nothing", 0.3);
+        p.NonNegative("min_range_m", "m", "stereo measures no nearer depth; 0: no limit", 0.3);
     blind_by_true_depth_ =
         p.Choice("blind_test", {"measured", "true_depth"},
                  "disparity that min_range_m is compared with: noisy or exact", 0) == 1;
@@ -49,23 +49,24 @@ class DepthTarget : public Source {
     const double sigma_edge_px =
         p.NonNegative("sigma_edge_px", "px", "noise of an edge of the target, 1 sigma", 1.0);
     template_depth_m_ =
-        p.Positive("template_depth_m", "m", "depth at which the template was taken", 0.3);
-    width_px_ = p.Integer("image.width", "of the images, px", 16, 1 << 14, 640);
-    height_px_ = p.Integer("image.height", "of the images, px", 16, 1 << 14, 480);
+        p.Positive("template_depth_m", "m", "depth at which the template was recorded", 0.3);
+    width_px_ = p.Integer("image.width", "width of the images, px", 16, 1 << 14, 640);
+    height_px_ = p.Integer("image.height", "height of the images, px", 16, 1 << 14, 480);
     image_noise_grey_ =
-        p.NonNegative("image.noise_grey", "1", "noise of a pixel's grey, of 255", 2.0);
+        p.NonNegative("image.noise_grey", "1", "noise of a pixel, in grey levels of 255", 2.0);
     wall_m_ =
         p.Positive("image.wall_m", "m", "depth of the wall behind the target", 5.0 * depth_mean_m_);
     if (!(wall_m_ > depth_mean_m_ + amplitude_m_)) {
-      p.Fail("image.wall_m", "must be more than depth_mean_m + amplitude_m: it hides the target");
+      p.Fail("image.wall_m",
+             "must be more than depth_mean_m + amplitude_m, or it hides the target");
     }
     target_m_ = template_px * template_depth_m_ / focal_px_;
     if (!(amplitude_m_ < depth_mean_m_)) {
-      p.Fail("amplitude_m", "must be less than depth_mean_m: the target would reach the camera");
+      p.Fail("amplitude_m", "must be less than depth_mean_m, or the target reaches the camera");
     }
     disparity_limit_px_ = min_range_m > 0.0 ? bf_px_m_ / min_range_m : kInfinity;
     relative_sigma_ = 2.0 * sigma_edge_px / template_px;
-    // A few units in the last place, for durations that are multiples of the step but for rounding.
+    // Allows for rounding if the duration is a multiple of the step.
     count_ = 1 + static_cast<std::int64_t>(duration_s / step_s_ * (1.0 + 4.0 * DBL_EPSILON));
   }
 
@@ -81,7 +82,7 @@ class DepthTarget : public Source {
       const Eigen::Vector3d x(side_m, 0.0, 0.0), y(0.0, side_m, 0.0), middle(0.0, 0.0, depth);
       return Rectangle{middle - 0.5 * (x + y), x, y, grain_m, texture};
     };
-    constexpr double kWidest = 20.0;  // of its depth: fills the image
+    constexpr double kWidest = 20.0;  // times the depth of the wall: fills the image
     const std::vector<Rectangle> surfaces = {square(target_m_, depth_m_, 0.25 * target_m_, 0),
                                              square(kWidest * wall_m_, wall_m_, 0.5 * wall_m_, 1)};
     const double eye[3] = {view * baseline_m_, 0.0, 0.0}, level[4] = {1.0, 0.0, 0.0, 0.0};
@@ -101,7 +102,7 @@ class DepthTarget : public Source {
     const double exact_px = bf_px_m_ / depth_m;
     const double disparity_px = exact_px + sigma_disparity_px_ * disparity_noise_.Normal();
     const bool sees = !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
-    // Of texture that is poor: no match, or a wrong one anywhere in the search.
+    // Poor texture: no match, or a wrong match anywhere in the search range.
     const double nearest_px = bf_px_m_ / (depth_mean_m_ - amplitude_m_);
     const bool missing = texture_.Uniform() < missing_;
     const bool wrong = texture_.Uniform() < outlier_share_;

@@ -7,7 +7,8 @@
 
 namespace alidade {
 
-/// A target that swings along the optical axis, seen by a stereo pair and by the size of its image.
+/// Simulates a target that oscillates along the optical axis. A stereo pair measures its disparity,
+/// and a tracker measures the size of its image.
 ///
 ///   truth      Z(t) = Zm + A sin(2 pi f t),   Zdot = dZ/dt,   lambda = 1 / Z0
 ///   stereo     d = F B / Z + sigma_d n1,   n1 ~ N(0, 1);   seen unless d > F B / Zn
@@ -16,41 +17,42 @@ namespace alidade {
 ///   symbol   parameter           unit  frame  2017   meaning
 ///   Zm       depth_mean_m        m     cam    0.3    mean depth; > 0
 ///   A        amplitude_m         m     cam    0.1    amplitude; 0 <= A < Zm
-///   f        frequency_hz        Hz    -      0.4    frequency of the swing
+///   f        frequency_hz        Hz    -      0.4    frequency of the motion
 ///   t        rate_hz             Hz    -      30.3   t = 0, 1 / rate_hz, 2 / rate_hz, ...
 ///            duration_s          s     -      5      ... <= duration_s
 ///   F        focal_px            px    -      400    rectified focal length
 ///   B        baseline_m          m     -      0.065  stereo baseline
 ///   sigma_d  sigma_disparity_px  px    left   1      disparity noise, 1 sigma
-///   Zn       min_range_m         m     left   0.3    stereo sees nothing nearer; 0: no limit
+///   Zn       min_range_m         m     left   0.3    stereo measures no nearer depth; 0: no limit
 ///   w        template_px         px    cam    300    width of the template
-///   Z0       template_depth_m    m     cam    0.3    depth at which the template was taken
+///   Z0       template_depth_m    m     cam    0.3    depth at which the template was recorded
 ///   sigma_e  sigma_edge_px      px    cam    1      noise of one edge of the target, 1 sigma
-///            missing             1     -      0      probability that there is no disparity
+///            missing             1     -      0      probability that the disparity is missing
 ///            outliers.share      1     -      0      probability that d is U(0, its largest)
 ///
 ///   stream                  size  unit  when
-///   disparity               1     px    while stereo sees, but for those that are missing
-///   disparity_all           1     px    while none is missing: for a sensor that judges validity
+///   disparity               1     px    while stereo measures, except for missing disparities
+///   disparity_all           1     px    except for missing ones, for a sensor that checks validity
 ///   inverse_scale           1     -     always
-///   inverse_scale_seeing    1     -     the same value, while stereo sees
-///   inverse_scale_blind     1     -     the same value, while stereo is blind
+///   inverse_scale_seeing    1     -     the same value, while stereo measures
+///   inverse_scale_blind     1     -     the same value, while stereo does not measure
 ///
-/// n1 and n2 come from streams 0 and 1 of the seed, one of each per sample whatever is emitted.
+/// n1 and n2 come from streams 0 and 1 of the seed. Each sample draws one of each, regardless of
+/// the measurements that are emitted.
 ///
-/// Drawn, the target is a textured square of w Z0 / F metres that faces the pair, on the axis of
-/// the left camera, before a textured wall. Images are image.width times image.height, their
-/// principal points in the middle. Their noise comes from stream 2, what is missing or wrong from
-/// stream 3.
+/// In the images the target is a textured square of w Z0 / F metres that faces the pair, on the
+/// axis of the left camera, in front of a textured wall. Images have image.width times image.height
+/// pixels and their principal points in the middle. Image noise comes from stream 2 of the seed;
+/// missing and wrong disparities come from stream 3.
 ///
-/// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
-/// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
-/// px within 3 px (sigma_d 1 px, example 01). `blind_test: true_depth` thresholds F B / Z instead.
-/// Its text says 25 cm and 1 Hz, its code 30 cm and 0.4 Hz, the defaults here. A blind disparity is
-/// a sentinel of 1e9 px there; here it is missing. Its noise of the scale counts both edges
-/// linearly, 2 sigma_e, as is done here.
+/// Differences from the notebook: it applies the threshold to the NOISY disparity, so the accepted
+/// disparities are biased: by -0.85 px if F B / Z is within 1 px of the limit, by -0.33 px within 3
+/// px (sigma_d 1 px, example 01). `blind_test: true_depth` applies the threshold to F B / Z
+/// instead. The text of the notebook has 25 cm and 1 Hz; its code has 30 cm and 0.4 Hz, the
+/// defaults here. The notebook replaces a blind disparity by 1e9 px; here it is missing. Its scale
+/// noise adds both edges linearly, 2 sigma_e, as here.
 ///
-/// Defined for  A < Zm; else the configuration is refused.
+/// Defined for  A < Zm; else the configuration is rejected.
 /// Source       [Ekf2017] sec. 2-4.
 std::unique_ptr<Source> CreateDepthTarget(const SourceArguments& arguments);
 

@@ -2,6 +2,7 @@
 #include "alidade/experiment/source_plugin.h"
 #include "depth_target.h"
 
-ALIDADE_SOURCE_PLUGIN({"depth_target",
-                       "simulator: a target swings in depth before a stereo pair and a 2D tracker",
-                       "", &alidade::CreateDepthTarget})
+ALIDADE_SOURCE_PLUGIN(
+    {"depth_target",
+     "simulator: a target oscillates in depth, seen by a stereo pair and a 2D tracker", "",
+     &alidade::CreateDepthTarget})

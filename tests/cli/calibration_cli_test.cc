@@ -143,7 +143,7 @@ TEST_F(CalibrationCli, WhatAHeaderTellsMustBeANumberOnce) {
   WriteTable(std::string(kHeader) + "# baseline_m=0.1\n");
   const Outcome twice = Run("depth.yaml");
   EXPECT_EQ(twice.code, 65);
-  EXPECT_TRUE(Contains(twice.err, "table.csv:2:14 baseline_m: is there twice, first in line 1"))
+  EXPECT_TRUE(Contains(twice.err, "table.csv:2:14 baseline_m: occurs twice, first in line 1"))
       << twice.err;
   WriteTable("# fx_px=-4 baseline_m=0.065\n");
   const Outcome negative = Run("depth.yaml");
@@ -214,7 +214,8 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
   const Outcome lens = Run("slam.yaml");
   EXPECT_EQ(lens.code, 65);
   EXPECT_TRUE(Contains(lens.err, "drive/calibration.yaml:8:1 distortion: unknown key")) << lens.err;
-  EXPECT_TRUE(Contains(lens.err, "; 'source.calibration: ignore' does without it\n")) << lens.err;
+  EXPECT_TRUE(Contains(lens.err, "; 'source.calibration: ignore' skips the calibration\n"))
+      << lens.err;
   WriteTracks("front: {intrinsics: [500, 510, 320, 240]}\n");
   const Outcome other = Run("slam.yaml");
   EXPECT_EQ(other.code, 65);

@@ -57,7 +57,7 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
     const Outcome empty = Call({"bundle", "p.txt", "--fix", names});
     EXPECT_EQ(empty.code, 2) << names;
     EXPECT_TRUE(Contains(empty.err, "error: --fix: '" + std::string(names) +
-                                        "' has an empty name; expected names with a comma"))
+                                        "' has an empty name; expected comma-separated names"))
         << empty.err;
   }
   Write("p.txt", BundleText(testing::TrueBundle()));

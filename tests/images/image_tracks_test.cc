@@ -424,8 +424,8 @@ TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
   const Outcome not_after = track("tum/rgb");
   EXPECT_EQ(not_after.code, 65);
   EXPECT_TRUE(Contains(not_after.err,
-                       "rgb.txt:5: has a time for image 000003.png that is not after "
-                       "that of 000002.png, line 4"))
+                       "rgb.txt:5: has a time for image 000003.png that is not later "
+                       "than for 000002.png in line 4"))
       << not_after.err;
   EXPECT_EQ(Track({"--set", "source.rate_hz=0", "--set", "source.path=tum/rgb", "--set",
                    "source.max_frames=3"})

@@ -233,7 +233,7 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
 TEST_F(RunView, RefusesWhatItCannotWrite) {
   const Outcome other = Run(kPlate, {"--save-video", "video.mp4"});
   EXPECT_EQ(other.code, 2);
-  EXPECT_TRUE(Contains(other.err, "expected a name like video.avi")) << other.err;
+  EXPECT_TRUE(Contains(other.err, "expected a name such as video.avi")) << other.err;
 
   const Outcome nowhere = Run(kPlate, {"--save-video", "none/v.avi"});
   EXPECT_EQ(nowhere.code, 73);

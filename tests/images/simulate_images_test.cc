@@ -157,7 +157,7 @@ TEST_F(SimulateImages, OneFrameIsAVideoToo) {
 TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   const Outcome other = Simulate(kScene, {"--video", "video.mp4"});
   EXPECT_EQ(other.code, 2);
-  EXPECT_TRUE(Contains(other.err, "expected a name like video.avi")) << other.err;
+  EXPECT_TRUE(Contains(other.err, "expected a name such as video.avi")) << other.err;
   const Outcome outside = Simulate(kScene, {"--images", "../images"});
   EXPECT_EQ(outside.code, 77) << outside.err;
   EXPECT_TRUE(Contains(outside.err,

@@ -22,12 +22,12 @@ namespace {
 
 constexpr int kPoint = 3, kPose = 7;  // ambient sizes; a pose is position and orientation
 
-/// Tells of the iterations, and ends the solve where that is asked for.
-class Watch : public ceres::IterationCallback {
+/// Callback that reports the progress, and ends the solve on request.
+class ProgressCallback : public ceres::IterationCallback {
  public:
-  explicit Watch(const BundleOptions& options) : options_(options) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary& done) override {
-    if (options_.progress) options_.progress(done.iteration);
+  explicit ProgressCallback(const BundleOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (options_.progress) options_.progress(summary.iteration);
     const bool stop = options_.stop && options_.stop();
     return stop ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
@@ -36,54 +36,57 @@ class Watch : public ceres::IterationCallback {
   const BundleOptions& options_;
 };
 
-/// A bundle as a problem of Ceres. Parameter blocks: of each camera its pose, followed by its
-/// intrinsics where they are free and no other camera has them; else of each intrinsics; of each
-/// point. Only what an observation uses is in the problem.
+/// Ceres problem of a bundle. A parameter block is the pose of a camera, the intrinsics, or a
+/// point. The block of a camera also contains its intrinsics if they are free and no two cameras
+/// share intrinsics. The problem contains only the blocks that an observation uses.
 class Bundle {
  public:
-  Bundle(const SensorModel& sensor, const BundleProblem& from, const BundleOptions& options)
-      : sensor_(sensor), roles_(RolesOf(sensor)), from_(from), options_(options) {
+  Bundle(const SensorModel& sensor, const BundleProblem& problem, const BundleOptions& options)
+      : sensor_(sensor), roles_(RolesOf(sensor)), problem_data_(problem), options_(options) {
     fixed_ = FixedElements(sensor, options.fixed);
     if (roles_.intrinsics >= 0) {
       lens_ = sensor.roles()[static_cast<std::size_t>(roles_.intrinsics)].geometry;
-      own_lens_ = !all_fixed() && NoneIsShared();
+      lens_in_camera_block_ = !all_fixed() && HasUniqueIntrinsics();
     }
     CopyValues();
-    for (const BundleObservation& seen : from.observations) {
-      if (seen.used) Add(seen);
+    for (const BundleObservation& observation : problem.observations) {
+      if (observation.used) Add(observation);
     }
     AddManifolds();
   }
 
   BundleResult Solve();
-  /// Writes the solution down.
-  void CopyTo(BundleProblem& to) const;
+  /// Copies the solution to `problem`.
+  void CopyTo(BundleProblem& problem) const;
 
  private:
-  int camera_size() const { return kPose + (own_lens_ ? lens_.ambient : 0); }
+  int camera_size() const { return kPose + (lens_in_camera_block_ ? lens_.ambient : 0); }
   bool all_fixed() const { return std::ranges::count(fixed_, false) == 0; }
-  bool separate_lens() const { return roles_.intrinsics >= 0 && !own_lens_; }
+  bool separate_lens() const { return roles_.intrinsics >= 0 && !lens_in_camera_block_; }
   double* camera(int i) { return cameras_.data() + i * camera_size(); }
   double* point(int i) { return points_.data() + i * kPoint; }
   double* lens(int i) { return lenses_.data() + i * lens_.ambient; }
 
-  bool NoneIsShared() const {
-    std::vector<int> users(from_.intrinsics.size());
-    for (const BundleCamera& one : from_.cameras) ++users[static_cast<std::size_t>(one.intrinsics)];
+  bool HasUniqueIntrinsics() const {
+    std::vector<int> users(problem_data_.intrinsics.size());
+    for (const BundleCamera& camera : problem_data_.cameras)
+      ++users[static_cast<std::size_t>(camera.intrinsics)];
     return std::ranges::all_of(users, [](int count) { return count < 2; });
   }
   void CopyValues() {
-    for (const BundleCamera& one : from_.cameras) {
-      cameras_.insert(cameras_.end(), one.position.begin(), one.position.end());
-      cameras_.insert(cameras_.end(), one.orientation.begin(), one.orientation.end());
-      if (!own_lens_) continue;
-      const auto& own = from_.intrinsics[static_cast<std::size_t>(one.intrinsics)];
-      cameras_.insert(cameras_.end(), own.begin(), own.end());
+    for (const BundleCamera& camera : problem_data_.cameras) {
+      cameras_.insert(cameras_.end(), camera.position.begin(), camera.position.end());
+      cameras_.insert(cameras_.end(), camera.orientation.begin(), camera.orientation.end());
+      if (!lens_in_camera_block_) continue;
+      const auto& lens = problem_data_.intrinsics[static_cast<std::size_t>(camera.intrinsics)];
+      cameras_.insert(cameras_.end(), lens.begin(), lens.end());
     }
-    for (const auto& one : from_.intrinsics) lenses_.insert(lenses_.end(), one.begin(), one.end());
-    for (const auto& one : from_.points) points_.insert(points_.end(), one.begin(), one.end());
+    for (const auto& lens : problem_data_.intrinsics)
+      lenses_.insert(lenses_.end(), lens.begin(), lens.end());
+    for (const auto& point : problem_data_.points)
+      points_.insert(points_.end(), point.begin(), point.end());
   }
-  /// The kind of cost with W = L^-1, made when it is first asked for.
+  /// Returns the kind of cost with W = L^-1, which the first call creates.
   const CostKind<SensorModel>& KindOf(const std::vector<double>& w) {
     auto& kind = kinds_[w];
     if (kind != nullptr) return *kind;
@@ -94,50 +97,51 @@ class Bundle {
     std::vector<int> sizes = {camera_size(), kPoint};
     if (roles_.intrinsics >= 0) {
       places[static_cast<std::size_t>(roles_.intrinsics)] =
-          own_lens_ ? RolePlace{0, kPose} : RolePlace{2, 0};
+          lens_in_camera_block_ ? RolePlace{0, kPose} : RolePlace{2, 0};
     }
     if (separate_lens()) sizes.push_back(lens_.ambient);
     kind = std::make_unique<CostKind<SensorModel>>(sensor_, places, sizes, w);
     return *kind;
   }
-  void Add(const BundleObservation& seen) {
+  void Add(const BundleObservation& observation) {
     const int m = sensor_.measurement().geometry.tangent;
     RowMajor l(m, m);
-    const Status status =
-        sensor_.SqrtNoise(RoleValues(roles_, from_, seen).data(), seen.z.data(), l.data());
+    const Status status = sensor_.SqrtNoise(RoleValues(roles_, problem_data_, observation).data(),
+                                            observation.z.data(), l.data());
     if (status != Status::kOk) return;
     std::vector<double> w(static_cast<std::size_t>(m * m));
     Eigen::Map<RowMajor>(w.data(), m, m) =
         l.triangularView<Eigen::Lower>().solve(RowMajor::Identity(m, m));
-    auto* const cost = new SensorCost<SensorModel>(KindOf(w), seen.z.data());
+    auto* const cost = new SensorCost<SensorModel>(KindOf(w), observation.z.data());
     const bool robust = options_.loss.kind != LossKind::kNone;
-    std::vector<double*> blocks = {camera(seen.camera), point(seen.point)};
+    std::vector<double*> blocks = {camera(observation.camera), point(observation.point)};
     if (separate_lens())
-      blocks.push_back(lens(from_.cameras[static_cast<std::size_t>(seen.camera)].intrinsics));
-    problem_.AddResidualBlock(cost, robust ? new Loss(options_.loss) : nullptr, blocks);
+      blocks.push_back(
+          lens(problem_data_.cameras[static_cast<std::size_t>(observation.camera)].intrinsics));
+    ceres_problem_.AddResidualBlock(cost, robust ? new Loss(options_.loss) : nullptr, blocks);
   }
   void AddManifolds() {
     const Geometry position = Geometry::Vector(3), orientation = Geometry::UnitQuaternion();
     bool first = true;
-    for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i) {
-      if (!problem_.HasParameterBlock(camera(i))) continue;
+    for (int i = 0; i < static_cast<int>(problem_data_.cameras.size()); ++i) {
+      if (!ceres_problem_.HasParameterBlock(camera(i))) continue;
       std::vector<GeometryManifold::Part> parts = {{position, first}, {orientation, first}};
-      if (own_lens_) AddLens(parts);
-      if (first && !own_lens_) {
-        problem_.SetParameterBlockConstant(camera(i));
+      if (lens_in_camera_block_) AddLens(parts);
+      if (first && !lens_in_camera_block_) {
+        ceres_problem_.SetParameterBlockConstant(camera(i));
       } else {
-        problem_.SetManifold(camera(i), new GeometryManifold(parts));
+        ceres_problem_.SetManifold(camera(i), new GeometryManifold(parts));
       }
       first = false;
     }
-    for (int i = 0; separate_lens() && i < static_cast<int>(from_.intrinsics.size()); ++i) {
-      if (!problem_.HasParameterBlock(lens(i))) continue;
+    for (int i = 0; separate_lens() && i < static_cast<int>(problem_data_.intrinsics.size()); ++i) {
+      if (!ceres_problem_.HasParameterBlock(lens(i))) continue;
       std::vector<GeometryManifold::Part> parts;
       AddLens(parts);
       if (all_fixed()) {
-        problem_.SetParameterBlockConstant(lens(i));
+        ceres_problem_.SetParameterBlockConstant(lens(i));
       } else {
-        problem_.SetManifold(lens(i), new GeometryManifold(parts));
+        ceres_problem_.SetManifold(lens(i), new GeometryManifold(parts));
       }
     }
   }
@@ -151,44 +155,46 @@ class Bundle {
 
   const SensorModel& sensor_;
   BundleRoles roles_;
-  const BundleProblem& from_;
+  const BundleProblem& problem_data_;
   const BundleOptions& options_;
   Geometry lens_;
-  std::vector<bool> fixed_;  ///< elements of the intrinsics
-  bool own_lens_ = false;    ///< in the block of the camera
+  std::vector<bool> fixed_;            ///< elements of the intrinsics
+  bool lens_in_camera_block_ = false;  ///< the block of a camera contains its intrinsics
   std::vector<double> cameras_, lenses_, points_;
   std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< by W
-  ceres::Problem problem_;
+  ceres::Problem ceres_problem_;
 };
 
-/// Points are eliminated first, or cameras where they have more unknowns: either see but the other.
+/// Eliminates the points first, or the cameras if they have more unknowns. Both are valid, because
+/// a residual depends on one camera and one point.
 void Bundle::Eliminate(ceres::Solver::Options& options) {
   int cameras = 0, points = 0;
   const auto count = [&](const double* block, int& sum) {
-    if (problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block))
-      sum += problem_.ParameterBlockTangentSize(block);
+    if (ceres_problem_.HasParameterBlock(block) && !ceres_problem_.IsParameterBlockConstant(block))
+      sum += ceres_problem_.ParameterBlockTangentSize(block);
   };
-  for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i) count(camera(i), cameras);
-  for (int i = 0; i < static_cast<int>(from_.points.size()); ++i) count(point(i), points);
+  for (int i = 0; i < static_cast<int>(problem_data_.cameras.size()); ++i)
+    count(camera(i), cameras);
+  for (int i = 0; i < static_cast<int>(problem_data_.points.size()); ++i) count(point(i), points);
   const bool points_first = points >= cameras;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   const auto add = [&](double* block, int group) {
-    if (problem_.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
+    if (ceres_problem_.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
   };
-  for (int i = 0; i < static_cast<int>(from_.points.size()); ++i)
+  for (int i = 0; i < static_cast<int>(problem_data_.points.size()); ++i)
     add(point(i), points_first ? 0 : 1);
-  for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i)
+  for (int i = 0; i < static_cast<int>(problem_data_.cameras.size()); ++i)
     add(camera(i), points_first ? 1 : 0);
-  for (int i = 0; i < static_cast<int>(from_.intrinsics.size()); ++i) add(lens(i), 1);
+  for (int i = 0; i < static_cast<int>(problem_data_.intrinsics.size()); ++i) add(lens(i), 1);
   options.linear_solver_ordering = ordering;
-  constexpr int kDense = 1000;  // unknowns that are left
+  constexpr int kDense = 1000;  // remaining unknowns
   options.linear_solver_type =
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }
 
-/// Ceres compares a step with the norm of all unknowns: one point very far away would let any step
-/// pass. So the tolerance is scaled to the norm that the points, of which there must be one, would
-/// have if all coordinates were of the median size.
+/// Ceres compares a step with the norm of all unknowns, so one very distant point would make every
+/// step pass. The tolerance is therefore scaled to the norm that the points would have if every
+/// coordinate had the median size. The problem has at least one point.
 double Bundle::StepTolerance() const {
   constexpr double kTolerance = 1e-12;
   std::vector<double> sizes;
@@ -203,13 +209,14 @@ double Bundle::StepTolerance() const {
 ceres::Solver::Options Bundle::SolverOptions() const {
   ceres::Solver::Options options;
   options.max_num_iterations = options_.max_iterations;
-  // A cost is a sum of squares, known to about epsilon times the root of their number.
-  const double rounding = std::numeric_limits<double>::epsilon() *
-                          std::sqrt(static_cast<double>(std::max(1, problem_.NumResiduals())));
+  // A cost is a sum of squares; its rounding error is about epsilon times the root of their number.
+  const double rounding =
+      std::numeric_limits<double>::epsilon() *
+      std::sqrt(static_cast<double>(std::max(1, ceres_problem_.NumResiduals())));
   options.function_tolerance = std::max(options_.function_tolerance, rounding);
   options.gradient_tolerance = 1e-12;
   options.parameter_tolerance = StepTolerance();
-  // A step that cannot be computed halves the trust region; from a far start it takes some of them.
+  // A step that cannot be computed halves the trust region; a distant start needs several of them.
   options.max_num_consecutive_invalid_steps = 50;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
@@ -217,18 +224,18 @@ ceres::Solver::Options Bundle::SolverOptions() const {
 }
 
 BundleResult Bundle::Solve() {
-  Watch watch(options_);
+  ProgressCallback callback(options_);
   ceres::Solver::Options options = SolverOptions();
   Eliminate(options);
-  options.callbacks = {&watch};
+  options.callbacks = {&callback};
   ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem_, &summary);
+  ceres::Solve(options, &ceres_problem_, &summary);
   BundleResult result;
   result.message = summary.message;
   result.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
   result.cost_before = summary.initial_cost;
   result.cost_after = summary.final_cost;
-  result.residuals = problem_.NumResiduals();
+  result.residuals = ceres_problem_.NumResiduals();
   result.unknowns = summary.num_effective_parameters_reduced;
   if (summary.termination_type == ceres::CONVERGENCE) result.end = BundleEnd::kConverged;
   if (summary.termination_type == ceres::NO_CONVERGENCE) result.end = BundleEnd::kOutOfIterations;
@@ -237,24 +244,25 @@ BundleResult Bundle::Solve() {
   return result;
 }
 
-/// Of dr/dx, columns scaled to length 1; -1 where it is not finite. It is that of R in dr/dx = Q R,
-/// which is made of a few rows at a time: dr/dx itself would need much memory.
+/// Returns the rank of dr/dx with columns scaled to length 1, or -1 if dr/dx is not finite. It is
+/// the rank of R in dr/dx = Q R. R is computed from a few rows at a time to save memory.
 int Bundle::Rank() {
   std::vector<double*> blocks, moved;
-  problem_.GetParameterBlocks(&blocks);
+  ceres_problem_.GetParameterBlocks(&blocks);
   std::ranges::copy_if(blocks, std::back_inserter(moved), [&](const double* block) {
-    return !problem_.IsParameterBlockConstant(block);
+    return !ceres_problem_.IsParameterBlockConstant(block);
   });
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = moved;
   options.apply_loss_function = false;
   ceres::CRSMatrix sparse;
-  if (!problem_.Evaluate(options, nullptr, nullptr, nullptr, &sparse)) return -1;
-  const int n = sparse.num_cols, some = 4 * n;
+  if (!ceres_problem_.Evaluate(options, nullptr, nullptr, nullptr, &sparse)) return -1;
+  const int n = sparse.num_cols, batch_rows = 4 * n;
   if (n == 0) return 0;
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + some, n);  // R of those so far, and more
-  for (int first = 0; first < sparse.num_rows; first += some) {
-    for (int r = first; r < std::min(first + some, sparse.num_rows); ++r) {
+  Eigen::MatrixXd rows =
+      Eigen::MatrixXd::Zero(n + batch_rows, n);  // R of the previous rows, then new rows
+  for (int first = 0; first < sparse.num_rows; first += batch_rows) {
+    for (int r = first; r < std::min(first + batch_rows, sparse.num_rows); ++r) {
       for (auto k = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r)]);
            k < static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r) + 1]); ++k) {
         rows(n + r - first, sparse.cols[k]) = sparse.values[k];
@@ -268,25 +276,25 @@ int Bundle::Rank() {
     const double norm = column.norm();
     if (norm > 0.0) column /= norm;
   }
-  constexpr double kNothing = 1e-9;
-  return internal::RankOf(rows.topRows(n), kNothing);
+  constexpr double kRankTolerance = 1e-9;
+  return internal::RankOf(rows.topRows(n), kRankTolerance);
 }
 
-void Bundle::CopyTo(BundleProblem& to) const {
-  for (std::size_t i = 0; i < to.cameras.size(); ++i) {
-    const double* const from = cameras_.data() + i * static_cast<std::size_t>(camera_size());
-    std::copy_n(from, 3, to.cameras[i].position.data());
-    std::copy_n(from + 3, 4, to.cameras[i].orientation.data());
-    if (own_lens_) {
-      auto& own = to.intrinsics[static_cast<std::size_t>(to.cameras[i].intrinsics)];
-      std::copy_n(from + kPose, own.size(), own.data());
+void Bundle::CopyTo(BundleProblem& problem) const {
+  for (std::size_t i = 0; i < problem.cameras.size(); ++i) {
+    const double* const source = cameras_.data() + i * static_cast<std::size_t>(camera_size());
+    std::copy_n(source, 3, problem.cameras[i].position.data());
+    std::copy_n(source + 3, 4, problem.cameras[i].orientation.data());
+    if (lens_in_camera_block_) {
+      auto& lens = problem.intrinsics[static_cast<std::size_t>(problem.cameras[i].intrinsics)];
+      std::copy_n(source + kPose, lens.size(), lens.data());
     }
   }
-  for (std::size_t i = 0; separate_lens() && i < to.intrinsics.size(); ++i)
-    std::copy_n(lenses_.data() + i * to.intrinsics[i].size(), to.intrinsics[i].size(),
-                to.intrinsics[i].data());
-  for (std::size_t i = 0; i < to.points.size(); ++i)
-    std::copy_n(points_.data() + i * kPoint, kPoint, to.points[i].data());
+  for (std::size_t i = 0; separate_lens() && i < problem.intrinsics.size(); ++i)
+    std::copy_n(lenses_.data() + i * problem.intrinsics[i].size(), problem.intrinsics[i].size(),
+                problem.intrinsics[i].data());
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    std::copy_n(points_.data() + i * kPoint, kPoint, problem.points[i].data());
 }
 
 BundleResult Adjust(const SensorModel& sensor, BundleProblem& problem,

@@ -10,26 +10,26 @@
 
 namespace alidade::ceres_batch {
 
-/// Where the value of a role stands: `offset` numbers into parameter block `block` of the cost.
+/// Place of the value of a role: `offset` numbers after the start of parameter block `block`.
 struct RolePlace {
-  int block = -1;  ///< -1: an optional role that is not bound
+  int block = -1;  ///< -1 if the role is optional and not bound
   int offset = 0;
 };
 
-/// An element of the Jacobian by a parameter block, row-major.
+/// Element of the row-major Jacobian with respect to a parameter block.
 struct JacobianElement {
   int block, index;
 };
 
 namespace detail {
 
-/// The geometry of a measurement, which is no product.
+/// Geometry of a measurement, which is never a product of geometries.
 struct Measured {
   GeometryKind kind;
   int ambient, tangent;
 };
 
-/// What is asked of a sensor: a model of alidade/model/model.h, which the compiler sees through.
+/// Static properties of a sensor whose type is known to the compiler (alidade/model/model.h).
 template <class Sensor>
 struct SensorTraits {
   using Z = typename Sensor::Measurement;
@@ -39,13 +39,13 @@ struct SensorTraits {
     return {GeometryKind{Z::kGeometry}, Z::kAmbient, Z::kTangent};
   }
   static std::vector<Geometry> Geometries(const Sensor&) {
-    std::vector<Geometry> all;
+    std::vector<Geometry> geometries;
     const auto add = [&](auto index) {
       using G = alidade::detail::SpaceAt<decltype(index)::value, Sensor>;
-      all.push_back({GeometryKind{G::kGeometry}, G::kAmbient, G::kTangent});
+      geometries.push_back({GeometryKind{G::kGeometry}, G::kAmbient, G::kTangent});
     };
     alidade::detail::ForEach(add, typename Roles::Indices{});
-    return all;
+    return geometries;
   }
   ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
                                                                const double* const* roles,
@@ -55,18 +55,18 @@ struct SensorTraits {
   }
 };
 
-/// And of one behind the plugin ABI.
+/// Properties of a sensor behind the plugin ABI.
 template <>
 struct SensorTraits<SensorModel> {
-  static constexpr int kMaxRoles = 64;  // as many as a model may have
+  static constexpr int kMaxRoles = 64;  // the maximum number of roles of a model
   static detail::Measured Measured(const SensorModel& sensor) {
     const Geometry& z = sensor.measurement().geometry;
     return {z.kind, z.ambient, z.tangent};
   }
   static std::vector<Geometry> Geometries(const SensorModel& sensor) {
-    std::vector<Geometry> all;
-    for (const Space& role : sensor.roles()) all.push_back(role.geometry);
-    return all;
+    std::vector<Geometry> geometries;
+    for (const Space& role : sensor.roles()) geometries.push_back(role.geometry);
+    return geometries;
   }
   static Status Linearise(const SensorModel& sensor, const double* const* roles, double* z,
                           double* const* jacobians, const int* strides) {
@@ -76,24 +76,23 @@ struct SensorTraits<SensorModel> {
 
 }  // namespace detail
 
-/// What costs of a kind share: the sensor, the places of its roles in the parameter blocks, and the
-/// noise, by W = L^-1, R = L L'.
+/// Common data of the costs with the same sensor, the same places of its roles in the parameter
+/// blocks, and the same noise, given as W = L^-1 with R = L L'.
 template <class Sensor>
 struct CostKind {
   using Traits = detail::SensorTraits<Sensor>;
 
   /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
-  /// row-major, of the size of the tangent of z. No two roles may share a place; the sensor must
-  /// outlive this.
+  /// row-major, of the tangent size of z. Two roles may not overlap. The sensor must outlive this.
   CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
            const std::vector<double>& whiten)
       : sensor(model), sizes(blocks), w(whiten) {
     const std::vector<Geometry> geometries = Traits::Geometries(model);
     const auto m = static_cast<std::size_t>(measured().tangent);
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
-    std::vector<std::vector<bool>> taken, written;  // elements of each block
-    for (const int size : blocks) taken.emplace_back(static_cast<std::size_t>(size), false);
-    written = taken;
+    std::vector<std::vector<bool>> bound, written;  // elements of each block
+    for (const int size : blocks) bound.emplace_back(static_cast<std::size_t>(size), false);
+    written = bound;
     role_count_ = static_cast<int>(roles.size());
     for (std::size_t i = 0; i < roles.size(); ++i) {
       places[i] = roles[i];
@@ -103,11 +102,11 @@ struct CostKind {
                       roles[i].offset + geometries[i].ambient <= blocks[block]);
       strides[i] = blocks[block];
       for (int k = 0; k < geometries[i].ambient; ++k) {
-        const std::size_t at =
+        const std::size_t index =
             static_cast<std::size_t>(roles[i].offset) + static_cast<std::size_t>(k);
-        ALIDADE_EXPECTS(!taken[block][at]);
-        taken[block][at] = true;
-        written[block][at] = k < geometries[i].tangent;
+        ALIDADE_EXPECTS(!bound[block][index]);
+        bound[block][index] = true;
+        written[block][index] = k < geometries[i].tangent;
       }
     }
     for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -122,20 +121,20 @@ struct CostKind {
   }
 
   int role_count() const { return kStatic ? Traits::kMaxRoles : role_count_; }
-  /// The geometry of z.
+  /// Returns the geometry of z.
   detail::Measured measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
 
   const Sensor& sensor;
   double scale = 1.0;
-  bool isotropic = true;                   ///< W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< read at each evaluation, and so an array
-  int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians by the roles
-  std::vector<int> sizes;                  ///< of the blocks
+  bool isotropic = true;                   ///< true if W = scale I
+  RolePlace places[Traits::kMaxRoles];     ///< an array, because each evaluation reads it
+  int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians with respect to the roles
+  std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major
-  std::vector<JacobianElement> unwritten;  ///< by any role: zero
+  std::vector<JacobianElement> unwritten;  ///< by the model; the cost sets them to zero
 
  private:
-  /// Of a model that the compiler sees through they are constants.
+  /// True if the compiler knows the type of the sensor; role_count() and measured() are constants.
   static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
   int role_count_ = 0;
   detail::Measured measured_ = Traits::Measured(sensor);

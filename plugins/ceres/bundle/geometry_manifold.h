@@ -11,15 +11,17 @@
 
 namespace alidade::ceres_batch {
 
-/// Values side by side in one parameter block, each moved as its geometry says, or constant.
+/// Manifold of a parameter block that consists of several parts. Each part moves on its geometry,
+/// or is constant.
 ///
-///   x (+) d           of each part by Geometry::Plus
-///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; none of a constant
-//part /
-/// That is not the derivative by the ambient values, which no model of alidade gives, but its
-/// counterpart: a cost writes [J | 0], J in the tangent, and Ceres forms [J | 0] [I; 0] = J. Only
-/// costs that do so, as SensorCost, may share a block with it; Ceres' own QuaternionManifold is
-/// another convention.
+///   x (+) d           Geometry::Plus for each part
+///   d(x (+) d)/dd  := [I; 0] for each part: its tangent in the first rows; a constant part has no
+///                     column
+///
+/// This is not the derivative of the ambient values, which models of alidade do not provide. It is
+/// the counterpart of the Jacobian [J | 0] that a cost writes, with J in the tangent: Ceres
+/// computes [J | 0] [I; 0] = J. Only costs that do so, such as SensorCost, may use a block with
+/// this manifold. Ceres' own QuaternionManifold has another convention.
 class GeometryManifold : public ceres::Manifold {
  public:
   struct Part {
@@ -64,14 +66,14 @@ class GeometryManifold : public ceres::Manifold {
     }
     return true;
   }
-  /// [I 0], the counterpart.
+  /// Computes [I 0], the counterpart of PlusJacobian.
   bool MinusJacobian(const double*, double* j) const override {
     Select(j, 1, ambient_);
     return true;
   }
 
  private:
-  /// j = 0, but 1 at (ambient row, tangent column) of each moved element.
+  /// Sets j to 0, and to 1 at (ambient row, tangent column) of each element that moves.
   void Select(double* j, int row_stride, int column_stride) const {
     std::fill_n(j, ambient_ * tangent_, 0.0);
     int row = 0, column = 0;

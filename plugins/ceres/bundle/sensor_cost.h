@@ -10,25 +10,26 @@
 
 namespace alidade::ceres_batch {
 
-/// The factor of a measurement, made of the sensor's own h:
+/// Residual of a measurement, computed with the sensor's h:
 ///
 ///   r = -W (z (-) h(roles)),   W = L^-1,   R = L L'
 ///
-/// The sign is of no account to a cost, and so the Jacobian W H needs no pass where W is 1.
+/// The sign does not affect the cost; with this sign the Jacobian W H needs no pass if W is 1.
 /// Jacobians are in the tangent of each role, [J | 0] in its ambient columns: see GeometryManifold.
-/// `Sensor` is a SensorModel or a model itself. Evaluate is false where h is not defined, and
-/// allocates nothing. In a large problem each cost is far memory: it is as small as may be.
+/// `Sensor` is SensorModel or the type of a model. Evaluate returns false if h is not defined, and
+/// does not allocate. The object is small, because in a large problem it is rarely in the cache.
 template <class Sensor>
 class SensorCost final : public ceres::CostFunction {
   using Traits = detail::SensorTraits<Sensor>;
 
  public:
-  /// `z`, ambient. The kind must outlive the cost, and z of more than three numbers too.
+  /// `z` has ambient size. The kind must outlive the cost, and so must a z of more than three
+  /// numbers.
   SensorCost(const CostKind<Sensor>& kind, const double* z) : kind_(kind) {
-    if (kind.measured().ambient <= kNear) {
-      std::copy_n(z, kind.measured().ambient, z_.near);
+    if (kind.measured().ambient <= kInlineSize) {
+      std::copy_n(z, kind.measured().ambient, z_.inline_values);
     } else {
-      z_.far = z;
+      z_.pointer = z;
     }
     set_num_residuals(kind.measured().tangent);
     *mutable_parameter_block_sizes() = kind.sizes;
@@ -36,15 +37,15 @@ class SensorCost final : public ceres::CostFunction {
 
   ALIDADE_SCALAR_LOOPS bool Evaluate(const double* const* blocks, double* residuals,
                                      double** jacobians) const override {
-    const double* const z = kind_.measured().ambient <= kNear ? z_.near : z_.far;
-    __builtin_prefetch(z);  // near or far, in another cache line; not needed until h is there
+    const double* const z = kind_.measured().ambient <= kInlineSize ? z_.inline_values : z_.pointer;
+    __builtin_prefetch(z);  // needed only after h has been computed
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j);
-    double** const wanted = jacobians == nullptr ? nullptr : j;
+    double** const requested = jacobians == nullptr ? nullptr : j;
     if (kind_.measured().kind != GeometryKind::kVector || !kind_.isotropic)
-      return General(z, roles, wanted, residuals, jacobians);
-    if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, kind_.strides) != Status::kOk)
+      return EvaluateGeneral(z, roles, requested, residuals, jacobians);
+    if (Traits::Linearise(kind_.sensor, roles, residuals, requested, kind_.strides) != Status::kOk)
       return false;
     const int m = kind_.measured().tangent;
     const double scale = kind_.scale;
@@ -54,14 +55,14 @@ class SensorCost final : public ceres::CostFunction {
   }
 
  private:
-  /// Where the roles are, and where the Jacobian by each goes.
+  /// Sets the pointers to the roles and to the Jacobians with respect to the roles.
   void Bind(const double* const* blocks, double** jacobians, const double** roles,
             double** j) const {
     for (int i = 0; i < kind_.role_count(); ++i) {
       const auto [block, offset] = kind_.places[i];
       roles[i] = block < 0 ? nullptr : blocks[block] + offset;
-      const bool wanted = jacobians != nullptr && block >= 0 && jacobians[block] != nullptr;
-      j[i] = wanted ? jacobians[block] + offset : nullptr;
+      const bool requested = jacobians != nullptr && block >= 0 && jacobians[block] != nullptr;
+      j[i] = requested ? jacobians[block] + offset : nullptr;
     }
     if (jacobians == nullptr) return;
     for (const auto [block, index] : kind_.unwritten) {
@@ -69,14 +70,16 @@ class SensorCost final : public ceres::CostFunction {
     }
   }
 
-  /// Where z is no vector, or its noise correlated. Out of line, so that Evaluate stays small.
-  [[gnu::noinline]] bool General(const double* z, const double* const* roles, double* const* j,
-                                 double* residuals, double** jacobians) const {
+  /// Evaluates the cost if z is not a vector or its noise is correlated. It is not inlined, so that
+  /// Evaluate stays small.
+  [[gnu::noinline]] bool EvaluateGeneral(const double* z, const double* const* roles,
+                                         double* const* j, double* residuals,
+                                         double** jacobians) const {
     const GeometryKind geometry = kind_.measured().kind;
     if (geometry == GeometryKind::kUnitQuaternion)
-      return Curved<UnitQuaternion>(z, roles, j, residuals, jacobians);
+      return EvaluateOnManifold<UnitQuaternion>(z, roles, j, residuals, jacobians);
     if (geometry == GeometryKind::kUnitVector)
-      return Curved<UnitVector>(z, roles, j, residuals, jacobians);
+      return EvaluateOnManifold<UnitVector>(z, roles, j, residuals, jacobians);
     if (Traits::Linearise(kind_.sensor, roles, residuals, j, kind_.strides) != Status::kOk)
       return false;
     for (int i = 0; i < kind_.measured().tangent; ++i) residuals[i] -= z[i];
@@ -86,10 +89,10 @@ class SensorCost final : public ceres::CostFunction {
     return true;
   }
 
-  /// Where z is on a manifold G, of 2 or 3 dimensions.
+  /// Evaluates the cost if z is on a manifold G of 2 or 3 dimensions.
   template <class G>
-  bool Curved(const double* z, const double* const* roles, double* const* j, double* residuals,
-              double** jacobians) const {
+  bool EvaluateOnManifold(const double* z, const double* const* roles, double* const* j,
+                          double* residuals, double** jacobians) const {
     constexpr int m = G::kTangent;
     double h[G::kAmbient], slope[m * m];
     if (Traits::Linearise(kind_.sensor, roles, h, j, kind_.strides) != Status::kOk) return false;
@@ -117,7 +120,8 @@ class SensorCost final : public ceres::CostFunction {
       if (jacobians[i] != nullptr) Whiten(jacobians[i], sizes[i], sign);
     }
   }
-  /// a <- sign W a, in place: from the last row up, as W is lower triangular.
+  /// Computes a <- sign W a in place, from the last row to the first, because W is lower
+  /// triangular.
   void Whiten(double* a, int columns, double sign) const {
     const int m = kind_.measured().tangent;
     if (kind_.isotropic) {
@@ -138,10 +142,10 @@ class SensorCost final : public ceres::CostFunction {
   }
 
   const CostKind<Sensor>& kind_;
-  static constexpr int kNear = 3;
+  static constexpr int kInlineSize = 3;
   union {
-    double near[kNear];  ///< z of no more numbers than these
-    const double* far;   ///< where a longer one is
+    double inline_values[kInlineSize];  ///< z of at most this size
+    const double* pointer;              ///< to a longer z
   } z_;
 };
 

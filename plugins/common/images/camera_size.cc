@@ -13,7 +13,7 @@ std::string SizeText(cv::Size size) {
 
 CameraSize::CameraSize(const SourceArguments& arguments, const Source& source) {
   if (arguments.config == nullptr) return;
-  const Config config = arguments.config->Copy();  // what is read here counts as unread there
+  const Config config = arguments.config->Copy();  // does not mark the keys of the original as read
   const Node root = config.root();
   const auto use = root.At("source").Find("calibration");
   std::optional<Config> calibration;
@@ -30,7 +30,7 @@ CameraSize::CameraSize(const SourceArguments& arguments, const Source& source) {
 
 void CameraSize::Check(cv::Size found, const Place& image) const {
   for (const Camera& camera : cameras_) {
-    if (IsOf(camera.width, found.width) && IsOf(camera.height, found.height)) continue;
+    if (Matches(camera.width, found.width) && Matches(camera.height, found.height)) continue;
     throw Error(ExitCode::kBadData,
                 ErrorLine(image, {},
                           SizeText(found) + ", but the camera of " + camera.place + " is " +
@@ -40,7 +40,7 @@ void CameraSize::Check(cv::Size found, const Place& image) const {
   }
 }
 
-bool CameraSize::IsOf(const std::optional<std::int64_t>& side, int found) {
+bool CameraSize::Matches(const std::optional<std::int64_t>& side, int found) {
   return !side || *side == found;
 }
 
@@ -63,14 +63,14 @@ std::vector<Node> CameraSize::SensorsOn(const std::vector<StreamInfo>& streams, 
 }
 
 void CameraSize::Read(const std::vector<Node>& maps) {
-  constexpr std::int64_t kMost = 1 << 20;
+  constexpr std::int64_t kMaxSide = 1 << 20;
   Camera camera;
   const auto read = [&](const char* key, std::optional<std::int64_t>& side) {
     for (const Node& map : maps) {
-      const auto own = map.Find("camera");
-      const auto node = own && own->is_map() ? own->Find(key) : std::nullopt;
+      const auto section = map.Find("camera");
+      const auto node = section && section->is_map() ? section->Find(key) : std::nullopt;
       if (!node) continue;
-      side = node->Integer(1, kMost);
+      side = node->Integer(1, kMaxSide);
       const Place& place = node->place();
       camera.place = place.file;
       if (place.line > 0) camera.place += ":" + std::to_string(place.line);

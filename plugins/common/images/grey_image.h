@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// A copy of an image, 8 bit grey.
+/// Copies an 8-bit grey image.
 inline GreyImage ToGreyImage(const cv::Mat& image) {
   GreyImage grey{image.cols, image.rows, {}};
   grey.pixels.reserve(image.total());

@@ -28,15 +28,16 @@ ImageReader::ImageReader(std::filesystem::path path, const std::string& names, c
   }
   is_live_ = std::filesystem::is_character_file(path_, error);
   if (!is_live_ && !std::filesystem::is_regular_file(path_, error)) {
-    throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {}, "not a file",  // a pipe, say
-                                              "a video, a folder of images, or a camera"));
+    throw Error(ExitCode::kBadData,
+                ErrorLine({path_.string()}, {}, "not a file",  // for example a pipe
+                          "a video, a folder of images, or a camera"));
   }
   if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
   throw Error(ExitCode::kBadData,
               ErrorLine({path_.string()}, {},
-                        is_live_ ? "not a camera that OpenCV reads, or another program has it"
+                        is_live_ ? "not a camera that OpenCV reads, or another program uses it"
                                  : "not a video that OpenCV reads",
-                        "a video, a folder of images, or a camera, as /dev/video0"));
+                        "a video, a folder of images, or a camera such as /dev/video0"));
 }
 
 bool ImageReader::Next(cv::Mat& image) {
@@ -69,8 +70,8 @@ bool ImageReader::EndsLikeAnImage(const std::filesystem::path& file) {
   constexpr const char* kEnds[] = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
                                    ".pnm", ".bmp", ".tif",  ".tiff", ".webp"};
   const std::string end = file.extension().string();
-  return std::ranges::any_of(kEnds,
-                             [&](const char* one) { return strcasecmp(end.c_str(), one) == 0; });
+  return std::ranges::any_of(
+      kEnds, [&](const char* ending) { return strcasecmp(end.c_str(), ending) == 0; });
 }
 
 void ImageReader::List(const std::string& names, const Node& key) {
@@ -94,7 +95,7 @@ void ImageReader::List(const std::string& names, const Node& key) {
       ExitCode::kInputMissing,
       ErrorLine(key.place(), key.path(),
                 "no image in " + path_.string() + (names.empty() ? "" : " matches '" + names + "'"),
-                "PNG, JPEG, PGM or another that OpenCV reads"));
+                "PNG, JPEG, PGM or another format that OpenCV reads"));
 }
 
 bool ImageReader::ReadVideo(cv::Mat& image) {
@@ -115,11 +116,12 @@ bool ImageReader::ReadFile(cv::Mat& image) {
   });
   const bool is_cut = IsCutShort(bytes);
   if (!bytes.empty() && !is_cut) {
-    const cv::Mat all(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
+                         const_cast<char*>(bytes.data()));
     try {
-      image.release();  // imdecode leaves what it has where no decoder knows the file
-      cv::imdecode(all, cv::IMREAD_GRAYSCALE, &image);
-    } catch (const cv::Exception&) {  // a header that asks for more than OpenCV reads
+      image.release();  // imdecode keeps the old image if no decoder accepts the file
+      cv::imdecode(buffer, cv::IMREAD_GRAYSCALE, &image);
+    } catch (const cv::Exception&) {  // the size in the header exceeds OpenCV's limit
       image.release();
     }
   }
@@ -129,7 +131,7 @@ bool ImageReader::ReadFile(cv::Mat& image) {
     Fail(bytes.empty() ? "an empty file"
          : is_cut      ? "the image is cut short"
                        : "not an image that OpenCV reads",
-         "a whole image; `images` says which files are");
+         "a complete image; `images` selects the files");
   }
   return true;
 }

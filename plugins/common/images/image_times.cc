@@ -19,22 +19,23 @@ ImageTimes::ImageTimes(const std::filesystem::path& table, const Node& key) {
   }
 }
 
-std::optional<ImageTimes> ImageTimes::Beside(const std::filesystem::path& folder, bool by_layout,
-                                             const Node& key) {
+std::optional<ImageTimes> ImageTimes::FindNextTo(const std::filesystem::path& folder,
+                                                 bool by_layout, const Node& key) {
   std::error_code error;
-  const auto is_there = [&](const std::filesystem::path& file) {
+  const auto exists = [&](const std::filesystem::path& file) {
     return std::filesystem::is_regular_file(file, error);
   };
-  if (is_there(folder / "timestamps.csv")) return ImageTimes(folder / "timestamps.csv", key);
+  if (exists(folder / "timestamps.csv")) return ImageTimes(folder / "timestamps.csv", key);
   if (!by_layout) return std::nullopt;
-  const std::filesystem::path whole = std::filesystem::weakly_canonical(folder, error);
-  const std::filesystem::path home = whole.parent_path();
+  const std::filesystem::path canonical_folder = std::filesystem::weakly_canonical(folder, error);
+  const std::filesystem::path parent = canonical_folder.parent_path();
   ImageTimes times;
-  if (const auto euroc = home / "data.csv"; is_there(euroc)) {
+  if (const auto euroc = parent / "data.csv"; exists(euroc)) {
     times.ReadNamed(NumberRows(euroc, key.place(), key.path()), true);
-  } else if (const auto tum = home / (whole.filename().string() + ".txt"); is_there(tum)) {
+  } else if (const auto tum = parent / (canonical_folder.filename().string() + ".txt");
+             exists(tum)) {
     times.ReadNamed(NumberRows(tum, key.place(), key.path(), ' '), false);
-  } else if (const auto kitti = home / "times.txt"; is_there(kitti)) {
+  } else if (const auto kitti = parent / "times.txt"; exists(kitti)) {
     times.ReadPlain(NumberRows(kitti, key.place(), key.path()));
   } else {
     return std::nullopt;
@@ -42,18 +43,20 @@ std::optional<ImageTimes> ImageTimes::Beside(const std::filesystem::path& folder
   return times;
 }
 
-void ImageTimes::Check(const ImageReader& images, std::int64_t first, std::int64_t most) const {
+void ImageTimes::Check(const ImageReader& images, std::int64_t first,
+                       std::int64_t max_count) const {
   if (table_.empty() || images.is_video()) return;
-  const std::int64_t end = most > 0 ? std::min(images.size(), first + most) : images.size();
+  const std::int64_t end =
+      max_count > 0 ? std::min(images.size(), first + max_count) : images.size();
   for (std::int64_t k = first; k < end; ++k) {
     const Row& row = RowOf(k, images.name(k));
-    if (k == first || by_name_.empty()) continue;  // those by number increase
-    const Row& before = RowOf(k - 1, images.name(k - 1));
-    if (row.t > before.t) continue;
+    if (k == first || by_name_.empty()) continue;  // times by number are known to increase
+    const Row& previous = RowOf(k - 1, images.name(k - 1));
+    if (row.t > previous.t) continue;
     Fail(row.line,
-         "has a time for image " + images.name(k) + " that is not after that of " +
-             images.name(k - 1) + ", line " + std::to_string(before.line),
-         "times that increase, in the order of the names of the images");
+         "has a time for image " + images.name(k) + " that is not later than for " +
+             images.name(k - 1) + " in line " + std::to_string(previous.line),
+         "increasing times, in the order of the names of the images");
   }
   End(images.size());
 }
@@ -61,7 +64,7 @@ void ImageTimes::Check(const ImageReader& images, std::int64_t first, std::int64
 Timestamp ImageTimes::At(std::int64_t number, const std::string& name) {
   if (!table_.empty()) return RowOf(number, name).t;
   if (rate_hz_ > 0.0) return TimestampFromSeconds(static_cast<double>(number) / rate_hz_);
-  return ByTheClock();
+  return ElapsedTime();
 }
 
 void ImageTimes::End(std::int64_t count) const {
@@ -80,10 +83,11 @@ void ImageTimes::ReadNamed(NumberRows&& rows, bool in_ns) {
     const Timestamp t = in_ns ? rows.Index(0, "t_ns") : rows.Time(0, "t_s");
     const std::string name = std::filesystem::path(rows.text(1)).filename().string();
     if (!by_name_.emplace(name, Row{t, rows.line()}).second) {
-      rows.FailCell(1, "name", "is there twice", "each once");
+      rows.FailCell(1, "name", "occurs twice", "each image once");
     }
   }
-  if (by_name_.empty()) rows.FailLine("no rows", "a row `" + std::string(columns) + "` an image");
+  if (by_name_.empty())
+    rows.FailLine("no rows", "a row `" + std::string(columns) + "` for each image");
 }
 
 void ImageTimes::ReadPlain(NumberRows&& rows) {
@@ -93,8 +97,8 @@ void ImageTimes::ReadPlain(NumberRows&& rows) {
     const Timestamp t = rows.Time(0, "t_s");
     if (!by_number_.empty() && t <= by_number_.rbegin()->second.t) {
       rows.FailCell(0, "t_s",
-                    "is not after that of line " + std::to_string(by_number_.rbegin()->second.line),
-                    "times that increase");
+                    "is not later than in line " + std::to_string(by_number_.rbegin()->second.line),
+                    "increasing times");
     }
     by_number_.emplace_hint(by_number_.end(), std::ssize(by_number_), Row{t, rows.line()});
   }
@@ -109,11 +113,11 @@ const ImageTimes::Row& ImageTimes::RowOf(std::int64_t number, const std::string&
   }
   const auto found = by_number_.lower_bound(number);
   if (found != by_number_.end() && found->first == number) return found->second;
-  const auto near = found == by_number_.end() ? std::prev(found) : found;
-  Fail(near->second.line, "has no time for image " + std::to_string(number));
+  const auto nearest = found == by_number_.end() ? std::prev(found) : found;
+  Fail(nearest->second.line, "has no time for image " + std::to_string(number));
 }
 
-Timestamp ImageTimes::ByTheClock() {
+Timestamp ImageTimes::ElapsedTime() {
   const auto now = std::chrono::steady_clock::now();
   if (!first_) first_ = now;
   return std::chrono::nanoseconds(now - *first_).count();

@@ -15,36 +15,40 @@
 
 namespace alidade {
 
-/// When images were taken: by a table `frame,t_s` that has each of them, by a table of their names,
-/// at a rate, or as they come. Tables are read whole when this is made.
+/// Times of images: from a table `frame,t_s`, from a table of file names, at a constant rate, or
+/// from the clock. The constructor reads a whole table.
 ///
-/// Errors       kBadData, with file and line: an image without a time; times that do not increase;
-///              a time without an image in a table by number, for an image that is gone would give
+/// Errors       kBadData with file and line, if an image has no time, if times do not increase, or
+/// if
+///              a table by number has a time without an image: with a missing image, the times of
+///              the images after it would be wrong.
 ///              those after it the times of others.
 class ImageTimes {
  public:
-  /// By the clock, counted from the first image: a camera.
+  /// Times by the clock, counted from the first image, for a live camera.
   ImageTimes() = default;
   explicit ImageTimes(double rate_hz) : rate_hz_(rate_hz) {}
   ImageTimes(const std::filesystem::path& table, const Node& key);
 
-  /// The table of a folder of images where one of these has it; none where none has.
+  /// Returns the times in the table of a folder of images, or nullopt if it has none of these
+  /// tables:
   ///
   ///   FOLDER/timestamps.csv    frame,t_s      counted from 0
   ///   FOLDER/../data.csv       t_ns,name      EuRoC: mav0/cam0/data
   ///   FOLDER/../FOLDER.txt     t_s name       TUM: rgb and rgb.txt
-  ///   FOLDER/../times.txt      t_s            KITTI: image_0, a row for each
+  ///   FOLDER/../times.txt      t_s            KITTI: image_0, a row for each image
   ///
-  /// `by_layout`: any of them, else the first alone.
-  static std::optional<ImageTimes> Beside(const std::filesystem::path& folder, bool by_layout,
-                                          const Node& key);
+  /// Without `by_layout` only the first table is read.
+  static std::optional<ImageTimes> FindNextTo(const std::filesystem::path& folder, bool by_layout,
+                                              const Node& key);
 
-  /// Whether each of the images of a folder from `first` on, `most` of them or all if that is 0,
-  /// has a time, after that of the one before. Of a video that is seen as they come.
-  void Check(const ImageReader& images, std::int64_t first, std::int64_t most) const;
-  /// Of image `number`, from 0, of that file name.
+  /// Checks that each image of a folder from number `first` on has a time after that of the image
+  /// before it. Checks `max_count` images, or all if it is 0. The times of a video are checked as
+  /// its images are read.
+  void Check(const ImageReader& images, std::int64_t first, std::int64_t max_count) const;
+  /// Returns the time of image `number`, counted from 0, with the file name `name`.
   Timestamp At(std::int64_t number, const std::string& name);
-  /// After the last of all images.
+  /// Checks, after the last image, that the table has no times for images beyond `count`.
   void End(std::int64_t count) const;
 
  private:
@@ -57,12 +61,12 @@ class ImageTimes {
   void ReadPlain(NumberRows&& rows);
 
   const Row& RowOf(std::int64_t number, const std::string& name) const;
-  Timestamp ByTheClock();
+  Timestamp ElapsedTime();
   [[noreturn]] void Fail(int line, const std::string& what,
                          const char* expected = "a time for each image") const;
 
   double rate_hz_ = 0.0;
-  std::string table_;  ///< file of the times below; empty: there is none
+  std::string table_;  ///< file of the times below, or ""
   std::map<std::string, Row> by_name_;
   std::map<std::int64_t, Row> by_number_;
   std::optional<std::chrono::steady_clock::time_point> first_;

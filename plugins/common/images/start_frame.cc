@@ -6,7 +6,7 @@
 namespace alidade {
 
 StartFrame::StartFrame(Params& p, const Node& entry)
-    : number_(p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0)) {
+    : number_(p.Integer("start_frame", "images before this one are skipped", 0, 1 << 30, 0)) {
   if (const auto node = entry.Find("start_frame")) {
     place_ = node->place();
     path_ = node->path();

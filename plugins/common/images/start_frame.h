@@ -11,17 +11,19 @@
 
 namespace alidade {
 
-/// The key `start_frame` of a source of images: those before it are left out.
+/// Key `start_frame` of a source of images. The images before it are skipped.
 class StartFrame {
  public:
   StartFrame(Params& p, const Node& entry);
 
   std::int64_t number() const { return number_; }
-  /// Of that many images, those from it on.
-  std::int64_t Left(std::int64_t count) const { return std::max<std::int64_t>(0, count - number_); }
-  /// Fails where images of that number end before it. Errors: kBadConfig.
+  /// Returns the number of images of `count` that remain.
+  std::int64_t Remaining(std::int64_t count) const {
+    return std::max<std::int64_t>(0, count - number_);
+  }
+  /// Fails if `count` images end before it. Errors: kBadConfig.
   void Check(std::int64_t count) const;
-  /// The same as soon as it is known: of a folder; a video says what it has at its end alone.
+  /// Checks the images of a folder before they are read. A video only reports its size at its end.
   void Check(const ImageReader& images) const;
 
  private:

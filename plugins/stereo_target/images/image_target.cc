@@ -93,8 +93,8 @@ class ImageTarget : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return left_->place(); }
   std::int64_t size() const override {
-    const std::int64_t left = start_.Left(left_->size());
-    return max_frames_ > 0 ? std::min(max_frames_, left) : left;
+    const std::int64_t remaining = start_.Remaining(left_->size());
+    return max_frames_ > 0 ? std::min(max_frames_, remaining) : remaining;
   }
   bool sees() const override { return true; }
   SeenImage Seen() const override {

@@ -68,8 +68,8 @@ class ImageTracks : public Source {
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
     if (images_->size() <= 0) return most_ > 0 ? most_ : -1;  // a camera, or a video that is silent
-    const std::int64_t left = start_.Left(images_->size());
-    return most_ > 0 ? std::min(most_, left) : left;
+    const std::int64_t remaining = start_.Remaining(images_->size());
+    return most_ > 0 ? std::min(most_, remaining) : remaining;
   }
   bool sees() const override { return true; }
   SeenImage Seen() const override { return {ToGreyImage(image_)}; }
@@ -214,7 +214,7 @@ class ImageTracks : public Source {
       return std::nullopt;
     };
     if (rate_hz_ == 0.0 && !images_->is_live()) {
-      times_ = ImageTimes::Beside(home, /*by_layout=*/!images_->is_video(), key);
+      times_ = ImageTimes::FindNextTo(home, /*by_layout=*/!images_->is_video(), key);
       if (!times_) rate_hz_ = images_->rate_hz();
       if (!times_ && !(rate_hz_ > 0.0)) {
         key.Fail("no timestamps.csv next to the images",

@@ -20,7 +20,7 @@ TEST_F(Csv, WrongNumberOfColumns) {
 
 TEST_F(Csv, BytesThatAreNoText) {
   const std::string expected =
-      "FILE:1:1: bytes that are no text; expected a table; a compressed one by a pipe: zcat FILE | "
+      "FILE:1:1: not a text file; expected a table; for a compressed one use a pipe: zcat FILE | "
       "alidade run CONFIG --set source.path=-";
   ExpectBadData("\x1F\x8B\x08\x01,t_s\n", expected);
   ExpectBadData(std::string("t\0_\0s\0\n", 7), expected);
@@ -107,11 +107,11 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 // FAULTS 35, 36
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
-                "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
+                "FILE:5:1 t_s: '0.1' is before line 3; expected increasing times, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'");
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
-                "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
-                "increase, 'time.repeats: true', by which rows of one time are one frame, or "
+                "FILE:4:1 t_s: '0.2000000001' is equal to line 3; expected increasing times, "
+                "or 'time.repeats: true', which joins rows of one time into a frame, or "
                 "'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
@@ -158,7 +158,7 @@ TEST_F(Csv, MissingIsTheTextOfACell) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nmissing: .nan\nstreams: {z: z}\n",
                   "run.yaml:2:10 missing: '.nan' is not the text of a cell; expected the text as "
-                  "the table has it; did you mean 'nan'?");
+                  "it is in the table; did you mean 'nan'?");
 }
 
 TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {
@@ -182,7 +182,7 @@ TEST_F(Csv, UnknownAndMissingKeys) {
   ExpectBadConfig("path: a.csv\nstreams: {d: scale}\nblind_afer: 0.5\n",
                   "run.yaml:3:1 blind_afer: unknown key; did you mean 'blind_after'?");
   ExpectBadConfig("path: a.csv\nstreams: {}\n",
-                  "run.yaml:2:10 streams: no streams; expected a map, as in 'disparity: "
+                  "run.yaml:2:10 streams: no streams; expected a map, such as 'disparity: "
                   "disparity_px'");
   ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by csv");
 }
@@ -190,8 +190,8 @@ TEST_F(Csv, UnknownAndMissingKeys) {
 TEST_F(Csv, GainOfNothing) {
   Write("t_s,z\n0,1\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: {columns: z, gain: 0}}\n",
-                  "run.yaml:2:33 streams.z.gain: 0 leaves nothing of the column; expected a number "
-                  "but 0");
+                  "run.yaml:2:33 streams.z.gain: a gain of 0 erases the column; expected a number "
+                  "other than 0");
 }
 
 TEST_F(Csv, TimeAndRateExcludeEachOther) {

@@ -105,7 +105,7 @@ TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   ExpectError(ExitCode::kBadData, "FILE:4:3 r: 'x' is not a number; expected a finite number",
               [&] { source->Next(frame); });
   ExpectBadData("t_s,r\n1,21\n0,22\n",
-                "FILE:3:1 t_s: '0' is before line 2; expected times that increase, or "
+                "FILE:3:1 t_s: '0' is before line 2; expected increasing times, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'",
                 "path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
   Write("t_s,r\n0,21\nO,22\n");
@@ -136,8 +136,8 @@ TEST_F(Csv, SeparatesAsTold) {
   Write("t_s\tz\tw\n0\t\t5\n");
   EXPECT_EQ(Held(Frames("path: a.csv\nseparator: \"\\t\"\nstreams: {z: z, w: w}\n")[0]), "1 |");
   ExpectBadConfig("path: a.csv\nseparator: \"1\"\nstreams: {z: z}\n",
-                  "run.yaml:2:12 separator: not a separator; expected one character that numbers "
-                  "do not hold, as in ';' or \"\\t\"");
+                  "run.yaml:2:12 separator: not a separator; expected one character that does not "
+                  "occur in numbers, such as ';' or \"\\t\"");
 }
 
 TEST_F(Csv, EmptyCellIsMissing) {
@@ -275,18 +275,17 @@ TEST_F(Csv, BlindNamesTheStreams) {
                   "run.yaml:5:9 blind[0]: no stream 'disparty'; expected one of disparity, "
                   "inverse_scale; did you mean 'disparity'?");
   ExpectBadConfig(kDepthConfig + std::string("blind: disparity\n"),
-                  "run.yaml:4:8 blind: without 'blind_after' no stream goes blind; expected "
-                  "'blind_after' with it");
+                  "run.yaml:4:8 blind: has no effect without 'blind_after'; expected "
+                  "'blind_after' too");
 }
 
 TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {
   Write(std::string(kHeader) + "1,1,2,3\n0,1,2,3\n");
   any_order_ = true;
   ExpectBadConfig(kDepthConfig + std::string("blind_after: 0.5\n"),
-                  "run.yaml:4:14 blind_after: counts rows as the file has them, not as "
-                  "'out_of_sequence.policy' puts them; expected 'out_of_sequence.policy: reject', "
-                  "which asks for a file in "
-                  "the order of time");
+                  "run.yaml:4:14 blind_after: counts the rows in the order of the file, but "
+                  "'out_of_sequence.policy' reorders them; expected 'out_of_sequence.policy: "
+                  "reject', for a file in the order of time");
   EXPECT_EQ(Frames(kDepthConfig + std::string("blind_after: 1\n")).size(), 2u);
 }
 

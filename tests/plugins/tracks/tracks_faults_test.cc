@@ -97,13 +97,13 @@ TEST_F(TracksTest, Fault36FramesGoBackwards) {
 TEST_F(TracksTest, Fault36TimesGoBackwards) {
   Write("timestamps.csv", "frame,t_s\n0,0.5\n1,0.5\n");
   ExpectBadData(kGood,
-                "DIR/timestamps.csv:3:3 t_s: '0.5' is not after that of line 2; expected "
-                "times that increase",
+                "DIR/timestamps.csv:3:3 t_s: '0.5' is not later than in line 2; expected "
+                "increasing times",
                 "measures: pixel");
   Write("timestamps.csv", "0,0.5\n0,0.6\n");
   ExpectBadData(kGood,
-                "DIR/timestamps.csv:2:1 frame: '0' is not after that of line 1; expected "
-                "frames in order, each once",
+                "DIR/timestamps.csv:2:1 frame: '0' is not larger than in line 1; expected "
+                "increasing frames",
                 "measures: pixel");
 }
 
@@ -171,8 +171,8 @@ TEST_F(TracksTest, FaultsOfOdometry) {
   const std::string header = "frame,wx_rad_s,wy_rad_s,wz_rad_s,vx_m_s,vy_m_s,vz_m_s\n";
   Write("odometry.csv", header + "1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n");
   ExpectBadData(kGood + kFrameTwo,
-                "DIR/odometry.csv:3:1 frame: '1' is not after that of line 2; "
-                "expected frames in order, each once");
+                "DIR/odometry.csv:3:1 frame: '1' is not larger than in line 2; "
+                "expected increasing frames");
   Write("odometry.csv", header + "0,0,0,nan,0,0,0\n");
   ExpectBadData(kGood,
                 "DIR/odometry.csv:2:7 wz_rad_s: 'nan' is not finite; expected a finite "

@@ -107,7 +107,7 @@ bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const CheckArgume
 /// Checks the models with the parameters in the config of a run. Returns true if a check failed.
 bool CheckAllAndPrint(const std::vector<PluginEntry>& entries, const Config& config,
                       CheckOptions options) {
-  options.other_keys = true;
+  options.allows_unread_keys = true;
   bool failed = false, found = false;
   constexpr std::pair<const char*, const char*> kSections[] = {{"state", kMotionKind},
                                                                {"sensors", kSensorKind}};

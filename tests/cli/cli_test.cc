@@ -354,7 +354,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
         "rejection_recovery.after", "[1, 1e+06]", "inf", "on_divergence"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
-  EXPECT_TRUE(Contains(ekf.out, "its own state, sensors, landmarks and initial_time_s, merged in"));
+  EXPECT_TRUE(Contains(ekf.out, "state, sensors, landmarks and initial_time_s of this estimator"));
   EXPECT_TRUE(Contains(Call({"plugins", "info", "ekf", "--json"}).out, "\"estimator\""));
   const Outcome iekf = Call({"plugins", "info", "iekf"});
   for (const char* part : {"iekf: estimator", "max_iterations", "[2, 1000]", "tolerance"}) {

@@ -75,7 +75,7 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   for (const char* part :
        {"(iekf)", "max_iterations      10", "tolerance           1e-04 sigma of the posterior",
         "blocks estimated or constant; roles estimate, known;",
-        "Not: consider blocks and roles, jacobian_at measurement"}) {
+        "Not supported: consider blocks and roles, jacobian_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
   }
   EXPECT_FALSE(Contains(iekf.out, "loss  ")) << iekf.out;
@@ -84,24 +84,24 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
 TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome none = Call({"explain", "config.yaml"});
   EXPECT_FALSE(Contains(none.out, "constant: ")) << none.out;
-  EXPECT_FALSE(Contains(none.out, "nothing for")) << none.out;
+  EXPECT_FALSE(Contains(none.out, "no effect for")) << none.out;
   // 3.3 +- 0.5 in the config.
   const Outcome one =
       Call({"explain", "config.yaml", "--set", "state.template.constant=[inverse_distance]"});
   for (const char* part : {"inverse_distance  3.3, exact\n",
-                           "    constant: known exactly, without covariance; nothing",
+                           "    constant: known exactly, without covariance; never changes\n",
                            "template  constant           none ",
                            "template.inverse_distance  -       knows     -         knows\n"}) {
     EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
   }
-  EXPECT_FALSE(Contains(one.out, "nothing for")) << one.out;
+  EXPECT_FALSE(Contains(one.out, "no effect for")) << one.out;
   const Outcome considered =
       Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
-  EXPECT_TRUE(Contains(considered.out, "in a row; nothing for stereo\n")) << considered.out;
+  EXPECT_TRUE(Contains(considered.out, "in a row; no effect for stereo\n")) << considered.out;
   // Stereo sees nothing but a constant block.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.constant=[depth, depth_rate]"});
-  EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; nothing for stereo\n"))
+  EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; no effect for stereo\n"))
       << all.out;
 }
 

@@ -871,7 +871,8 @@ TEST_F(ImageTracks, ExplainSaysWhoGuidesAndWhoseTheNoiseIs) {
   MakeImages();
   const Outcome explained = Call({"explain", "config.yaml", "--set", "source.estimate_noise=true"});
   EXPECT_EQ(explained.code, 0) << explained.err;
-  EXPECT_TRUE(Contains(explained.out, "guide: filter 'ekf' says where to look")) << explained.out;
+  EXPECT_TRUE(Contains(explained.out, "guide: filter 'ekf' predicts the search regions"))
+      << explained.out;
   EXPECT_TRUE(Contains(explained.out, "estimate_noise  true")) << explained.out;
   const Outcome alone = Call({"explain", "config.yaml", "--set", "source.guide=none"});
   EXPECT_FALSE(Contains(alone.out, "guide: filter")) << alone.out;

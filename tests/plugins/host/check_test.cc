@@ -21,7 +21,7 @@ using Verdict = Finding::Verdict;
 std::vector<std::string> Failures(const std::vector<Finding>& findings) {
   std::vector<std::string> failures;
   for (const Finding& finding : findings) {
-    if (finding.verdict == Verdict::kFail) failures.push_back(finding.check + ": " + finding.words);
+    if (finding.verdict == Verdict::kFail) failures.push_back(finding.check + ": " + finding.text);
   }
   return failures;
 }
@@ -84,17 +84,19 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{60, "nan_output", "outputs", {"Predict at x = 0, y = ", "z.second is nan"}},
         Fault{60, "nan_noise", "noise", {"SqrtNoise at", "entry (0, 0) is nan"}},
         Fault{60, "infinite_q", "noise", {"SqrtQ at", "dt = ", "entry (0, 0) is -inf"}},
-        Fault{61, "past_the_end", "bounds", {"Predict at", "writes past its buffer of z"}},
+        Fault{61, "past_the_end", "bounds", {"Predict at", "writes outside its buffer of z"}},
         Fault{61, "writes_its_input", "bounds", {"Predict at", "writes to its input y"}},
-        Fault{61, "ignores_strides", "bounds", {"writes past its buffer of Jacobian 0"}},
+        Fault{61, "ignores_strides", "bounds", {"writes outside its buffer of Jacobian 0"}},
         Fault{62, "wrong_jacobian", "jacobian", {"Predict: d z.second / d x is", "by differences"}},
         Fault{63,
               "two_values",
               "same_value",
-              {"differs with all Jacobians and with none: z = (", " apart"}},
-        Fault{
-            64, "not_deterministic", "deterministic", {"Predict at", "two calls in a row differ"}},
-        Fault{65, "hidden_state", "pure", {"Predict at", "depends on what was called before"}},
+              {"with all Jacobians differs from the value with none: z = (", " apart"}},
+        Fault{64,
+              "not_deterministic",
+              "deterministic",
+              {"Predict at", "two consecutive calls differ"}},
+        Fault{65, "hidden_state", "pure", {"Predict at", "depends on earlier calls"}},
         Fault{66, "crashes", "calls", {"Predict crashed (signal 11", "; at x = "}},
         Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
         Fault{
@@ -110,42 +112,48 @@ INSTANTIATE_TEST_SUITE_P(
               "hangs",
               "calls",
               {"the check took longer than 1 s (--timeout); it was in Predict at x = "}},
-        Fault{68, "leaks", "leaks", {"Predict loses 10", "bytes each time"}},
-        Fault{68, "loses_itself", "leaks", {"create and destroy loses", "bytes each time"}},
+        Fault{68, "leaks", "leaks", {"Predict leaks 10", "bytes per call"}},
+        Fault{68, "loses_itself", "leaks", {"create and destroy leaks", "bytes per call"}},
         Fault{68, "leaks_files", "leaks", {"Predict leaves files open"}},
         Fault{69, "rounds_upward", "environment", {"Predict changed the rounding mode"}},
         Fault{69, "sets_locale", "environment", {"Predict changed the locale from 'C'"}},
         Fault{0, "prints", "environment", {"the model prints", "output of a run: 'hello'"}},
-        Fault{0, "eats_memory", "calls", {"Predict at", "std::bad_alloc; it may take 64 MB"}},
+        Fault{0, "eats_memory", "calls", {"Predict at", "std::bad_alloc; the limit is 64 MB"}},
         Fault{0, "singular_noise", "noise", {"R is singular: smallest eigenvalue"}},
         Fault{0, "no_noise", "noise", {"R is singular: no noise on z.second"}},
-        Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but wrote an output"}},
-        Fault{0, "strange_status", "calls", {"returned 77, which is not a status"}},
+        Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but writes an output"}},
+        Fault{0, "strange_status", "calls", {"returned 77, which is not a valid status"}},
         Fault{0, "nowhere_defined", "calls", {"Predict is defined at 0 of", "--states N"}},
-        Fault{0, "wrong_inverse", "initialise", {"Initialise at", "gives x = ", "Predict gives z"}},
-        Fault{0, "wrong_landmark", "initialise", {"prior = ", "gives bearing = ", ", rho = "}},
-        Fault{61, "past_the_landmark", "bounds", {"Initialise at", "past its buffer of rho"}},
-        Fault{0, "two_covers", "double_cover", {"q and -q of orientation are not the same"}},
+        Fault{0,
+              "wrong_inverse",
+              "initialise",
+              {"Initialise at", "returns x = ", "Predict returns z"}},
+        Fault{0, "wrong_landmark", "initialise", {"prior = ", "returns bearing = ", ", rho = "}},
+        Fault{61, "past_the_landmark", "bounds", {"Initialise at", "outside its buffer of rho"}},
+        Fault{0, "two_covers", "double_cover", {"q and -q of orientation yield different results"}},
         Fault{0,
               "two_covers_of_a_part",
               "double_cover",
-              {"Initialise at", "q and -q of pose are not the same"}},
-        Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise moves it"}},
+              {"Initialise at", "q and -q of pose yield different results"}},
+        Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise changes the state"}},
         Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
         Fault{0, "euler_overstated", "step", {"of order 2 in dt, not 3", "kStepOrder = N"}},
-        Fault{0, "drifts", "step", {"a step over dt = 0 without noise moves it"}},
+        Fault{0, "drifts", "step", {"a step over dt = 0 without noise changes the state"}},
         Fault{0,
               "held_undeclared",
               "noise_kind",
-              {"declares continuous noise, but", "47 % off", "NoiseKind::kDiscrete; }`"}},
+              {"declares continuous noise, but", "differs from that over dt by 47 %",
+               "NoiseKind::kDiscrete; }`"}},
         Fault{0,
               "adds_up_undeclared",
               "noise_kind",
-              {"declares discrete noise, but", "50 % off", "NoiseKind::kContinuous"}},
+              {"declares discrete noise, but", "differs from that over dt by 50 %",
+               "NoiseKind::kContinuous"}},
         Fault{0,
               "noise_of_each_step",
               "noise_kind",
-              {"declares continuous noise, but", "100 % off", "depends on the number of steps"}}),
+              {"declares continuous noise, but", "differs from that over dt by 100 %",
+               "depends on the number of steps"}}),
     Name);
 
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
@@ -198,7 +206,7 @@ TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
 TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
   const auto findings = Checked("wrong_jacobian");
   const auto is = [](const Finding& finding) { return finding.check == "jacobian"; };
-  const std::string words = std::find_if(findings.begin(), findings.end(), is)->words;
+  const std::string words = std::find_if(findings.begin(), findings.end(), is)->text;
   double written = 0.0, numeric = 0.0, x = 0.0, y = 0.0;
   ASSERT_EQ(std::sscanf(words.c_str(),
                         "Predict: d z.second / d x is %lf from the model, %lf by differences; "
@@ -218,7 +226,7 @@ TEST_F(CheckTest, SkipsWhatAFailureLeavesUnsaid) {
   ASSERT_NE(failed, findings.end());
   for (auto later = failed + 1; later != findings.end(); ++later) {
     EXPECT_EQ(later->verdict, Verdict::kSkipped) << later->check;
-    EXPECT_EQ(later->words, "'deterministic' failed");
+    EXPECT_EQ(later->text, "'deterministic' failed");
   }
 }
 

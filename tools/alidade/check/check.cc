@@ -21,38 +21,38 @@ using internal::ChildEnd;
 using internal::Context;
 using internal::NumberText;
 
-/// The child's answers: a verdict, or an error of the set-up with its exit code.
+/// First characters of the child's answer: a set-up error, or a verdict.
 constexpr char kError = 'E';
 constexpr char kVerdicts[] = {'+', '-', '0'};
 
 std::string Encode(const Finding& finding) {
-  return kVerdicts[static_cast<int>(finding.verdict)] + finding.words;
+  return kVerdicts[static_cast<int>(finding.verdict)] + finding.text;
 }
 
 Finding Decode(const std::string& answer) {
-  if (answer.empty()) return internal::Fail("gave no verdict");
+  if (answer.empty()) return internal::Fail("the check returned no verdict");
   if (answer.front() == kError) throw Error(ExitCode::kBadConfig, answer.substr(1));
-  const auto* at = std::find(std::begin(kVerdicts), std::end(kVerdicts), answer.front());
-  if (at == std::end(kVerdicts)) return internal::Fail("gave no verdict");
-  return {static_cast<Finding::Verdict>(at - kVerdicts), "", answer.substr(1)};
+  const auto* verdict = std::find(std::begin(kVerdicts), std::end(kVerdicts), answer.front());
+  if (verdict == std::end(kVerdicts)) return internal::Fail("the check returned no verdict");
+  return {static_cast<Finding::Verdict>(verdict - kVerdicts), "", answer.substr(1)};
 }
 
-/// How the child ended, in words, and in which call.
-std::string EndWords(const ChildEnd& end, const internal::CallRecord& record, double timeout_s) {
-  const std::string at = record.state().empty() ? "" : " at " + record.state();
-  if (end.late) {
-    const std::string where =
-        record.call().empty() ? "before its first call" : "in " + record.call() + at;
+/// Describes how the child ended, and in which call.
+std::string EndText(const ChildEnd& end, const internal::CallRecord& record, double timeout_s) {
+  const std::string state = record.state().empty() ? "" : " at " + record.state();
+  if (end.timed_out) {
+    const std::string place =
+        record.call().empty() ? "before its first call" : "in " + record.call() + state;
     return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it was " +
-           where;
+           place;
   }
-  std::string words = record.call().empty() ? "the check" : record.call();
-  words += ' ' + end.text;
-  if (!record.state().empty()) words += "; at " + record.state();
-  return words;
+  std::string text = record.call().empty() ? "the check" : record.call();
+  text += ' ' + end.text;
+  if (!record.state().empty()) text += "; at " + record.state();
+  return text;
 }
 
-/// One check, in a child process.
+/// Runs one check in a child process. Sets `ended` if the child ended without an answer.
 Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& parameters,
                  const CheckOptions& options, bool& ended) {
   internal::CallRecord record;
@@ -72,16 +72,18 @@ Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& param
   const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, work);
   ended = !end.answered;
   Finding finding =
-      end.answered ? Decode(end.text) : internal::Fail(EndWords(end, record, options.timeout_s));
+      end.answered ? Decode(end.text) : internal::Fail(EndText(end, record, options.timeout_s));
   if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
       !end.printed.empty()) {
-    finding = internal::Fail("the model prints, which goes into the output of a run: '" +
+    finding = internal::Fail("the model prints, which would mix with the output of a run: '" +
                              end.printed + "'");
   }
-  const auto says = [&](const char* what) { return finding.words.find(what) != std::string::npos; };
-  // The second is what a thread without room for its stack throws.
-  if (says("std::bad_alloc") || says("Resource temporarily unavailable")) {
-    finding.words += "; it may take " + std::to_string(options.memory_mb) + " MB (--memory)";
+  const auto contains = [&](const char* words) {
+    return finding.text.find(words) != std::string::npos;
+  };
+  // A thread whose stack cannot be allocated throws the second error.
+  if (contains("std::bad_alloc") || contains("Resource temporarily unavailable")) {
+    finding.text += "; the limit is " + std::to_string(options.memory_mb) + " MB (--memory)";
   }
   return finding;
 }
@@ -125,17 +127,14 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
     return stem == plugin || stem == "alidade_" + plugin;
   });
   collect([&](const PluginEntry& entry) { return entry.name == plugin; });
-  const auto fail = [&](const std::string& what, const std::string& wanted) {
-    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, what, {}, Nearest(wanted, names)));
-  };
   if (found.empty()) {
-    const auto other = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
+    const auto entry_of_name = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
     const bool built_in = internal::FindEstimatorType(plugin) != nullptr;
-    if (built_in || other != host.entries().end()) {
-      const std::string is = built_in ? "built-in estimator" : other->kind;
+    if (built_in || entry_of_name != host.entries().end()) {
+      const std::string kind = built_in ? "built-in estimator" : entry_of_name->kind;
       throw Error(ExitCode::kPlugin,
-                  ErrorLine({}, {}, "'" + plugin + "' is " + internal::WithArticle(is),
-                            "a sensor or motion model, which is what is checked"));
+                  ErrorLine({}, {}, "'" + plugin + "' is " + internal::WithArticle(kind),
+                            "a sensor or motion model"));
     }
     for (const PluginEntry& entry : host.entries()) {
       if (entry.is_model()) names.push_back(entry.name);
@@ -148,7 +147,11 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
   if (model.empty()) return found;
   for (const PluginEntry& entry : found) names.push_back(entry.name);
   std::erase_if(found, [&](const PluginEntry& entry) { return entry.name != model; });
-  if (found.empty()) fail("plugin '" + plugin + "' offers no model '" + model + "'", model);
+  if (found.empty()) {
+    throw Error(ExitCode::kPlugin,
+                ErrorLine({}, {}, "plugin '" + plugin + "' offers no model '" + model + "'", {},
+                          Nearest(model, names)));
+  }
   return found;
 }
 
@@ -156,9 +159,9 @@ std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& find
   constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
   std::vector<internal::TextRow> rows;
   for (const Finding& finding : findings) {
-    std::string words = finding.words;
-    std::replace(words.begin(), words.end(), '\n', ' ');
-    rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, words});
+    std::string text = finding.text;
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, text});
   }
   return entry.name + " (" + entry.kind + " of " + entry.plugin.string() + ")\n" +
          internal::TextTable(rows, 2);

@@ -7,46 +7,46 @@
 
 #include "alidade/plugin/plugin_host.h"
 
-/// Whether a model of a plugin keeps the rules of plugin_abi.h, tried in a process of its own.
+/// Checks that a plugin's models obey the rules of plugin_abi.h, in separate processes.
 namespace alidade {
 
-/// What is tried, and how far a plugin may go.
+/// Tested states and resource limits.
 struct CheckOptions {
-  std::uint64_t seed = 1;   ///< of the states
-  int states = 48;          ///< random ones, besides those at the edges
+  std::uint64_t seed = 1;   ///< seed of the random states
+  int states = 48;          ///< number of random states; edge states are added
   double timeout_s = 10.0;  ///< wall-clock time of one check
-  int memory_mb = 1024;     ///< that the model may take
-  /// A Step that is additive in dt only up to an error of this order passes (2: Euler); 0: of the
-  /// order that the model declares, if it does, else exactly.
+  int memory_mb = 1024;     ///< memory that the model may allocate
+  /// Order up to which Step must be additive in dt (2: Euler). 0: the order that the model
+  /// declares, or exactly if it declares none.
   int step_order = 0;
-  /// The parameters may have keys that the model does not read, as an entry of a run's config has.
-  bool other_keys = false;
+  /// Accepts parameters that the model does not read, as in an entry of a run's config.
+  bool allows_unread_keys = false;
 };
 
-/// What came of one check.
+/// Result of one check.
 struct Finding {
   enum class Verdict { kOk, kFail, kSkipped };
   Verdict verdict = Verdict::kSkipped;
   std::string check;  ///< `jacobian`
-  std::string words;  ///< what was seen; of a failure the call, the state and the numbers
+  std::string text;   ///< result of the check; for a failure the call, the state and the numbers
 };
 
-/// Checks the model `entry` of `host` made from `parameters`, each check in a child process with
-/// the limits of `options`. After one on which the rest depends has failed, the rest is skipped.
-/// docs/check.md lists the checks. Errors: kBadConfig where the parameters do not fit.
+/// Checks the model that `entry` creates from `parameters`. Each check runs in a child process with
+/// the limits of `options`. If a check fails that others depend on, the remaining checks are
+/// skipped. docs/check.md lists the checks. Errors: kBadConfig if the parameters are wrong.
 std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
                                 const CheckOptions& options = {});
 
-/// The sensors and motion models of `plugin`: a file, a file's name on the search path without
-/// `alidade_` and `.so`, or the name of a model; of these the one named `model` unless that is "".
-/// Errors: kPlugin where there is none.
+/// Finds the sensors and motion models of `plugin`: a file, the name of a file on the search path
+/// without `alidade_` and `.so`, or the name of a model. `model` selects one of them by name; "":
+/// all. Errors: kPlugin if there is no such model.
 std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& plugin,
                                     const std::string& model = "");
 
-/// Findings as lines `verdict  check  words`, below the name of the model.
+/// Formats the findings as lines `verdict  check  text`, below the name of the model.
 std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& findings);
 
-/// Whether one of the findings is a failure.
+/// Returns true if one of the findings is a failure.
 bool AnyFailure(const std::vector<Finding>& findings);
 
 }  // namespace alidade

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLarge = 1e6;  // the largest edge of RandomStates
 
-/// Whether a large state has an infinite value, which says nothing against the model.
+/// Returns true if a value is infinite at a large state, which is not an error of the model.
 bool Overflows(const CheckedState& state, const Answer& answer) {
   bool large = false, infinite = false;
   for (const auto& value : state.values) {
@@ -55,11 +55,11 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
-  std::string thrown;  // of which the host warns alone
+  std::string thrown;  // the host reports an exception of a destructor as a warning only
   record_.Enter("destroy");
   {
-    const auto take = [&](LogLevel, std::string_view text) { thrown = text; };
-    const LogSubscription warnings(LogLevel::kWarning, take);
+    const auto record_text = [&](LogLevel, std::string_view text) { thrown = text; };
+    const LogSubscription warnings(LogLevel::kWarning, record_text);
     model.reset();
   }
   record_.Enter("");
@@ -91,7 +91,7 @@ Answer Context::CallWith(const Function& f, const Values& inputs, int matrices) 
   return answer;
 }
 
-std::string Context::Where(const Function& f, const Values& inputs) const {
+std::string Context::CallText(const Function& f, const Values& inputs) const {
   return f.name + " at " + StateText(InputSpaces(f), inputs);
 }
 

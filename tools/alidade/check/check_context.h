@@ -9,22 +9,22 @@
 #include "alidade/check/child_process.h"
 #include "alidade/check/model_under_test.h"
 
-/// The checks that `alidade check` makes of a model, one function each.
+/// Checks of `alidade check`, one function each.
 namespace alidade::internal {
 
-/// Values of all slots of a model. `defined`: Predict or Step is defined there; then the slot of a
-/// sensor's measurement holds what Predict gave.
+/// Values of all slots of a model. If `defined`, Predict or Step is defined at the state, and the
+/// measurement slot of a sensor contains the result of Predict.
 struct CheckedState {
   Values values;
   bool defined = false;
 };
 
-/// What a check works with, in the child process.
+/// The model under test and its states, in the child process of a check.
 class Context {
  public:
   Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
           CallRecord& record);
-  /// The destruction of the model is noted as a call.
+  /// Records the destruction of the model as a call.
   ~Context() {
     if (model_) record_.Enter("destroy");
   }
@@ -34,25 +34,25 @@ class Context {
   const ModelUnderTest& model() const { return *model_; }
   const CheckOptions& options() const { return options_; }
   const std::vector<CheckedState>& states();
-  /// Sensor: Predict. Motion: Step.
+  /// Returns Predict of a sensor or Step of a motion model.
   const Function& main() const { return model_->functions.front(); }
 
-  /// Error kBadConfig where a parameter is given that the model does not read.
+  /// Error: kBadConfig if the model does not read a given parameter.
   void RejectUnread() const { parameters_.RejectUnread(); }
-  /// Another instance with the same parameters.
+  /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
-  /// Destroys `model`, which is written down as a call. Error: kPlugin where that throws.
+  /// Destroys `model` and records this as a call. Error: kPlugin if the destruction throws.
   void Destroy(std::unique_ptr<ModelUnderTest> model) const;
-  /// The inputs of `f` at a state.
+  /// Returns the inputs of `f` at a state.
   static Values Inputs(const Function& f, const CheckedState& state);
   Answer Call(const Function& f, const CheckedState& state, int matrices = kAllMatrices) const;
   Answer CallWith(const Function& f, const Values& inputs, int matrices) const;
-  /// `Predict at depth = 0.3`
-  std::string Where(const Function& f, const Values& inputs) const;
-  std::string Where(const Function& f, const CheckedState& state) const {
-    return Where(f, Inputs(f, state));
+  /// Returns a text such as `Predict at depth = 0.3`.
+  std::string CallText(const Function& f, const Values& inputs) const;
+  std::string CallText(const Function& f, const CheckedState& state) const {
+    return CallText(f, Inputs(f, state));
   }
-  /// Destroys the model; nothing else may be called after it.
+  /// Destroys the model. Do not call another function afterwards.
   void Close();
 
  private:
@@ -66,19 +66,17 @@ class Context {
   std::vector<CheckedState> states_;
 };
 
-inline Finding Ok(std::string words) { return {Finding::Verdict::kOk, "", std::move(words)}; }
-inline Finding Fail(std::string words) { return {Finding::Verdict::kFail, "", std::move(words)}; }
-inline Finding Skip(std::string words) {
-  return {Finding::Verdict::kSkipped, "", std::move(words)};
-}
+inline Finding Ok(std::string text) { return {Finding::Verdict::kOk, "", std::move(text)}; }
+inline Finding Fail(std::string text) { return {Finding::Verdict::kFail, "", std::move(text)}; }
+inline Finding Skip(std::string text) { return {Finding::Verdict::kSkipped, "", std::move(text)}; }
 
 struct Check {
   const char* name;
   Finding (*run)(Context&);
-  bool needed;  ///< by all that follow
+  bool needed;  ///< all later checks depend on it
 };
 
-// Of the rules of the plugin ABI.
+// Rules of the plugin ABI.
 Finding CheckCreate(Context& context);
 Finding CheckCalls(Context& context);
 Finding CheckBounds(Context& context);
@@ -88,7 +86,7 @@ Finding CheckPure(Context& context);
 Finding CheckOutputs(Context& context);
 Finding CheckFailure(Context& context);
 Finding CheckLeaks(Context& context);
-// Of the mathematics.
+// Mathematics.
 Finding CheckSameValue(Context& context);
 Finding CheckJacobian(Context& context);
 Finding CheckNoise(Context& context);

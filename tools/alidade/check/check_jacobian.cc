@@ -7,17 +7,17 @@
 #include "alidade/check/check_values.h"
 #include "alidade/check/derivative.h"
 
-/// The checks of Jacobians: against differences, and that asking for them changes no value.
+/// Checks of Jacobians: they agree with differences, and requesting them does not change a value.
 namespace alidade::internal {
 namespace {
 
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-/// How two answers of a function differ, beyond the rounding of another order of operations; or "".
+/// Describes a difference of two answers beyond rounding error; "" if they agree.
 std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
   if (a.code != b.code) {
-    return "status " + std::to_string(a.code) + " against " + std::to_string(b.code);
+    return "status " + std::to_string(a.code) + " and " + std::to_string(b.code);
   }
   if (!a.ok()) return {};
   const Values x = OutputValues(a);
@@ -26,14 +26,14 @@ std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, con
   return StateText(f.outputs, x) + ", " + RoundedText(distance) + " apart";
 }
 
-/// How far an entry of a Jacobian is from the numeric one.
+/// An entry of the model's Jacobian and the numeric derivative.
 struct Entry {
-  double written = 0.0, numeric = 0.0;
+  double model = 0.0, numeric = 0.0;
   Eigen::Index row = 0;
-  bool judged = false;  ///< the numeric derivative is good enough to tell
-  bool wrong = false;
+  bool is_judged = false;  ///< the numeric derivative is accurate enough to compare with
+  bool is_wrong = false;
   double Distance() const {
-    return std::abs(written - numeric) / std::max(std::abs(written), std::abs(numeric));
+    return std::abs(model - numeric) / std::max(std::abs(model), std::abs(numeric));
   }
 };
 
@@ -45,12 +45,12 @@ class JacobianTest {
     const Answer answer = context.CallWith(f, inputs, kAllMatrices);
     defined_ = answer.ok();
     if (!defined_) return;
-    jacobian_ = SideBySide(answer);
-    center_ = OutputValues(answer);
+    jacobian_ = ConcatenatedJacobian(answer);
+    centre_ = OutputValues(answer);
   }
   bool defined() const { return defined_; }
 
-  /// The entries of the column of tangent element `k` of input `i`, which is `column` of all.
+  /// Compares the column of tangent element `k` of input `i`, column `column` of the Jacobian.
   std::vector<Entry> Column(std::size_t i, int k, Eigen::Index column) const {
     double h = 0.1;
     Input(i).geometry.ForEachPart([&](const Geometry& part, int a, int t) {
@@ -58,17 +58,16 @@ class JacobianTest {
       h *= std::max(std::abs(inputs_[i][static_cast<std::size_t>(a + k - t)]), 0.01);
     });
     const Curve curve = [&](double t) { return Moved(i, k, t); };
-    constexpr int kMostLengths = 6;
+    constexpr int kMaxLengths = 6;
     std::vector<Entry> entries;
-    // A step that leaves the domain, crosses a kink or takes the function round and round, so that
-    // differences agree on its mean slope, is shortened.
+    // Shorten a step that leaves the domain, crosses a kink, or spans several periods of the
+    // function, in which case differences agree on its mean slope.
     for (int tries = 0, lengths = 0; tries < 40 && h > 1e-12; ++tries) {
       const auto derivative = Differentiate(curve, h);
       if (derivative) {
         entries = Compare(*derivative, jacobian_.col(column).array(), h);
-        const auto wrong = [](const Entry& e) { return e.wrong; };
-        if (std::none_of(entries.begin(), entries.end(), wrong)) return entries;
-        if (++lengths == kMostLengths) return entries;
+        if (std::ranges::none_of(entries, &Entry::is_wrong)) return entries;
+        if (++lengths == kMaxLengths) return entries;
       }
       h /= derivative ? 16.0 : 2.0;
     }
@@ -87,20 +86,21 @@ class JacobianTest {
     geometry.Plus(inputs_[i].data(), d.data(), moved[i].data());
     const Answer answer = context_.CallWith(f_, moved, kNoMatrix);
     if (!answer.ok()) return std::nullopt;
-    return Difference(f_.outputs, OutputValues(answer), center_);
+    return Difference(f_.outputs, OutputValues(answer), centre_);
   }
-  std::vector<Entry> Compare(const Derivative& numeric, const ArrayXd& written, double h) const {
-    // Rounding of the values, seen through the smallest step; 100 for what extrapolation adds.
-    const double size = std::max(Largest(center_), Largest(inputs_));
+  std::vector<Entry> Compare(const Derivative& numeric, const ArrayXd& column, double h) const {
+    // Rounding error of the values divided by the smallest step; the factor 100 allows for the
+    // amplification by extrapolation.
+    const double size = std::max(Largest(centre_), Largest(inputs_));
     const double floor = 100.0 * 2.2e-16 * size / (kSmallestStep * h);
     std::vector<Entry> entries;
-    for (Eigen::Index r = 0; r < written.size(); ++r) {
-      Entry entry{written[r], numeric.value[r], r, false, false};
-      const double scale = std::max(std::abs(entry.written), std::abs(entry.numeric));
+    for (Eigen::Index r = 0; r < column.size(); ++r) {
+      Entry entry{column[r], numeric.value[r], r, false, false};
+      const double scale = std::max(std::abs(entry.model), std::abs(entry.numeric));
       const double error = numeric.error[r];
-      entry.judged = error <= 1e-3 * scale + floor;
-      entry.wrong = entry.judged &&
-                    std::abs(entry.written - entry.numeric) > 1e-6 * scale + 5.0 * error + floor;
+      entry.is_judged = error <= 1e-3 * scale + floor;
+      entry.is_wrong = entry.is_judged &&
+                       std::abs(entry.model - entry.numeric) > 1e-6 * scale + 5.0 * error + floor;
       entries.push_back(entry);
     }
     return entries;
@@ -111,12 +111,12 @@ class JacobianTest {
   const Values& inputs_;
   bool defined_ = false;
   MatrixXd jacobian_;
-  Values center_;
+  Values centre_;
 };
 
-/// What CheckJacobian has seen so far.
+/// Results of CheckJacobian so far.
 struct JacobianTally {
-  long judged = 0;
+  long judged = 0;     ///< number of compared entries
   double worst = 0.0;  ///< relative distance of the worst wrong entry
   std::string failure;
 };
@@ -133,28 +133,28 @@ void TestJacobian(const Context& context, const Function& f, const CheckedState&
     const int count = test.Input(i).geometry.tangent;
     for (int k = 0; k < count && !inputs[i].empty(); ++k) {
       for (const Entry& entry : test.Column(i, k, column + k)) {
-        tally.judged += entry.judged ? 1 : 0;
-        if (!entry.wrong || entry.Distance() <= tally.worst) continue;
+        tally.judged += entry.is_judged ? 1 : 0;
+        if (!entry.is_wrong || entry.Distance() <= tally.worst) continue;
         tally.worst = entry.Distance();
         tally.failure = f.name + ": d " + rows[static_cast<std::size_t>(entry.row)] + " / d " +
-                        columns[static_cast<std::size_t>(k)] + " is " + RoundedText(entry.written) +
+                        columns[static_cast<std::size_t>(k)] + " is " + RoundedText(entry.model) +
                         " from the model, " + RoundedText(entry.numeric) + " by differences; " +
-                        context.Where(f, inputs);
+                        context.CallText(f, inputs);
       }
     }
     column += count;
   }
 }
 
-/// `Predict: analytic Jacobian, Initialise: automatic differentiation`
+/// Returns a text such as `Predict: analytic Jacobian, Initialise: automatic differentiation`.
 std::string KindsText(const ModelUnderTest& model) {
   const bool analytic = (model.instance->capabilities() & ALIDADE_ANALYTIC_JACOBIAN) != 0;
   std::string text;
   for (const Function& f : model.functions) {
     if (f.differentiated == 0) continue;
-    const bool written = analytic && f.name != "Initialise";  // of which a model writes none
+    const bool is_analytic = analytic && f.name != "Initialise";  // always differentiated
     text += (text.empty() ? "" : ", ") + f.name +
-            (written ? ": analytic Jacobian" : ": automatic differentiation");
+            (is_analytic ? ": analytic Jacobian" : ": automatic differentiation");
   }
   return text;
 }
@@ -165,14 +165,16 @@ Finding CheckSameValue(Context& context) {
   for (const Function& f : context.model().functions) {
     for (const CheckedState& state : context.states()) {
       if (f.differentiated == 0) continue;
-      const Answer with = context.Call(f, state);
+      const Answer all_jacobians = context.Call(f, state);
       const int count = static_cast<int>(f.matrices.size());
       for (int matrix = kNoMatrix; matrix < count; ++matrix) {
-        const Answer other = context.Call(f, state, matrix);
-        const std::string defect = ValueDefect(f, with, other, Context::Inputs(f, state));
+        const Answer fewer_jacobians = context.Call(f, state, matrix);
+        const std::string defect =
+            ValueDefect(f, all_jacobians, fewer_jacobians, Context::Inputs(f, state));
         if (defect.empty()) continue;
-        return Fail(context.Where(f, state) + ": the value differs with all Jacobians and with " +
-                    (matrix == kNoMatrix ? "none: " : "one alone: ") + defect);
+        return Fail(context.CallText(f, state) +
+                    ": the value with all Jacobians differs from the value with " +
+                    (matrix == kNoMatrix ? "none: " : "only one: ") + defect);
       }
     }
   }
@@ -187,7 +189,7 @@ Finding CheckJacobian(Context& context) {
     }
   }
   if (!tally.failure.empty()) return Fail(tally.failure);
-  if (tally.judged == 0) return Skip("differences are nowhere good enough");
+  if (tally.judged == 0) return Skip("no numeric derivative is accurate enough");
   return Ok(KindsText(context.model()) + "; " + std::to_string(tally.judged) +
             " entries agree with differences");
 }

@@ -9,27 +9,27 @@
 #include "alidade/check/check_values.h"
 #include "alidade/state/dense_algebra.h"
 
-/// The checks of what a model computes but for Jacobians: noise, rotations, inverse, time.
+/// Checks of the mathematics other than Jacobians: noise, rotations, inverse model, time.
 namespace alidade::internal {
 namespace {
 
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-// Of values that are equal but for rounding.
+// Relative tolerance of values that are equal up to rounding error.
 constexpr double kRounding = 1e-9;
 
-/// The farthest that a value is from what it should be, relative to `tolerance`.
-struct Farthest {
-  double ratio = 1.0;  ///< more is a failure
+/// Largest deviation of a value from its expected value, relative to the tolerance.
+struct WorstDeviation {
+  double ratio = 1.0;  ///< a deviation beyond this is a failure
   std::string failure;
 
-  /// `words` are made only for a failure.
-  template <class Words>
-  void Add(double distance, double tolerance, const Words& words) {
+  /// Calls `text` only for a failure.
+  template <class Text>
+  void Add(double distance, double tolerance, const Text& text) {
     if (!(distance > tolerance * ratio)) return;
     ratio = distance / tolerance;
-    failure = words();
+    failure = text();
   }
 };
 
@@ -48,7 +48,7 @@ std::string DefectOfR(const MatrixXd& l, const Space& z) {
   return "R is singular: smallest eigenvalue of its correlations " + RoundedText(smallest);
 }
 
-/// Step over dt from `state` without noise; nothing where it is not defined.
+/// Computes a step over dt from `blocks` without noise; nullopt if it is not defined.
 std::optional<Values> StepOver(const Context& context, const Function& f, Values inputs,
                                const Values& blocks, double dt_s) {
   std::copy(blocks.begin(), blocks.end(), inputs.begin());
@@ -60,31 +60,31 @@ std::optional<Values> StepOver(const Context& context, const Function& f, Values
   return OutputValues(answer);
 }
 
-/// Step over dt against two steps over its parts.
+/// Difference between one step over dt and two steps over its parts.
 struct Additivity {
   double defect = 0.0, size = 0.0;
-  Eigen::Index row = 0;
+  Eigen::Index row = 0;  ///< tangent element with the largest difference
 };
 
-std::optional<Additivity> Split(const Context& context, const Function& f, const Values& inputs,
-                                const Values& blocks, double dt_s) {
+std::optional<Additivity> TestAdditivity(const Context& context, const Function& f,
+                                         const Values& inputs, const Values& blocks, double dt_s) {
   const double first_s = 0.375 * dt_s;
-  const auto whole = StepOver(context, f, inputs, blocks, dt_s);
+  const auto single_step = StepOver(context, f, inputs, blocks, dt_s);
   const auto first = StepOver(context, f, inputs, blocks, first_s);
-  if (!whole || !first) return std::nullopt;
-  const auto both = StepOver(context, f, inputs, *first, dt_s - first_s);
-  if (!both) return std::nullopt;
+  if (!single_step || !first) return std::nullopt;
+  const auto two_steps = StepOver(context, f, inputs, *first, dt_s - first_s);
+  if (!two_steps) return std::nullopt;
   Additivity result;
-  result.size = std::max({1.0, Largest(inputs), Largest(*whole), Largest(*both)});
-  result.defect = Difference(f.outputs, *whole, *both).abs().maxCoeff(&result.row);
+  result.size = std::max({1.0, Largest(inputs), Largest(*single_step), Largest(*two_steps)});
+  result.defect = Difference(f.outputs, *single_step, *two_steps).abs().maxCoeff(&result.row);
   return result;
 }
 
-/// p where the defect goes with dt^p, from 20 ms and 10 ms.
+/// Estimates p in defect ~ dt^p, from steps of 20 ms and 10 ms.
 double OrderOf(const Context& context, const Function& f, const Values& inputs,
                const Values& blocks) {
-  const auto coarse = Split(context, f, inputs, blocks, 0.02);
-  const auto fine = Split(context, f, inputs, blocks, 0.01);
+  const auto coarse = TestAdditivity(context, f, inputs, blocks, 0.02);
+  const auto fine = TestAdditivity(context, f, inputs, blocks, 0.01);
   return coarse && fine ? std::log2(coarse->defect / fine->defect) : 0.0;
 }
 
@@ -94,47 +94,48 @@ struct NoisyStep {
   MatrixXd f, n;
 };
 
-/// Over dt_s from `blocks`, with Lq as it is at `noise_of`, for a step of noise_dt_s.
+/// Computes a step over dt_s from `blocks`, with Lq evaluated at `noise_blocks` for noise_dt_s.
 std::optional<NoisyStep> StepWithNoise(const Context& context, Values inputs, const Values& blocks,
-                                       double dt_s, const Values& noise_of, double noise_dt_s) {
+                                       double dt_s, const Values& noise_blocks, double noise_dt_s) {
   std::copy(blocks.begin(), blocks.end(), inputs.begin());
   std::fill(inputs[blocks.size()].begin(), inputs[blocks.size()].end(), 0.0);
   inputs.back()[0] = dt_s;
-  Values of_noise = noise_of;
-  of_noise.push_back({noise_dt_s});
+  Values noise_inputs = noise_blocks;
+  noise_inputs.push_back({noise_dt_s});
   const bool has_input = inputs.size() > blocks.size() + 2;
-  if (has_input) of_noise.push_back(inputs[blocks.size() + 1]);
+  if (has_input) noise_inputs.push_back(inputs[blocks.size() + 1]);
   const Answer step = context.CallWith(context.main(), inputs, kAllMatrices);
-  const Answer noise = context.CallWith(*context.model().Find("SqrtQ"), of_noise, kAllMatrices);
+  const Answer noise = context.CallWith(*context.model().Find("SqrtQ"), noise_inputs, kAllMatrices);
   if (!step.ok() || !noise.ok()) return std::nullopt;
   return NoisyStep{OutputValues(step), ToMatrix(step.matrices[0]),
                    ToMatrix(step.matrices[1]) * ToMatrix(noise.matrices[0])};
 }
 
-/// How far the covariance of the noise over two parts of dt is from that over dt, relative to it.
+/// Relative difference between the noise covariance over two parts of dt and that over dt.
 struct PartsDefect {
-  double discrete = 0.0, continuous = 0.0;  ///< for one w in both parts, for one in each
+  double discrete = 0.0;    ///< for the same w in both parts
+  double continuous = 0.0;  ///< for an independent w in each part
 };
 
 std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& inputs,
                                          const Values& blocks, double dt_s) {
   const double first_s = 0.375 * dt_s, second_s = dt_s - first_s;
-  const auto whole = StepWithNoise(context, inputs, blocks, dt_s, blocks, dt_s);
+  const auto single_step = StepWithNoise(context, inputs, blocks, dt_s, blocks, dt_s);
   const auto first = StepWithNoise(context, inputs, blocks, first_s, blocks, first_s);
-  if (!whole || !first) return std::nullopt;
+  if (!single_step || !first) return std::nullopt;
   const Values& between = first->next;
-  const auto held = StepWithNoise(context, inputs, between, second_s, blocks, first_s);
-  const auto anew = StepWithNoise(context, inputs, between, second_s, between, second_s);
-  if (!held || !anew) return std::nullopt;
-  const MatrixXd q = whole->n * whole->n.transpose();
-  const MatrixXd m = held->f * first->n + held->n, moved = anew->f * first->n;
+  const auto same_noise = StepWithNoise(context, inputs, between, second_s, blocks, first_s);
+  const auto new_noise = StepWithNoise(context, inputs, between, second_s, between, second_s);
+  if (!same_noise || !new_noise) return std::nullopt;
+  const MatrixXd q = single_step->n * single_step->n.transpose();
+  const MatrixXd m = same_noise->f * first->n + same_noise->n, moved = new_noise->f * first->n;
   const MatrixXd discrete = m * m.transpose();
-  const MatrixXd continuous = moved * moved.transpose() + anew->n * anew->n.transpose();
+  const MatrixXd continuous = moved * moved.transpose() + new_noise->n * new_noise->n.transpose();
   if (!(q.norm() > 0.0 && q.allFinite())) return std::nullopt;
   return PartsDefect{(discrete - q).norm() / q.norm(), (continuous - q).norm() / q.norm()};
 }
 
-/// Where dt goes to 0, and with it what integration leaves.
+/// Estimates the limit for dt -> 0, which removes the integration error.
 std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedState& state) {
   const Values inputs = Context::Inputs(context.main(), state);
   const Values blocks(inputs.begin(),
@@ -150,41 +151,39 @@ std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedSta
   return least;
 }
 
-/// The remedy for noise that is not of the kind that the model declares.
-std::string RemedyOfParts(bool discrete, bool other_fits) {
+/// Describes the remedy for noise that is not of the declared kind.
+std::string NoiseKindRemedy(bool discrete, bool other_fits) {
   if (!other_fits) {
-    return "its noise depends on the number of steps. Discrete noise has an Lq that does not "
-           "depend "
-           "on dt and enters as what is held, such as an acceleration; continuous noise has "
+    return "its noise depends on the number of steps. Discrete noise, such as an acceleration, is "
+           "constant over dt, and its Lq does not depend on dt; continuous noise has "
            "Q(dt) = F Q(dt_1) F' + Q(dt_2)";
   }
-  return discrete ? "the noise adds up over the parts: leave noise_kind() out, or let it return "
+  return discrete ? "the noise adds up over the parts: omit noise_kind(), or return "
                     "NoiseKind::kContinuous"
-                  : "the noise is held over the parts: declare it by `NoiseKind noise_kind() const "
-                    "{ return NoiseKind::kDiscrete; }`, or let Q grow with dt";
+                  : "the noise is constant over the parts: declare it by `NoiseKind noise_kind() "
+                    "const { return NoiseKind::kDiscrete; }`, or let Q grow with dt";
 }
 
-/// That f is the same for q and -q, the quaternion at `offset` of its input i.
+/// Compares f for q and -q, the quaternion at `offset` of its input i.
 void CompareCovers(Context& context, const Function& f, std::size_t i, int offset,
-                   Farthest& farthest) {
+                   WorstDeviation& worst) {
   const std::string& name = context.model().slots[static_cast<std::size_t>(f.slots[i])].name;
   for (const CheckedState& state : context.states()) {
-    Values turned = Context::Inputs(f, state);
-    // Of a half turn, -0 apart from 0 decides which way round its logarithm goes.
-    if (turned[i].empty() || turned[i][static_cast<std::size_t>(offset)] == 0.0) continue;
-    for (double& element : std::span(turned[i]).subspan(offset, 4)) element = -element;
-    const Answer a = context.Call(f, state), b = context.CallWith(f, turned, kAllMatrices);
-    const auto words = [&] {
-      return context.Where(f, state) + ": q and -q of " + name + " are not the same";
+    Values negated = Context::Inputs(f, state);
+    // For a half turn, the sign of zero determines the sign of the logarithm.
+    if (negated[i].empty() || negated[i][static_cast<std::size_t>(offset)] == 0.0) continue;
+    for (double& element : std::span(negated[i]).subspan(offset, 4)) element = -element;
+    const Answer a = context.Call(f, state), b = context.CallWith(f, negated, kAllMatrices);
+    const auto text = [&] {
+      return context.CallText(f, state) + ": q and -q of " + name + " yield different results";
     };
-    farthest.Add(a.code == b.code ? 0.0 : 2.0, 1.0, words);
+    worst.Add(a.code == b.code ? 0.0 : 2.0, 1.0, text);
     if (!a.ok() || !b.ok()) continue;
     const Values x = OutputValues(a), y = OutputValues(b);
-    farthest.Add(Difference(f.outputs, x, y).abs().maxCoeff(), kRounding * (1.0 + Largest(x)),
-                 words);
-    const MatrixXd j = SideBySide(a);
-    farthest.Add((j - SideBySide(b)).cwiseAbs().maxCoeff(),
-                 kRounding * (1.0 + j.cwiseAbs().maxCoeff()), words);
+    worst.Add(Difference(f.outputs, x, y).abs().maxCoeff(), kRounding * (1.0 + Largest(x)), text);
+    const MatrixXd j = ConcatenatedJacobian(a);
+    worst.Add((j - ConcatenatedJacobian(b)).cwiseAbs().maxCoeff(),
+              kRounding * (1.0 + j.cwiseAbs().maxCoeff()), text);
   }
 }
 
@@ -193,7 +192,7 @@ void CompareCovers(Context& context, const Function& f, std::size_t i, int offse
 Finding CheckNoise(Context& context) {
   const Function* const f =
       context.model().Find(context.model().is_sensor() ? "SqrtNoise" : "SqrtQ");
-  if (f == nullptr) return Skip("it has no noise input");
+  if (f == nullptr) return Skip("the model has no noise input");
   for (const CheckedState& state : context.states()) {
     if (!state.defined) continue;
     const Buffer factor = context.Call(*f, state).matrices.front();
@@ -201,69 +200,70 @@ Finding CheckNoise(Context& context) {
     for (int r = 0; r < factor.rows(); ++r) {
       for (int c = 0; c < factor.columns(); ++c) {
         if (std::isfinite(l(r, c)) && !Unwritten(l(r, c))) continue;
-        return Fail(context.Where(*f, state) + ": entry (" + std::to_string(r) + ", " +
+        return Fail(context.CallText(*f, state) + ": entry (" + std::to_string(r) + ", " +
                     std::to_string(c) + ") " +
                     (Unwritten(l(r, c)) ? "is not written" : "is " + NumberText(l(r, c))));
       }
     }
     if (!context.model().is_sensor()) continue;
     const std::string defect = DefectOfR(l, context.model().instance->space());
-    if (!defect.empty()) return Fail(context.Where(*f, state) + ": " + defect);
+    if (!defect.empty()) return Fail(context.CallText(*f, state) + ": " + defect);
   }
   return Ok(context.model().is_sensor() ? "R is finite and positive definite" : "Lq is finite");
 }
 
 Finding CheckDoubleCover(Context& context) {
-  Farthest farthest;
-  bool any = false;
+  WorstDeviation worst;
+  bool has_quaternion = false;
   for (const Function& f : context.model().functions) {
     for (std::size_t i = 0; i < f.slots.size() && !f.outputs.empty(); ++i) {
       const Space& space = context.model().slots[static_cast<std::size_t>(f.slots[i])];
       space.geometry.ForEachPart([&](const Geometry& part, int offset, int) {
         if (part.kind != GeometryKind::kUnitQuaternion) return;
-        any = true;
-        CompareCovers(context, f, i, offset, farthest);
+        has_quaternion = true;
+        CompareCovers(context, f, i, offset, worst);
       });
     }
   }
-  if (!any) return Skip("it takes no quaternion");
-  return farthest.failure.empty() ? Ok("q and -q are one rotation") : Fail(farthest.failure);
+  if (!has_quaternion) return Skip("no input is a quaternion");
+  return worst.failure.empty() ? Ok("q and -q yield the same results") : Fail(worst.failure);
 }
 
 Finding CheckInitialise(Context& context) {
   const Function* const f = context.model().Find("Initialise");
-  if (f == nullptr) return Skip("it has no Initialise");
-  const std::vector<int> y = context.model().Initialised();
-  Farthest farthest;
+  if (f == nullptr) return Skip("the model has no Initialise");
+  const std::vector<int> y = context.model().InitialisedRoles();
+  WorstDeviation worst;
   int inverted = 0;
   for (const CheckedState& state : context.states()) {
     if (!state.defined) continue;
     const Answer answer = context.Call(*f, state, kNoMatrix);
     if (!answer.ok()) continue;
     ++inverted;
-    CheckedState back = state;
+    CheckedState initialised_state = state;
     const Values initialised = OutputValues(answer);
     for (std::size_t i = 0; i < y.size(); ++i) {
-      back.values[static_cast<std::size_t>(y[i])] = initialised[i];
+      initialised_state.values[static_cast<std::size_t>(y[i])] = initialised[i];
     }
-    const Answer again = context.Call(context.main(), back, kNoMatrix);
+    const Answer prediction = context.Call(context.main(), initialised_state, kNoMatrix);
     const std::vector<double>& z =
         state.values[static_cast<std::size_t>(context.model().measurement_slot())];
-    const auto words = [&] {
-      return context.Where(*f, state) + " gives " + StateText(f->outputs, initialised) +
-             ", where Predict " +
-             (again.ok() ? "gives " + StateText(context.main().outputs, OutputValues(again))
-                         : std::string("is not defined"));
+    const auto text = [&] {
+      return context.CallText(*f, state) + " returns " + StateText(f->outputs, initialised) +
+             ", for which Predict " +
+             (prediction.ok()
+                  ? "returns " + StateText(context.main().outputs, OutputValues(prediction))
+                  : std::string("is not defined"));
     };
-    farthest.Add(again.ok() ? 0.0 : 2.0, 1.0, words);
-    if (!again.ok()) continue;
-    const ArrayXd d = Difference(context.main().outputs, OutputValues(again), {z});
-    farthest.Add(d.abs().maxCoeff(), 1e-6 * Largest({z}) + 1e-12 * (1.0 + Largest(state.values)),
-                 words);
+    worst.Add(prediction.ok() ? 0.0 : 2.0, 1.0, text);
+    if (!prediction.ok()) continue;
+    const ArrayXd d = Difference(context.main().outputs, OutputValues(prediction), {z});
+    worst.Add(d.abs().maxCoeff(), 1e-6 * Largest({z}) + 1e-12 * (1.0 + Largest(state.values)),
+              text);
   }
-  if (!farthest.failure.empty()) return Fail(farthest.failure);
-  if (inverted == 0) return Skip("it inverts at none of the states");
-  return Ok("Predict gives the measurement back at " + std::to_string(inverted) + " states");
+  if (!worst.failure.empty()) return Fail(worst.failure);
+  if (inverted == 0) return Skip("Initialise succeeds at none of the states");
+  return Ok("Predict reproduces the measurement at " + std::to_string(inverted) + " states");
 }
 
 Finding CheckStep(Context& context) {
@@ -271,77 +271,82 @@ Finding CheckStep(Context& context) {
   const Function& f = context.main();
   const std::vector<std::string> names = TangentNames(f.outputs);
   const bool stationary = (context.model().instance->capabilities() & ALIDADE_STATIONARY) != 0;
-  Farthest identity, additive;
+  WorstDeviation identity, additive;
   double order = 0.0;
   for (const CheckedState& state : context.states()) {
     const Values inputs = Context::Inputs(f, state);
     const Values blocks(inputs.begin(),
                         inputs.begin() + static_cast<std::ptrdiff_t>(f.outputs.size()));
     const double dt_s = inputs.back()[0];
-    const auto still = StepOver(context, f, inputs, blocks, stationary ? dt_s : 0.0);
-    if (still) {
-      identity.Add(Difference(f.outputs, *still, blocks).abs().maxCoeff(),
+    const auto unchanged = StepOver(context, f, inputs, blocks, stationary ? dt_s : 0.0);
+    if (unchanged) {
+      identity.Add(Difference(f.outputs, *unchanged, blocks).abs().maxCoeff(),
                    kRounding * (1.0 + Largest(blocks)), [&] {
-                     return context.Where(f, state) + ": " +
-                            (stationary ? "it says that it is stationary, but moves"
-                                        : "a step over dt = 0 without noise moves it");
+                     return context.CallText(f, state) + ": " +
+                            (stationary
+                                 ? "the model declares itself stationary, but its state changes"
+                                 : "a step over dt = 0 without noise changes the state");
                    });
     }
-    const auto split = Split(context, f, inputs, blocks, dt_s);
+    const auto split = TestAdditivity(context, f, inputs, blocks, dt_s);
     if (!split) continue;
     const double before = additive.ratio;
     additive.Add(split->defect, kRounding * split->size, [&] {
-      return context.Where(f, state) + ", w = 0: one step and two steps over the parts of dt end " +
+      return context.CallText(f, state) +
+             ", w = 0: one step over dt and two steps over its parts end " +
              RoundedText(split->defect) + " apart in " +
              names[static_cast<std::size_t>(split->row)];
     });
     if (additive.ratio > before) order = OrderOf(context, f, inputs, blocks);
   }
   if (!identity.failure.empty()) return Fail(identity.failure);
-  if (additive.failure.empty()) return Ok("additive in dt, and over dt = 0 the identity");
-  const int given = context.options().step_order;
-  const int expected = given > 0 ? given : context.model().instance->step_order();
+  if (additive.failure.empty()) return Ok("additive in dt, and the identity for dt = 0");
+  const int option = context.options().step_order;
+  const int expected = option > 0 ? option : context.model().instance->step_order();
   if (expected > 0 && order > expected - 0.2) {
-    return Ok("additive to order " + RoundedText(order, 2) + " in dt, over dt = 0 the identity");
+    return Ok("additive in dt to order " + RoundedText(order, 2) + ", and the identity for dt = 0");
   }
-  return Fail(additive.failure + "; of order " + RoundedText(order, 2) + " in dt" +
+  return Fail(additive.failure + "; the error is of order " + RoundedText(order, 2) + " in dt" +
               (expected > 0 ? ", not " + std::to_string(expected) : "") +
-              ". A discretisation of order N declares `static constexpr int kStepOrder = N;`, or "
-              "passes with --step-order N");
+              ". If the model is a discretisation of order N, declare `static constexpr int "
+              "kStepOrder = N;`, or pass --step-order N");
 }
 
-// A wrong kind leaves 0.47 or more however small dt is, a right one what goes with dt.
+// The defect of a wrong kind is at least 0.47 for every dt; that of the right kind vanishes with
+// dt.
 Finding CheckNoiseKind(Context& context) {
-  constexpr double kMost = 0.1;
+  constexpr double kMaxDefect = 0.1;
   if (context.model().is_sensor()) return Skip("not a motion model");
-  if (context.model().Find("SqrtQ") == nullptr) return Skip("it has no noise input");
+  if (context.model().Find("SqrtQ") == nullptr) return Skip("the model has no noise input");
   const bool discrete = (context.model().instance->capabilities() & ALIDADE_DISCRETE_NOISE) != 0;
   const std::string kind = discrete ? "discrete" : "continuous";
   PartsDefect worst;
-  bool any = false;
-  std::string where;
+  bool has_noise = false;
+  std::string worst_call;
   for (const CheckedState& state : context.states()) {
     const auto defect = LimitOfParts(context, state);
     if (!defect) continue;
-    any = true;
+    has_noise = true;
     const double before = discrete ? worst.discrete : worst.continuous;
     if ((discrete ? defect->discrete : defect->continuous) > before) {
-      where = context.Where(context.main(), state);
+      worst_call = context.CallText(context.main(), state);
     }
     worst.discrete = std::max(worst.discrete, defect->discrete);
     worst.continuous = std::max(worst.continuous, defect->continuous);
   }
-  if (!any) return Skip("its noise is 0");
-  const double own = discrete ? worst.discrete : worst.continuous;
-  const double other = discrete ? worst.continuous : worst.discrete;
-  if (own <= kMost) {
-    return Ok(kind + " noise: over two parts of dt it is that over dt, but for integration");
+  if (!has_noise) return Skip("the noise is 0");
+  const double declared_defect = discrete ? worst.discrete : worst.continuous;
+  const double other_defect = discrete ? worst.continuous : worst.discrete;
+  if (declared_defect <= kMaxDefect) {
+    return Ok(kind +
+              " noise: the covariance over two parts of dt equals that over dt, up to "
+              "integration error");
   }
   return Fail("declares " + kind +
-              " noise, but over two parts of a dt that goes to 0 its covariance "
-              "is " +
-              std::to_string(std::lround(100.0 * own)) + " % off that over dt, at " + where + "; " +
-              RemedyOfParts(discrete, other <= kMost));
+              " noise, but for small dt the covariance over two parts of dt differs from that over "
+              "dt by " +
+              std::to_string(std::lround(100.0 * declared_defect)) + " %, at " + worst_call + "; " +
+              NoiseKindRemedy(discrete, other_defect <= kMaxDefect));
 }
 
 }  // namespace alidade::internal

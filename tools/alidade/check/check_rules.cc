@@ -15,12 +15,12 @@
 extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
-/// The checks of the rules that plugin_abi.h states for every call.
+/// Checks of the rules that plugin_abi.h states for every call.
 namespace alidade::internal {
 namespace {
 
-/// The first failure that `test(function, state)` finds ("" where there is none) among all
-/// functions and states at which they are to be called.
+/// Calls `test(function, state)` for all functions at all states, noise functions at defined states
+/// only. Returns the first failure, or "".
 template <class Test>
 std::string FirstFailure(Context& context, const Test& test) {
   for (const Function& f : context.model().functions) {
@@ -32,37 +32,37 @@ std::string FirstFailure(Context& context, const Test& test) {
   return {};
 }
 
-Finding Verdict(const std::string& failure, const std::string& fine) {
-  return failure.empty() ? Ok(fine) : Fail(failure);
+Finding ToFinding(const std::string& failure, const std::string& success_text) {
+  return failure.empty() ? Ok(success_text) : Fail(failure);
 }
 
 std::string Count(Context& context) { return std::to_string(context.states().size()) + " states"; }
 
-/// What a code says that it should not, or "".
+/// Describes an invalid return code of `f`; "" if the code is valid.
 std::string CodeDefect(const Context& context, const Function& f, std::int32_t code) {
   if (code == ALIDADE_ERROR) {
     const std::string text = [&] {
       const AlidadeInstance& c = context.model().instance->c();
       return c.error_text == nullptr ? std::string() : context.model().instance->error_text();
     }();
-    return "failed: " + (text.empty() ? "it does not say why" : text);
+    return "failed: " + (text.empty() ? "the model sets no error text" : text);
   }
   const bool may_refuse = f.name == "Valid" || f.name == "Initialise";
   if (code == ALIDADE_OK || (code == ALIDADE_INVALID && may_refuse)) return {};
   if (code == ALIDADE_OUT_OF_DOMAIN && f.name != "Valid") {
-    return f.is_noise ? "is out of domain where " + context.main().name + " is not" : "";
+    return f.is_noise ? "is out of domain although " + context.main().name + " is not" : "";
   }
-  return "returned " + std::to_string(code) + ", which is not a status of its";
+  return "returned " + std::to_string(code) + ", which is not a valid status of this function";
 }
 
-/// Settings of the process that decide how numbers are rounded and written.
+/// Settings of the process that determine how numbers are rounded and formatted.
 struct NumberSettings {
   int rounding = std::fegetround();
   std::string locale = std::setlocale(LC_ALL, nullptr);
   locale_t thread_locale = uselocale(nullptr);
 };
 
-/// The setting that has changed, or "".
+/// Describes a changed setting; "" if none has changed.
 std::string ChangeBetween(const NumberSettings& before, const NumberSettings& now) {
   if (now.rounding != before.rounding) return "changed the rounding mode";
   if (now.locale != before.locale || now.thread_locale != before.thread_locale) {
@@ -71,7 +71,7 @@ std::string ChangeBetween(const NumberSettings& before, const NumberSettings& no
   return {};
 }
 
-/// Bytes on the heap.
+/// Returns the number of allocated bytes on the heap.
 double HeapBytes() {
 #if defined(__SANITIZE_ADDRESS__)
   return static_cast<double>(__sanitizer_get_current_allocated_bytes());
@@ -89,13 +89,13 @@ int OpenDescriptors() {
   return count;
 }
 
-/// What is wrong with one number that a model has to write, or "".
+/// Describes the defect of one output number of a model; "" if it is valid.
 std::string CellDefect(double cell) {
   if (Unwritten(cell)) return "is not written";
   return std::isfinite(cell) ? "" : "is " + NumberText(cell);
 }
 
-/// What is wrong with the values of an answer, or "".
+/// Describes the first defect of the values of an answer; "" if they are valid.
 std::string ValueDefect(const Function& f, const Answer& answer) {
   for (std::size_t i = 0; i < f.outputs.size(); ++i) {
     const Space& space = f.outputs[i];
@@ -113,12 +113,12 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
   return {};
 }
 
-/// What is wrong with the Jacobians of an answer, or "".
+/// Describes the first defect of the Jacobians of an answer; "" if they are valid.
 std::string JacobianDefect(const Function& f, const CheckedState& state, const Answer& answer) {
   for (std::size_t i = 0; i < answer.matrices.size(); ++i) {
     const Buffer& j = answer.matrices[i];
     if (f.jacobian_per_input() && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
-      continue;  // by a role that is not bound
+      continue;  // Jacobian by an unbound role
     }
     for (int cell = 0; cell < j.rows() * j.columns(); ++cell) {
       const int r = cell / j.columns(), c = cell % j.columns();
@@ -134,7 +134,7 @@ std::string JacobianDefect(const Function& f, const CheckedState& state, const A
 }  // namespace
 
 Finding CheckCreate(Context& context) {
-  if (!context.options().other_keys) context.RejectUnread();
+  if (!context.options().allows_unread_keys) context.RejectUnread();
   for (int i = 0; i < 3; ++i) context.Destroy(context.Create());
   return Ok("created and destroyed");
 }
@@ -145,12 +145,12 @@ Finding CheckCalls(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         const std::string defect = CodeDefect(context, f, context.Call(f, state).code);
-        return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
+        return defect.empty() ? defect : context.CallText(f, state) + ": " + defect;
       });
   if (!failure.empty()) return Fail(failure);
   const std::string text =
       context.main().name + " is defined at " + std::to_string(defined) + " of " + Count(context);
-  if (defined == 0) return Fail(text + ", so that nothing can be checked; more: --states N");
+  if (defined == 0) return Fail(text + ", so nothing can be checked; --states N tests more states");
   return Ok(text);
 }
 
@@ -160,21 +160,21 @@ Finding CheckBounds(Context& context) {
         const Answer answer = context.Call(f, state);
         if (answer.written_input >= 0) {
           const int slot = f.slots[static_cast<std::size_t>(answer.written_input)];
-          return context.Where(f, state) + ": writes to its input " +
+          return context.CallText(f, state) + ": writes to its input " +
                  context.model().slots[static_cast<std::size_t>(slot)].name;
         }
         for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
           for (std::size_t i = 0; i < buffers->size(); ++i) {
-            if ((*buffers)[i].GuardsWhole()) continue;
-            const std::string what = buffers == &answer.outputs ? f.outputs[i].name
-                                     : f.is_noise               ? "factor"
-                                                                : "Jacobian " + std::to_string(i);
-            return context.Where(f, state) + ": writes past its buffer of " + what;
+            if ((*buffers)[i].GuardsIntact()) continue;
+            const std::string output = buffers == &answer.outputs ? f.outputs[i].name
+                                       : f.is_noise               ? "factor"
+                                                                  : "Jacobian " + std::to_string(i);
+            return context.CallText(f, state) + ": writes outside its buffer of " + output;
           }
         }
         return std::string();
       });
-  return Verdict(failure, "nothing written but the outputs");
+  return ToFinding(failure, "writes nothing but its outputs");
 }
 
 Finding CheckEnvironment(Context& context) {
@@ -183,9 +183,9 @@ Finding CheckEnvironment(Context& context) {
     const std::string change = ChangeBetween(before, NumberSettings());
     return change.empty() ? change : call + ' ' + change;
   };
-  std::unique_ptr<ModelUnderTest> other = context.Create();
+  std::unique_ptr<ModelUnderTest> second_instance = context.Create();
   std::string failure = changed("create");
-  context.Destroy(std::move(other));
+  context.Destroy(std::move(second_instance));
   if (failure.empty()) failure = changed("destroy");
   if (failure.empty()) {
     failure = FirstFailure(context, [&](const Function& f, const CheckedState& state) {
@@ -193,7 +193,7 @@ Finding CheckEnvironment(Context& context) {
       return changed(f.name);
     });
   }
-  return Verdict(failure, "rounding mode and locale stay");
+  return ToFinding(failure, "rounding mode and locale are unchanged");
 }
 
 Finding CheckDeterministic(Context& context) {
@@ -201,23 +201,23 @@ Finding CheckDeterministic(Context& context) {
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         static_cast<void>(context.Call(f, state));
         const Answer second = context.Call(f, state), third = context.Call(f, state);
-        return second == third ? "" : context.Where(f, state) + ": two calls in a row differ";
+        return second == third ? "" : context.CallText(f, state) + ": two consecutive calls differ";
       });
-  return Verdict(failure, "calls in a row give the same bits");
+  return ToFinding(failure, "consecutive calls return the same bits");
 }
 
 Finding CheckPure(Context& context) {
   std::vector<Answer> first;
-  const auto remember = [&](const Function& f, const CheckedState& state) {
+  const auto record_answer = [&](const Function& f, const CheckedState& state) {
     first.push_back(context.Call(f, state));
     return std::string();
   };
-  static_cast<void>(FirstFailure(context, remember));
-  // The same in the opposite order, first by an instance that has not been called before.
-  std::unique_ptr<ModelUnderTest> other = context.Create();
+  static_cast<void>(FirstFailure(context, record_answer));
+  // Repeat the calls in reverse order, first with an instance that has not been called before.
+  std::unique_ptr<ModelUnderTest> second_instance = context.Create();
   std::string failure;
   for (const ModelUnderTest* model :
-       {const_cast<const ModelUnderTest*>(other.get()), &context.model()}) {
+       {const_cast<const ModelUnderTest*>(second_instance.get()), &context.model()}) {
     std::size_t k = first.size();
     for (std::size_t i = model->functions.size(); i-- > 0 && failure.empty();) {
       const Function& f = model->functions[i];
@@ -225,26 +225,26 @@ Finding CheckPure(Context& context) {
         const CheckedState& state = context.states()[s];
         if (f.is_noise && !state.defined) continue;
         if (context.Call(f, state) == first[--k]) continue;
-        failure = context.Where(f, state) + ": depends on what was called before";
+        failure = context.CallText(f, state) + ": depends on earlier calls";
       }
     }
   }
-  context.Destroy(std::move(other));
-  return Verdict(failure, "earlier calls and other instances change nothing");
+  context.Destroy(std::move(second_instance));
+  return ToFinding(failure, "independent of earlier calls and other instances");
 }
 
 Finding CheckOutputs(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
-        if (f.is_noise) return std::string();  // of `noise`
-        const Answer with = context.Call(f, state), without = context.Call(f, state, kNoMatrix);
+        if (f.is_noise) return std::string();  // tested by check `noise`
+        const Answer full = context.Call(f, state), value = context.Call(f, state, kNoMatrix);
         std::string defect;
-        if (without.ok()) defect = ValueDefect(f, without);
-        if (defect.empty() && with.ok()) defect = ValueDefect(f, with);
-        if (defect.empty() && with.ok()) defect = JacobianDefect(f, state, with);
-        return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
+        if (value.ok()) defect = ValueDefect(f, value);
+        if (defect.empty() && full.ok()) defect = ValueDefect(f, full);
+        if (defect.empty() && full.ok()) defect = JacobianDefect(f, state, full);
+        return defect.empty() ? defect : context.CallText(f, state) + ": " + defect;
       });
-  return Verdict(failure, "all written, finite and on their geometries");
+  return ToFinding(failure, "all outputs are written, finite and on their geometries");
 }
 
 Finding CheckFailure(Context& context) {
@@ -257,19 +257,19 @@ Finding CheckFailure(Context& context) {
         for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
           for (const Buffer& buffer : *buffers) {
             if (!buffer.Untouched())
-              return context.Where(f, state) + ": fails, but wrote an output";
+              return context.CallText(f, state) + ": fails, but writes an output";
           }
         }
         return std::string();
       });
   if (failure.empty() && failed == 0) return Skip("no call failed");
-  return Verdict(failure, std::to_string(failed) + " failed calls left their outputs alone");
+  return ToFinding(failure, std::to_string(failed) + " failed calls left their outputs unchanged");
 }
 
 Finding CheckLeaks(Context& context) {
-  // The allocator keeps some of what is freed, but only so much: a leak grows in every part.
+  // The allocator retains a limited amount of freed memory; a leak grows in every part.
   constexpr int kWarmUp = 5, kRounds = 100, kParts = 10;
-  const auto grown = [&](const char* what, const auto& round) -> std::string {
+  const auto find_leak = [&](const std::string& call, const auto& round) -> std::string {
     for (int i = 0; i < kWarmUp; ++i) round();
     const int descriptors = OpenDescriptors();
     double growth = std::numeric_limits<double>::infinity();
@@ -278,19 +278,19 @@ Finding CheckLeaks(Context& context) {
       for (int i = 0; i < kRounds; ++i) round();
       growth = std::min(growth, (HeapBytes() - start) / kRounds);
     }
-    if (OpenDescriptors() - descriptors >= kRounds) return std::string(what) + " leaves files open";
+    if (OpenDescriptors() - descriptors >= kRounds) return call + " leaves files open";
     if (growth < 1.0) return {};
-    return std::string(what) + " loses " + RoundedText(growth, 4) + " bytes each time";
+    return call + " leaks " + RoundedText(growth, 4) + " bytes per call";
   };
-  std::string failure = grown("create and destroy", [&] { context.Destroy(context.Create()); });
+  std::string failure = find_leak("create and destroy", [&] { context.Destroy(context.Create()); });
   const auto& states = context.states();
   const auto defined = std::find_if(states.begin(), states.end(),
                                     [](const CheckedState& state) { return state.defined; });
   for (const Function& f : context.model().functions) {
     if (!failure.empty() || defined == states.end()) break;
-    failure = grown(f.name.c_str(), [&] { static_cast<void>(context.Call(f, *defined)); });
+    failure = find_leak(f.name, [&] { static_cast<void>(context.Call(f, *defined)); });
   }
-  return Verdict(failure, "memory and open files do not grow");
+  return ToFinding(failure, "memory and open files do not grow");
 }
 
 }  // namespace alidade::internal

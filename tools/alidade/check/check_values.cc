@@ -44,14 +44,14 @@ MatrixXd ToMatrix(const Buffer& buffer) {
   });
 }
 
-MatrixXd SideBySide(const Answer& answer) {
-  MatrixXd all(answer.matrices.front().rows(), 0);
+MatrixXd ConcatenatedJacobian(const Answer& answer) {
+  MatrixXd jacobian(answer.matrices.front().rows(), 0);
   for (const Buffer& buffer : answer.matrices) {
-    const Eigen::Index first = all.cols();
-    all.conservativeResize(Eigen::NoChange, first + buffer.columns());
-    all.rightCols(buffer.columns()) = ToMatrix(buffer);
+    const Eigen::Index first = jacobian.cols();
+    jacobian.conservativeResize(Eigen::NoChange, first + buffer.columns());
+    jacobian.rightCols(buffer.columns()) = ToMatrix(buffer);
   }
-  return all;
+  return jacobian;
 }
 
 std::vector<std::string> TangentNames(const std::vector<Space>& spaces) {

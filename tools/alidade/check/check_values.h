@@ -7,23 +7,23 @@
 
 #include "alidade/check/model_under_test.h"
 
-/// What the checks compute with: values, their differences and Jacobians as Eigen sees them.
+/// Conversions of values, their differences and Jacobians to Eigen.
 namespace alidade::internal {
 
-/// The largest magnitude.
+/// Returns the largest magnitude.
 double Largest(const Values& values);
 
 Values OutputValues(const Answer& answer);
 
-/// a (-) b, all spaces one below the other.
+/// Computes a (-) b, with all spaces stacked.
 Eigen::ArrayXd Difference(const std::vector<Space>& spaces, const Values& a, const Values& b);
 
 Eigen::MatrixXd ToMatrix(const Buffer& buffer);
 
-/// All Jacobians of `answer` side by side.
-Eigen::MatrixXd SideBySide(const Answer& answer);
+/// Concatenates all Jacobians of `answer` horizontally.
+Eigen::MatrixXd ConcatenatedJacobian(const Answer& answer);
 
-/// Of all spaces, one behind the other.
+/// Returns the names of the tangent elements of all spaces, in order.
 std::vector<std::string> TangentNames(const std::vector<Space>& spaces);
 
 }  // namespace alidade::internal

@@ -31,7 +31,8 @@ class Pipe {
  public:
   explicit Pipe(int flags) {
     if (pipe2(ends_, O_CLOEXEC | flags) == 0) return;
-    throw Error(ExitCode::kInternal, std::string("no pipe to a child process: ") + strerror(errno));
+    throw Error(ExitCode::kInternal,
+                std::string("cannot create a pipe to a child process: ") + strerror(errno));
   }
   ~Pipe() {
     close(ends_[0]);
@@ -56,14 +57,14 @@ void Limit(int resource, rlim_t value) {
   setrlimit(resource, &limit);
 }
 
-/// Address space that the process has now.
+/// Returns the present size of the address space.
 rlim_t AddressSpace() {
   rlim_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   return pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// In the child: sends the answer, zero-terminated so that truncation is detectable.
+/// Runs `work` in the child and sends the answer, zero-terminated so that truncation is detectable.
 [[noreturn]] void RunChild(const ChildLimits& limits, pid_t parent, const Pipe& answer,
                            const Pipe& output, const std::function<std::string()>& work) noexcept {
   setpgid(0, 0);
@@ -91,11 +92,11 @@ rlim_t AddressSpace() {
 bool ReadAnswer(int pipe_end, Clock::time_point deadline, std::string& text) {
   char buffer[4096];
   while (text.empty() || text.back() != '\0') {
-    const auto left =
+    const auto remaining_ms =
         std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
-    if (left <= 0) return false;
+    if (remaining_ms <= 0) return false;
     pollfd end{pipe_end, POLLIN, 0};
-    if (poll(&end, 1, static_cast<int>(std::min<long long>(left, 1 << 30))) <= 0) continue;
+    if (poll(&end, 1, static_cast<int>(std::min<long long>(remaining_ms, 1 << 30))) <= 0) continue;
     const ssize_t count = read(pipe_end, buffer, sizeof buffer);
     if (count == 0 || (count < 0 && errno != EINTR)) return true;
     if (count > 0) text.append(buffer, static_cast<std::size_t>(count));
@@ -111,7 +112,7 @@ std::string EndText(int status) {
   return "ended the process with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
-/// The first line in the pipe, truncated if it is too long.
+/// Reads the first line from the pipe, truncated if it is too long.
 std::string FirstLine(int pipe_end) {
   char line[80] = "";
   if (read(pipe_end, line, sizeof line - 1) < 0) return {};
@@ -124,7 +125,8 @@ std::string FirstLine(int pipe_end) {
 CallRecord::CallRecord() {
   void* const memory =
       mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throw Error(ExitCode::kInternal, "out of memory to share with a child");
+  if (memory == MAP_FAILED)
+    throw Error(ExitCode::kInternal, "out of memory shared with a child process");
   shared_ = new (memory) Shared();
 }
 
@@ -137,30 +139,31 @@ void CallRecord::Enter(const char* call, const std::string& state) {
 
 ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()>& work) {
   Pipe answer(0), output(O_NONBLOCK);
-  std::fflush(nullptr);  // else the child prints what the program has not printed yet
+  std::fflush(nullptr);  // otherwise the child prints the program's buffered output again
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) RunChild(limits, parent, answer, output, work);
   if (child < 0) {
-    throw Error(ExitCode::kInternal, std::string("no child process: ") + strerror(errno));
+    throw Error(ExitCode::kInternal,
+                std::string("cannot create a child process: ") + strerror(errno));
   }
   answer.CloseWriteEnd();
   std::string text;
   ChildEnd end;
   const auto timeout =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(limits.timeout_s));
-  end.late = !ReadAnswer(answer.read_end(), Clock::now() + timeout, text);
-  if (end.late) kill(child, SIGKILL);
+  end.timed_out = !ReadAnswer(answer.read_end(), Clock::now() + timeout, text);
+  if (end.timed_out) kill(child, SIGKILL);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  kill(-child, SIGKILL);  // processes that it has started
+  kill(-child, SIGKILL);  // processes that the child has started
   end.answered = !text.empty() && text.back() == '\0';
   if (end.answered) {
     end.text = text.substr(0, text.size() - 1);
   } else {
-    end.text =
-        end.late ? "did not return within " + NumberText(limits.timeout_s) + " s" : EndText(status);
+    end.text = end.timed_out ? "did not return within " + NumberText(limits.timeout_s) + " s"
+                             : EndText(status);
   }
   end.printed = FirstLine(output.read_end());
   return end;

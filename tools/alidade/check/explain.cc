@@ -40,10 +40,10 @@ const char* StatusText(BlockStatus status) {
   return "constant";
 }
 
-/// A number, or a list; the number alone where all are equal and `same` allows it.
-std::string ListText(const std::vector<double>& values, bool same = false) {
+/// Formats values as a list. A single value, or with `merge_equal` equal values, become one number.
+std::string ListText(const std::vector<double>& values, bool merge_equal = false) {
   const bool equal = std::equal(values.begin() + 1, values.end(), values.begin());
-  if (values.size() == 1 || (same && equal)) return NumberText(values[0]);
+  if (values.size() == 1 || (merge_equal && equal)) return NumberText(values[0]);
   std::vector<std::string> parts;
   for (const double value : values) parts.push_back(NumberText(value));
   return '[' + Join(parts) + ']';
@@ -52,7 +52,7 @@ std::string ListText(const std::vector<double>& values, bool same = false) {
 std::string SigmasText(const Eigen::MatrixXd& covariance) {
   std::vector<double> sigmas;
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    // Six digits hide the rounding of sigma -> variance -> sigma.
+    // Six digits hide the rounding error of sigma -> variance -> sigma.
     char sigma[32];
     std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(covariance(i, i)));
     sigmas.push_back(std::strtod(sigma, nullptr));
@@ -68,9 +68,9 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + SigmasText(prior.covariance);
 }
 
-/// A line for each block; what constant ones are; for each truth that is of no block, why.
-std::string States(const Problem& problem, const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
+/// Lists the blocks, explains `constant`, and states for each unused truth why it is unused.
+std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> block_truths = internal::MatchTruths(problem.layout, truths);
   std::vector<TextRow> rows = {
       {"block", "geometry", "size", "unit", "owner", "status", "truth", "starts from"}};
   for (const Prior& prior : problem.priors) {
@@ -80,10 +80,10 @@ std::string States(const Problem& problem, const std::vector<StreamInfo>& truths
     if (geometry.tangent != geometry.ambient) {
       size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
     }
-    const int truth = match[static_cast<std::size_t>(prior.block)];
+    const int truth_index = block_truths[static_cast<std::size_t>(prior.block)];
     rows.push_back({block.name, ToString(geometry.kind), size, block.space.unit, block.owner,
                     StatusText(block.status),
-                    truth >= 0       ? truths[static_cast<std::size_t>(truth)].name
+                    truth_index >= 0 ? truths[static_cast<std::size_t>(truth_index)].name
                     : truths.empty() ? ""
                                      : "-",
                     PriorText(prior, block)});
@@ -91,16 +91,16 @@ std::string States(const Problem& problem, const std::vector<StreamInfo>& truths
   std::string text = TextTable(rows, kIndent);
   const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kConstant; };
   if (std::ranges::any_of(problem.layout.blocks(), is_fixed)) {
-    text += "    constant: known exactly, without covariance; nothing moves or corrects it\n";
+    text += "    constant: known exactly, without covariance; never changes\n";
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
-    const std::string why = internal::WhyNoBlock(problem.layout, truths, t);
-    if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
+    const std::string reason = internal::WhyNoBlock(problem.layout, truths, t);
+    if (!reason.empty()) text += "    truth not used: " + truths[t].name + ", " + reason + '\n';
   }
   return text;
 }
 
-/// The control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
+/// Returns the control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
 std::string InputText(const MotionBinding& motion) {
   if (!motion.model->has_input()) return "none";
   const InputBinding& input = motion.input;
@@ -109,20 +109,20 @@ std::string InputText(const MotionBinding& motion) {
                                          : "");
 }
 
-/// A line for a state or sensor entry whose noise the config gives as a covariance; else "".
-std::string GivenNoise(const std::string& name, const std::vector<double>& root, int size) {
+/// Returns a line for a state or sensor entry whose noise is a covariance in the config; else "".
+std::string ConfigNoise(const std::string& name, const std::vector<double>& root, int size) {
   if (root.empty()) return "";
   const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
   return "    noise of " + name + ": the covariance of the config, sigma " +
          SigmasText(l * l.transpose()) + '\n';
 }
 
-std::string Motions(const Problem& problem) {
-  const bool driven = std::ranges::any_of(
+std::string MotionTable(const Problem& problem) {
+  const bool has_input = std::ranges::any_of(
       problem.motions, [](const MotionBinding& motion) { return motion.model->has_input(); });
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
-  if (driven) rows[0].emplace_back("control input");
-  std::string given;
+  if (has_input) rows[0].emplace_back("control input");
+  std::string noise_text;
   for (const MotionBinding& motion : problem.motions) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
@@ -133,10 +133,10 @@ std::string Motions(const Problem& problem) {
     const char* const kind = motion.model->discrete_noise() ? " discrete" : " continuous";
     rows.push_back({motion.name, motion.model->name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise) + kind});
-    if (driven) rows.back().push_back(InputText(motion));
-    given += GivenNoise(motion.name, motion.model->description().sqrt_noise, noise);
+    if (has_input) rows.back().push_back(InputText(motion));
+    noise_text += ConfigNoise(motion.name, motion.model->description().sqrt_noise, noise);
   }
-  return TextTable(rows, kIndent) + given;
+  return TextTable(rows, kIndent) + noise_text;
 }
 
 const char* ModeText(RoleMode mode) {
@@ -151,17 +151,17 @@ const char* ModeText(RoleMode mode) {
   return "known";
 }
 
-std::string Sensors(const Problem& problem) {
+std::string SensorTable(const Problem& problem) {
   std::vector<TextRow> rows = {
       {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
-  std::string given;
+  std::string noise_text;
   for (const SensorBinding& sensor : problem.sensors) {
-    TextRow front = {sensor.name, sensor.stream, sensor.model->name()};
-    given += GivenNoise(sensor.name, sensor.model->description().sqrt_noise,
-                        sensor.model->measurement().geometry.tangent);
+    TextRow sensor_columns = {sensor.name, sensor.stream, sensor.model->name()};
+    noise_text += ConfigNoise(sensor.name, sensor.model->description().sqrt_noise,
+                              sensor.model->measurement().geometry.tangent);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
-      TextRow row = std::exchange(front, TextRow(3));
+      TextRow row = std::exchange(sensor_columns, TextRow(3));
       row.push_back(sensor.model->roles()[i].name);
       if (sensor.model->roles()[i].landmark()) {
         row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
@@ -175,18 +175,18 @@ std::string Sensors(const Problem& problem) {
       rows.push_back(std::move(row));
     }
   }
-  return TextTable(rows, kIndent) + given;
+  return TextTable(rows, kIndent) + noise_text;
 }
 
-/// What a sensor does with the block that fills a role.
+/// Returns the effect of a sensor on the block that is bound to a role.
 const char* EffectText(const Block& block, RoleMode mode) {
   if (block.status == BlockStatus::kConstant || mode == RoleMode::kKnown) return "knows";
   const bool considers = block.status == BlockStatus::kConsider || mode == RoleMode::kConsider;
   return considers ? "considers" : "corrects";
 }
 
-/// A line for each block, a column for each motion entry and sensor.
-std::string Touches(const Problem& problem) {
+/// Returns a table of effects: a row for each block, a column for each motion entry and sensor.
+std::string EffectTable(const Problem& problem) {
   std::vector<TextRow> rows(1 + problem.layout.blocks().size());
   rows[0].push_back("block");
   for (std::size_t b = 0; b + 1 < rows.size(); ++b) {
@@ -214,13 +214,13 @@ std::string Touches(const Problem& problem) {
   return TextTable(rows, kIndent);
 }
 
-/// "target.depth together with target.depth_rate"
+/// Returns a text such as "target.depth together with target.depth_rate".
 std::string DirectionText(const std::vector<std::string>& names) {
-  const std::string rest = Join({names.begin() + 1, names.end()});
-  return names[0] + (rest.empty() ? "" : " together with " + rest);
+  const std::string other_names = Join({names.begin() + 1, names.end()});
+  return names[0] + (other_names.empty() ? "" : " together with " + other_names);
 }
 
-/// A line for each direction that is observable, but not while the control inputs are constant.
+/// Returns a line for each direction that is observable only while a control input changes.
 std::string NeedExcitation(const Problem& problem,
                            const std::vector<std::vector<std::string>>& unobservable) {
   const auto constant = internal::UnobservableDirections(problem, internal::Excitation::kConstant);
@@ -234,10 +234,10 @@ std::string NeedExcitation(const Problem& problem,
 
 std::string Unobservable(const Problem& problem) {
   if (problem.landmarks && !internal::PlaceLandmarks(problem)) {
-    return "  what can be observed depends on the landmarks\n";
+    return "  observability depends on the landmarks\n";
   }
   if (!internal::ObservabilityIsTold(problem)) {
-    return "  what can be observed is not looked into: the state has more than " +
+    return "  observability is not analysed: the state has more than " +
            std::to_string(internal::kMostObserved) + " elements\n";
   }
   const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(problem);
@@ -250,55 +250,55 @@ std::string Unobservable(const Problem& problem) {
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=
-          "    scale, of trajectory and map alike, is what the prior makes of it: depth, a stereo "
-          "pair, "
-          "odometry\n    or known landmarks determine it\n";
+          "    scale, of trajectory and map alike, is determined by the prior alone; depth, a "
+          "stereo "
+          "pair,\n    odometry or known landmarks would make it observable\n";
     }
   }
   return text + NeedExcitation(problem, unobservable);
 }
 
-std::string SupportText(const std::string& type) {
-  const internal::EstimatorType* known = internal::FindEstimatorType(type);
-  if (known == nullptr) return {};
-  const EstimatorCapabilities& can = known->capabilities;
-  const auto either = [](bool can_do, const char* with, const char* without) {
-    return std::string(can_do ? with : without);
+std::string CapabilitiesText(const std::string& type) {
+  const internal::EstimatorType* estimator_type = internal::FindEstimatorType(type);
+  if (estimator_type == nullptr) return {};
+  const EstimatorCapabilities& capabilities = estimator_type->capabilities;
+  const auto either = [](bool supported, const char* text, const char* alternative) {
+    return std::string(supported ? text : alternative);
   };
-  std::string lacks;
-  const auto lack = [&](bool can_do, const char* what) {
-    if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
+  std::string unsupported;
+  const auto add_unsupported = [&](bool supported, const char* feature) {
+    if (!supported) unsupported += (unsupported.empty() ? "" : ", ") + std::string(feature);
   };
-  lack(can.consider, "consider blocks and roles");
-  lack(can.at_measurement, "jacobian_at measurement");
-  lack(can.from_measurement, "blocks that start from a measurement");
-  lack(can.recovery, "rejection\n    recovery");
-  lack(can.landmarks, "landmarks");
-  return either(can.consider,
+  add_unsupported(capabilities.consider, "consider blocks and roles");
+  add_unsupported(capabilities.at_measurement, "jacobian_at measurement");
+  add_unsupported(capabilities.from_measurement, "blocks that start from a measurement");
+  add_unsupported(capabilities.recovery, "rejection\n    recovery");
+  add_unsupported(capabilities.landmarks, "landmarks");
+  return either(capabilities.consider,
                 "    blocks estimated, consider (Schmidt) or constant; roles estimate, consider, "
                 "known;\n",
                 "    blocks estimated or constant; roles estimate, known;\n") +
          "    control inputs; jacobian_at prediction" +
-         either(can.at_measurement, " or measurement", "") +
-         either(can.from_measurement, "; blocks that start from a measurement", "") +
-         ";\n    robust losses" + either(can.landmarks, "; landmarks", "") + '.' +
-         (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
+         either(capabilities.at_measurement, " or measurement", "") +
+         either(capabilities.from_measurement, "; blocks that start from a measurement", "") +
+         ";\n    robust losses" + either(capabilities.landmarks, "; landmarks", "") + '.' +
+         (unsupported.empty() ? "" : "\n    Not supported: " + unsupported + '.') + '\n';
 }
 
-/// What is done with out-of-sequence frames, if not the default.
-std::string OutOfSequenceText(const OutOfSequencePolicy& given) {
-  if (given.policy == OutOfSequence::kReject) return "";
-  const bool buffer = given.policy == OutOfSequence::kBuffer;
-  const char* const done = buffer ? "buffer: frames are held back"
-                                  : "rollback: the estimators go back and process them in order";
-  return std::string("  out-of-sequence frames: ") + done +
-         (given.window ? ", up to " + internal::RoundedText(Seconds(*given.window), 6) +
-                             " s behind the newest"
-                       : " to the end of the run") +
+/// Describes the treatment of out-of-sequence frames; "" for the default.
+std::string OutOfSequenceText(const OutOfSequencePolicy& handling) {
+  if (handling.policy == OutOfSequence::kReject) return "";
+  const bool buffer = handling.policy == OutOfSequence::kBuffer;
+  const char* const action = buffer ? "buffer: frames are delayed"
+                                    : "rollback: the estimators go back and process them in order";
+  return std::string("  out-of-sequence frames: ") + action +
+         (handling.window ? ", up to " + internal::RoundedText(Seconds(*handling.window), 6) +
+                                " s behind the newest"
+                          : " to the end of the run") +
          '\n';
 }
 
-/// A row for each parameter that the data tell: its key, value and place.
+/// Appends a row of key, value and position for each parameter of the calibration of the data.
 void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow>& rows) {
   for (const auto& [name, value] : map.Entries()) {
     const std::string path = key.empty() ? name : key + '.' + name;
@@ -313,15 +313,15 @@ void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow
 }
 
 std::string CalibrationText(const Config& config, const Source& source) {
-  const Config with = internal::WithCalibration(config, source);
-  const auto calibration = with.root().Find("calibration");
+  const Config calibrated = internal::WithCalibration(config, source);
+  const auto calibration = calibrated.root().Find("calibration");
   if (!calibration) return "";
   std::vector<TextRow> rows;
   AddCalibration(*calibration, "", rows);
   return "  calibration of the data\n" + TextTable(rows, kIndent);
 }
 
-/// A row for each key of the source that is one value.
+/// Returns a row for each key of the source that has a scalar value.
 std::string SourceKeys(const Node& source) {
   std::vector<TextRow> rows;
   for (const auto& [key, value] : source.Entries()) {
@@ -350,7 +350,7 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent) + SourceKeys(source);
   if (const std::string guide = experiment.source->guided_by(); !guide.empty()) {
-    text += "  guide: filter '" + guide + "' says where to look for what is measured\n";
+    text += "  guide: filter '" + guide + "' predicts the search regions of the measurements\n";
   }
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
          CalibrationText(config, *experiment.source) +
@@ -365,15 +365,15 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     const Problem& problem = spec.problem;
     const Node entry = config.root().At("estimators").At(spec.name);
     text += "\nestimator " + spec.name + " (" + spec.type + ")\n";
-    text += "  state\n" + States(problem, experiment.source->truths());
-    text += "  motion\n" + Motions(problem);
-    text += "  sensors\n" + Sensors(problem);
+    text += "  state\n" + StateTable(problem, experiment.source->truths());
+    text += "  motion\n" + MotionTable(problem);
+    text += "  sensors\n" + SensorTable(problem);
     if (problem.landmarks)
       text += "  landmarks\n" + TextTable(internal::LandmarkRows(problem), kIndent);
-    text += "  who touches which block\n" + Touches(problem);
+    text += "  effects on blocks\n" + EffectTable(problem);
     text += Unobservable(problem);
     text += "  options\n" + TextTable(internal::OptionRows(entry, spec), kIndent);
-    if (const std::string support = SupportText(spec.type); !support.empty()) {
+    if (const std::string support = CapabilitiesText(spec.type); !support.empty()) {
       text += "  type " + spec.type + " supports\n" + support;
     }
   }

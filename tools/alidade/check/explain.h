@@ -7,9 +7,9 @@
 
 namespace alidade {
 
-/// What `experiment`, made from `config`, does, for a person to read before running it: for each
-/// estimator its blocks and how they start, what moves and measures them, which directions of the
-/// state no sensor determines, its options, and what it supports.
+/// Describes `experiment`, which was built from `config`, before it is run. For each estimator: its
+/// blocks and their initial values, its motion models and sensors, unobservable directions of the
+/// state, options, and capabilities.
 std::string Explain(const Config& config, const Experiment& experiment);
 
 }  // namespace alidade

@@ -9,22 +9,25 @@ namespace alidade::internal {
 
 std::vector<TextRow> LandmarkRows(const Problem& problem) {
   const LandmarkOptions& options = *problem.landmarks;
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  const auto sensor = std::ranges::find_if(problem.sensors, sees);
+  const auto has_landmark = [](const SensorBinding& sensor) {
+    return sensor.model->has_landmark();
+  };
+  const auto sensor = std::ranges::find_if(problem.sensors, has_landmark);
   const auto representation = RepresentationOf(sensor->model->roles());
   std::vector<TextRow> rows = {
-      {"representation", representation ? ToString(*representation) : "the sensor's own"}};
-  const auto add = [&rows](const std::string& what, const std::string& text) {
-    rows.push_back({what, text});
+      {"representation", representation ? ToString(*representation) : "specific to the sensor"}};
+  const auto add = [&rows](const std::string& key, const std::string& text) {
+    rows.push_back({key, text});
   };
   if (options.prior) {
     std::string prior = "inverse distance " + NumberText(options.prior->inverse_distance) + " +- " +
                         NumberText(options.prior->sigma) + " 1/m";
     if (const int n = options.prior->adapt_after; n > 0) {
-      prior += "; once " + std::to_string(n) + " in view have converged, their median";
+      prior += "; the median of the landmarks in view, once " + std::to_string(n) +
+               " of them have converged";
     }
     if (const int n = options.prior->min_observations; n > 0) {
-      prior += "; taken at observation " + std::to_string(n);
+      prior += "; applied at observation " + std::to_string(n);
     }
     add("prior", prior);
   }

@@ -44,13 +44,13 @@ std::string RejectionRecoveryText(const EkfOptions& options, const Problem& prob
     return role.block >= 0 && role.mode == RoleMode::kEstimate &&
            problem.layout[role.block].status == BlockStatus::kEstimated;
   };
-  std::vector<std::string> without;
+  std::vector<std::string> unaffected;
   for (const SensorBinding& sensor : problem.sensors) {
-    if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
+    if (std::ranges::none_of(sensor.roles, corrects)) unaffected.push_back(sensor.name);
   }
   std::string after = " after " + std::to_string(options.rejection_recovery_after) +
                       " rejections of a sensor in a row";
-  if (!without.empty()) after += "; nothing for " + Join(without);
+  if (!unaffected.empty()) after += "; no effect for " + Join(unaffected);
   switch (options.rejection_recovery) {
     case RejectionRecovery::kReset:
       return "reset its blocks from the measurement, or inflate them," + after;
@@ -78,24 +78,25 @@ std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
   const Problem& problem = spec.problem;
   std::vector<TextRow> rows;
   if (const EstimatorType* const type = FindEstimatorType(spec.type)) {
-    const auto [options, own] = type->describe(entry);
+    const auto [options, type_rows] = type->describe(entry);
     rows = {{"gate", GateText(options, problem)}, {"fuse", FuseText(options.fuse, problem)}};
     if (type->capabilities.recovery)
       rows.push_back({"rejection_recovery", RejectionRecoveryText(options, problem)});
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                                 : "none: a gap is one step"});
-    rows.insert(rows.end(), own.begin(), own.end());
+    rows.insert(rows.end(), type_rows.begin(), type_rows.end());
   }
   if (const auto use = entry.Find("use"); use && use->is_map()) {
     rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
   }
   rows.push_back({"on_divergence", spec.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
-                                       : "report: the run goes on"});
+                                       : "report: the run continues"});
   if (spec.on_plugin_failure != OnPluginFailure::kSkip) {
-    rows.push_back({"on_plugin_failure", spec.on_plugin_failure == OnPluginFailure::kAbort
-                                             ? "abort: the run ends with exit code 69"
-                                             : "disable: a sensor that fails is no longer used"});
+    rows.push_back(
+        {"on_plugin_failure", spec.on_plugin_failure == OnPluginFailure::kAbort
+                                  ? "abort: the run ends with exit code 69"
+                                  : "disable: a sensor is disabled after a failed call"});
   }
   if (const std::string losses = LossText(problem); !losses.empty()) {
     rows.push_back({"loss", losses});

@@ -8,11 +8,10 @@
 
 namespace alidade::internal {
 
-/// How the landmarks of a problem that has some are initialised, converted and pruned: what, and
-/// how.
+/// Describes how landmarks are initialised, converted and pruned. Requires problem.landmarks.
 std::vector<TextRow> LandmarkRows(const Problem& problem);
 
-/// What the entry of an estimator sets, a key and its value in words each.
+/// Describes the options of an estimator's entry: a row of key and value for each.
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec);
 
 }  // namespace alidade::internal

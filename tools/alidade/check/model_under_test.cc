@@ -15,20 +15,19 @@ namespace alidade::internal {
 namespace {
 
 constexpr double kPoison = 1e302;
-constexpr double kGuardWord = -7.0546875e-251;  // no value that a model would compute
+constexpr double kGuardWord = -7.0546875e-251;  // a value that no model computes
 
-bool Same(double a, double b) {
+bool SameBits(double a, double b) {
   return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-/// Leaves kPoison where the locals of the next call will lie, so that one which is read before it
-/// is written shows.
+/// Fills the stack that the next call will use with kPoison, to reveal uninitialised locals.
 [[gnu::noinline]] void PoisonStack() {
   volatile double cells[4096];
   for (volatile double& cell : cells) cell = kPoison;
 }
 
-Space Named(const char* name, const Geometry& geometry) {
+Space MakeSpace(const char* name, const Geometry& geometry) {
   Space space;
   space.name = name;
   space.geometry = geometry;
@@ -45,8 +44,8 @@ std::vector<int> FirstSlots(int count) {
   return slots;
 }
 
-/// The noise that the config gives, n x n, in rows `stride` apart; false: none.
-bool CopyGiven(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
+/// Copies the n x n noise factor of the config to `l`, if any. Returns false if there is no factor.
+bool CopyConfigNoise(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
   for (int i = 0; i < n && !root.empty(); ++i) std::copy_n(root.data() + i * n, n, l + i * stride);
   return !root.empty();
 }
@@ -56,78 +55,79 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
   const int count = static_cast<int>(roles.size()), m = z.geometry.tangent;
-  const auto knowing = [&](std::vector<int> slots) {  // the known numbers are the last input
+  const auto with_known = [&](std::vector<int> slots) {  // the known numbers are the last input
     if (model.known_slot >= 0) slots.push_back(model.known_slot);
     return slots;
   };
-  const bool knows = model.known_slot >= 0;
-  Function predict{"Predict", knowing(FirstSlots(count)), {z}, {}, count, false, {}};
+  const bool has_known = model.known_slot >= 0;
+  Function predict{"Predict", with_known(FirstSlots(count)), {z}, {}, count, false, {}};
   for (const Space& role : roles) predict.matrices.push_back({m, role.geometry.tangent});
   predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
-    const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
-    const AlidadeObservation seen = Shown(nullptr, knows ? in[count] : nullptr);
-    return sensor.eval(self, &seen, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
+    const bool requested = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
+    const AlidadeObservation observation = Shown(nullptr, has_known ? in[count] : nullptr);
+    return sensor.eval(self, &observation, in, out[0], requested ? jacobians : nullptr,
+                       requested ? strides : nullptr);
   };
   model.functions.push_back(std::move(predict));
   model.functions.push_back(
       {"SqrtNoise",
-       knowing(FirstSlots(count + 1)),
+       with_known(FirstSlots(count + 1)),
        {},
        {{m, m}},
        0,
        true,
        [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
                                                    double* const* l, const std::int32_t* strides) {
-         if (CopyGiven(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
-         const AlidadeObservation seen = Shown(in[count], knows ? in[count + 1] : nullptr);
-         return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
+         if (CopyConfigNoise(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
+         const AlidadeObservation observation =
+             Shown(in[count], has_known ? in[count + 1] : nullptr);
+         return sensor.sqrt_noise(self, &observation, in, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
     model.functions.push_back(
         {"Valid",
-         knowing({count}),
+         with_known({count}),
          {},
          {},
          0,
          false,
          [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
-           const AlidadeObservation seen = Shown(in[0], knows ? in[1] : nullptr);
-           return sensor.valid(self, &seen);
+           const AlidadeObservation observation = Shown(in[0], has_known ? in[1] : nullptr);
+           return sensor.valid(self, &observation);
          }});
   }
 }
 
-/// The values of several outputs, which lie apart, in one row: in front what is in them, behind the
-/// words after the last one.
+/// Copies the values of several outputs to one row, followed by the guard words after the last one.
 std::vector<double> Gather(const std::vector<Space>& outputs, const double* const* out) {
-  constexpr int kBehind = 8;
+  constexpr int kGuardWords = 8;
   std::vector<double> row;
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    const int behind = i + 1 == outputs.size() ? kBehind : 0;
-    row.insert(row.end(), out[i], out[i] + outputs[i].geometry.ambient + behind);
+    const int guards = i + 1 == outputs.size() ? kGuardWords : 0;
+    row.insert(row.end(), out[i], out[i] + outputs[i].geometry.ambient + guards);
   }
   return row;
 }
 
-/// Puts what Gather took back, as a call has left it.
+/// Copies a row of Gather back to the outputs, with the values that a call has written.
 void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
              double* const* out) {
-  const double* from = row.data();
+  const double* begin = row.data();
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    const double* const end = from + outputs[i].geometry.ambient;
-    std::copy(from, i + 1 == outputs.size() ? row.data() + row.size() : end, out[i]);
-    from = end;
+    const double* const end = begin + outputs[i].geometry.ambient;
+    std::copy(begin, i + 1 == outputs.size() ? row.data() + row.size() : end, out[i]);
+    begin = end;
   }
 }
 
-/// y = g(other roles, z, prior), y one role or those of a landmark.
+/// Adds y = g(other roles, z, prior). y is one role or all roles of a landmark.
 void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
                    ModelUnderTest& model) {
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
   const auto count = roles.size();
-  const std::vector<int> y = model.Initialised();
+  const std::vector<int> y = model.InitialisedRoles();
   const auto is_y = [y](std::size_t i) { return std::ranges::count(y, static_cast<int>(i)) > 0; };
   const int prior = c.description->prior_count;
   Function f{"Initialise", {}, {}, {}, 0, false, {}};
@@ -148,28 +148,29 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     f.matrices.push_back({n, prior});
   }
   f.differentiated = static_cast<int>(f.slots.size());
-  const bool knows = model.known_slot >= 0;
-  if (knows) f.slots.push_back(model.known_slot);
+  const bool has_known = model.known_slot >= 0;
+  if (has_known) f.slots.push_back(model.known_slot);
   f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
                                     const std::int32_t* strides) {
-    std::vector<const double*> all(count, nullptr);
+    std::vector<const double*> role_values(count, nullptr);
     std::vector<double*> jx(count, nullptr);
     std::vector<std::int32_t> jx_strides(count, 0);
     std::size_t k = 0;
     for (std::size_t i = 0; i < count; ++i) {
       if (is_y(i)) continue;
-      all[i] = in[k];
+      role_values[i] = in[k];
       jx[i] = j[k];
       jx_strides[i] = strides[k++];
     }
-    const bool has_prior = prior > 0, apart = outputs.size() > 1;
-    std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
-    const AlidadeObservation seen = Shown(in[k], knows ? in[k + (has_prior ? 2 : 1)] : nullptr);
+    const bool has_prior = prior > 0, has_several = outputs.size() > 1;
+    std::vector<double> row = has_several ? Gather(outputs, out) : std::vector<double>();
+    const AlidadeObservation observation =
+        Shown(in[k], has_known ? in[k + (has_prior ? 2 : 1)] : nullptr);
     const std::int32_t code = sensor.initialise(
-        self, &seen, all.data(), has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
-        jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
-        has_prior ? strides[k + 1] : 0);
-    if (apart) Scatter(row, outputs, out);
+        self, &observation, role_values.data(), has_prior ? in[k + 1] : nullptr,
+        has_several ? row.data() : out[0], jx.data(), jx_strides.data(), j[k], strides[k],
+        has_prior ? j[k + 1] : nullptr, has_prior ? strides[k + 1] : 0);
+    if (has_several) Scatter(row, outputs, out);
     return code;
   };
   model.functions.push_back(std::move(f));
@@ -208,7 +209,7 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
        true,
        [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
                                                    double* const* l, const std::int32_t* strides) {
-         if (CopyGiven(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
+         if (CopyConfigNoise(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
                               strides[0]);
        }});
@@ -239,29 +240,29 @@ Buffer::Buffer(int rows, int columns)
 
 bool Buffer::Untouched() const { return *this == Buffer(rows_, columns_); }
 
-bool Buffer::GuardsWhole() const {
+bool Buffer::GuardsIntact() const {
   const Buffer fresh(rows_, columns_);
   for (std::size_t i = 0; i < cells_.size(); ++i) {
-    if (Same(fresh.cells_[i], kGuardWord) && !Same(cells_[i], kGuardWord)) return false;
+    if (SameBits(fresh.cells_[i], kGuardWord) && !SameBits(cells_[i], kGuardWord)) return false;
   }
   return true;
 }
 
 bool operator==(const Buffer& a, const Buffer& b) {
   return a.rows_ == b.rows_ && a.columns_ == b.columns_ &&
-         std::equal(a.cells_.begin(), a.cells_.end(), b.cells_.begin(), Same);
+         std::equal(a.cells_.begin(), a.cells_.end(), b.cells_.begin(), SameBits);
 }
 
-bool Unwritten(double cell) { return Same(cell, kPoison); }
+bool Unwritten(double cell) { return SameBits(cell, kPoison); }
 
-ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
-    : instance(std::move(from)) {
+ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> model_instance)
+    : instance(std::move(model_instance)) {
   const AlidadeInstance& c = instance->c();
   slots = instance->spaces();
   if (is_sensor()) {
     slots.push_back(instance->space());
     const int prior = c.description->prior_count;
-    if (prior > 0) slots.push_back(Named("prior", Geometry::Vector(prior)));
+    if (prior > 0) slots.push_back(MakeSpace("prior", Geometry::Vector(prior)));
     if (!instance->known().name.empty()) {
       known_slot = static_cast<int>(slots.size());
       slots.push_back(instance->known());
@@ -273,13 +274,13 @@ ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
     return;
   }
   const bool has_input = instance->has_input();
-  slots.push_back(Named("w", Geometry::Vector(c.description->noise_count)));
+  slots.push_back(MakeSpace("w", Geometry::Vector(c.description->noise_count)));
   if (has_input) slots.push_back(instance->space());
-  slots.push_back(Named("dt", Geometry::Vector(1)));
+  slots.push_back(MakeSpace("dt", Geometry::Vector(1)));
   AddMotion(c, instance->spaces(), has_input, *this);
 }
 
-std::vector<int> ModelUnderTest::Initialised() const {
+std::vector<int> ModelUnderTest::InitialisedRoles() const {
   const PluginSensor sensor(instance);
   std::vector<int> roles(static_cast<std::size_t>(sensor.inverse().count));
   std::iota(roles.begin(), roles.end(), sensor.inverse().role);
@@ -295,10 +296,10 @@ const Function* ModelUnderTest::Find(const std::string& name) const {
 Answer CallFunction(const Function& function, const Values& inputs, int matrices) {
   Answer answer;
   std::vector<const double*> in;
-  std::vector<double*> out, wanted;
+  std::vector<double*> out, requested;
   std::vector<std::int32_t> strides;
-  const Values given(inputs.begin(), inputs.end());  // lent: the model may write to it
-  for (const auto& input : given) in.push_back(input.empty() ? nullptr : input.data());
+  const Values passed(inputs.begin(), inputs.end());  // a copy that the model may write to
+  for (const auto& input : passed) in.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);
   for (const Shape& shape : function.matrices) {
@@ -307,17 +308,18 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   for (Buffer& buffer : answer.outputs) out.push_back(buffer.data());
   for (std::size_t i = 0; i < function.matrices.size(); ++i) {
     Buffer& buffer = answer.matrices[i];
-    // The Jacobian by a role that is not bound does not exist.
+    // The Jacobian by an unbound role does not exist.
     const bool exists =
         buffer.columns() > 0 && (!function.jacobian_per_input() || in[i] != nullptr);
-    const bool asked = matrices == kAllMatrices || matrices == static_cast<int>(i);
-    wanted.push_back(exists && (asked || function.is_noise) ? buffer.data() : nullptr);
+    const bool selected = matrices == kAllMatrices || matrices == static_cast<int>(i);
+    requested.push_back(exists && (selected || function.is_noise) ? buffer.data() : nullptr);
     strides.push_back(buffer.stride());
   }
   PoisonStack();
-  answer.code = function.call(in.data(), out.data(), wanted.data(), strides.data());
-  for (std::size_t i = 0; i < given.size() && answer.written_input < 0; ++i) {
-    if (!std::ranges::equal(given[i], inputs[i], Same)) answer.written_input = static_cast<int>(i);
+  answer.code = function.call(in.data(), out.data(), requested.data(), strides.data());
+  for (std::size_t i = 0; i < passed.size() && answer.written_input < 0; ++i) {
+    if (!std::ranges::equal(passed[i], inputs[i], SameBits))
+      answer.written_input = static_cast<int>(i);
   }
   return answer;
 }

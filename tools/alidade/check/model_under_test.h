@@ -8,14 +8,14 @@
 
 #include "alidade/plugin/model_instance.h"
 
-/// The functions of a model as the checks see them: named inputs in, guarded buffers out.
+/// Functions of a model with named inputs and guarded output buffers.
 namespace alidade::internal {
 
-/// A value for each of some spaces; an empty one is an optional role that is not bound.
+/// One value per space; an empty value is an unbound optional role.
 using Values = std::vector<std::vector<double>>;
 
-/// A row-major matrix, or a vector as one row, in cells that hold 1e302 until they are written,
-/// between words that a callee has no business to touch: in front, behind and after each row.
+/// Row-major matrix, or vector as one row. Its cells contain 1e302 until they are written. Guard
+/// words that a callee must not write surround the matrix and separate its rows.
 class Buffer {
  public:
   Buffer(int rows, int columns);
@@ -27,8 +27,8 @@ class Buffer {
   double operator()(int row, int column) const { return cells_[Index(row, column)]; }
 
   bool Untouched() const;
-  bool GuardsWhole() const;
-  /// Bit by bit.
+  bool GuardsIntact() const;
+  /// Compares the bits.
   friend bool operator==(const Buffer& a, const Buffer& b);
 
  private:
@@ -40,72 +40,71 @@ class Buffer {
   std::vector<double> cells_;
 };
 
-/// Whether a cell still has what Buffer put there.
+/// Returns true if a cell still contains the initial value of Buffer.
 bool Unwritten(double cell);
 
 struct Shape {
   int rows, columns;
 };
 
-/// One function of the plugin ABI. Its Jacobians side by side are d outputs / d inputs, in the
+/// One function of the plugin ABI. Its concatenated Jacobians are d outputs / d inputs, in the
 /// tangents, for the first `differentiated` inputs in order.
 struct Function {
-  std::string name;        ///< as the author knows it: `Predict`
+  std::string name;        ///< name in the C++ interface: `Predict`
   std::vector<int> slots;  ///< the inputs, as indices into ModelUnderTest::slots
   std::vector<Space> outputs;
-  std::vector<Shape> matrices;  ///< Jacobians; or the factor of a covariance
+  std::vector<Shape> matrices;  ///< Jacobians, or the factor of a covariance
   int differentiated = 0;
-  bool is_noise = false;  ///< the one matrix is a factor L, always written
-  /// `matrices` has null entries for what is not wanted.
+  bool is_noise = false;  ///< the only matrix is a factor L, which is always written
+  /// `matrices` has null entries for matrices that are not requested.
   std::function<std::int32_t(const double* const* inputs, double* const* outputs,
                              double* const* matrices, const std::int32_t* strides)>
       call;
 
-  /// Whether each of the differentiated inputs has a Jacobian of its own.
+  /// Returns true if each differentiated input has a separate Jacobian.
   bool jacobian_per_input() const { return std::ssize(matrices) == differentiated; }
 };
 
-/// What a call left.
+/// Results of a call.
 struct Answer {
   std::int32_t code = 0;
   std::vector<Buffer> outputs, matrices;
-  int written_input = -1;  ///< the first of its inputs that is no longer what it was
+  int written_input = -1;  ///< first input that the call has changed; -1: none
   bool ok() const { return code == ALIDADE_OK; }
   friend bool operator==(const Answer&, const Answer&) = default;
 };
 
-/// Which matrices a call asks for: none, all, or the one of an index.
+/// Matrices that a call requests: none, all, or the one with an index >= 0.
 enum : int { kNoMatrix = -1, kAllMatrices = -2 };
 
-/// A model under test: everything that its functions take, and the functions.
+/// Model under test: its functions and the spaces of their inputs.
 struct ModelUnderTest {
-  explicit ModelUnderTest(std::shared_ptr<const ModelInstance> from);
+  explicit ModelUnderTest(std::shared_ptr<const ModelInstance> model_instance);
 
   bool is_sensor() const { return instance->c().kind == ALIDADE_KIND_SENSOR; }
   const Function* Find(const std::string& name) const;
-  /// Of a sensor: the slot of its measurement.
+  /// Returns the slot of a sensor's measurement.
   int measurement_slot() const { return static_cast<int>(instance->spaces().size()); }
-  /// Of a sensor that can initialise: the roles that Initialise computes.
-  std::vector<int> Initialised() const;
+  /// Returns the roles that a sensor's Initialise computes.
+  std::vector<int> InitialisedRoles() const;
 
   std::shared_ptr<const ModelInstance> instance;
-  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one, the known
-  /// numbers where it takes any. Motion: its blocks, the noise `w`, the control input where it has
-  /// one, `dt`.
+  /// Sensor: roles, measurement, `prior` of Initialise if it needs one, known numbers if any.
+  /// Motion: blocks, noise `w`, control input if any, `dt`.
   std::vector<Space> slots;
-  int known_slot = -1;  ///< -1: it takes none
+  int known_slot = -1;  ///< slot of the known numbers; -1: none
   std::vector<Function> functions;
 };
 
 Answer CallFunction(const Function& function, const Values& inputs, int matrices);
 
-/// `depth = 0.3, orientation = (1, 0, 0, 0)`
+/// Returns a text such as `depth = 0.3, orientation = (1, 0, 0, 0)`.
 std::string StateText(const std::vector<Space>& spaces, const Values& values);
 
-/// `count` random values of the slots of a model, then states at the edges: each slot in turn zero,
-/// tiny, large or where its geometry wraps, turns over or is counted twice, the others random. The
-/// slot of a sensor's measurement is random here; half of the random states leave optional roles
-/// unbound.
+/// Returns `count` states with random values, followed by edge states. In an edge state one slot is
+/// zero, tiny, large or a special value of its geometry (wrap-around, half turn, double cover); the
+/// other slots are random. The measurement slot of a sensor is random. Half of the random states
+/// have unbound optional roles.
 std::vector<Values> RandomStates(const ModelUnderTest& model, int count, std::uint64_t seed);
 
 }  // namespace alidade::internal

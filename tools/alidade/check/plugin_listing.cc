@@ -26,7 +26,7 @@ using internal::Json;
 using internal::TextRow;
 using internal::TextTable;
 
-/// The place of a kind in a list.
+/// Returns the position of a kind in a list.
 std::ptrdiff_t RankOf(const std::string& kind) {
   constexpr std::array kOrder = {kSensorKind, kMotionKind, kSourceKind, kEstimatorKind};
   return std::ranges::find(kOrder, kind) - kOrder.begin();
@@ -42,20 +42,21 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   return entries;
 }
 
-/// `keys`, and those that every estimator has.
+/// Adds the keys that every estimator has to `keys`.
 std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
                        std::vector<std::string> choices = {}) {
     keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
   };
-  add("sensors", "list", "all", "names of those it uses, in the order of their updates");
-  add("use", "choice or map", "all", "or {accepted_by: NAME}: what that filter accepted");
-  add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
+  add("sensors", "list", "all", "names of the sensors used, in the order of their updates");
+  add("use", "choice or map", "all",
+      "or {accepted_by: NAME}: the measurements that that filter accepted");
+  add("on_divergence", "choice", "report", "fail: end the run", {"report", "fail"});
   add("on_plugin_failure", "choice", "skip",
-      "a call of a sensor that fails: leave that measurement out, or the sensor, or end the run",
+      "if a call of a sensor fails: skip the measurement, disable the sensor, or end the run",
       {"skip", "disable", "abort"});
   add("overrides", "map", "none",
-      "its own state, sensors, landmarks and initial_time_s, merged in");
+      "state, sensors, landmarks and initial_time_s of this estimator, merged into the config");
   return keys;
 }
 
@@ -65,8 +66,8 @@ std::vector<ParamInfo> KeysOf(const PluginEntry& entry) {
   return entry.is_model() ? ModelSchema(entry) : std::vector<ParamInfo>();
 }
 
-/// The entries called `name`; there may be none for a built-in estimator only.
-std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
+/// Finds the entries with a name. The result may be empty only for a built-in estimator.
+std::vector<const PluginEntry*> EntriesNamed(const PluginHost& host, const std::string& name) {
   std::vector<const PluginEntry*> entries = Sorted(host);
   std::vector<std::string> names;
   for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
@@ -74,8 +75,8 @@ std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string&
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
   if (entries.empty() && FindEstimatorType(name) == nullptr) {
     throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                                             "a name that `alidade plugins list` prints, or a "
-                                             "type of estimator",
+                                             "a name from `alidade plugins list`, or a type of "
+                                             "estimator",
                                              Nearest(name, names)) +
                                        "\n" + PluginPlaces(host));
   }
@@ -84,9 +85,9 @@ std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string&
 
 std::string Parameters(const std::vector<ParamInfo>& schema) {
   std::vector<TextRow> rows = {
-      {"parameter", "unit", "type", "range", "default", "only where", "meaning"}};
+      {"parameter", "unit", "type", "range", "default", "only if", "meaning"}};
   for (const ParamInfo& info : schema) {
-    // The keys that a source lists itself have no type.
+    // Keys that a source lists itself have no type.
     const std::string fallback =
         !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
     const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");
@@ -121,14 +122,14 @@ std::string PluginList(const PluginHost& host, bool files) {
   for (const PluginEntry* entry : Sorted(host)) {
     rows.push_back({entry->name, entry->kind, entry->doc, entry->plugin.string()});
   }
-  const std::string none = rows.size() > 1 ? "" : "\nno plugin was found\n";
+  const std::string suffix = rows.size() > 1 ? "" : "\nno plugins found\n";
   for (const EstimatorType& type : EstimatorTypes()) {
     rows.push_back({type.name, kEstimatorKind, type.doc, "built in"});
   }
   for (TextRow& row : rows) {
     if (!files) row.pop_back();
   }
-  return TextTable(rows) + none;
+  return TextTable(rows) + suffix;
 }
 
 std::string PluginListJson(const PluginHost& host) {
@@ -146,7 +147,7 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
     text =
         name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
   }
-  for (const PluginEntry* entry : Named(host, name)) {
+  for (const PluginEntry* entry : EntriesNamed(host, name)) {
     if (!text.empty()) text += '\n';
     text += entry->name + ": " + entry->kind + "\n  " + entry->doc + '\n';
     if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
@@ -168,10 +169,10 @@ std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
                     {"doc", type->doc},
                     {"parameters", JsonOf(WithCommonKeys(type->schema()))}});
   }
-  for (const PluginEntry* entry : Named(host, name)) {
-    Json& one = json.emplace_back(JsonOf(*entry));
-    one["describes"] = DescribeModel(*entry);
-    one["parameters"] = JsonOf(KeysOf(*entry));
+  for (const PluginEntry* entry : EntriesNamed(host, name)) {
+    Json& object = json.emplace_back(JsonOf(*entry));
+    object["describes"] = DescribeModel(*entry);
+    object["parameters"] = JsonOf(KeysOf(*entry));
   }
   return internal::JsonText(json);
 }

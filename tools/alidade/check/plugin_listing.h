@@ -7,18 +7,18 @@
 
 namespace alidade {
 
-/// The models, sources and estimators on offer: name, kind, doc and, with `files`, the file.
+/// Lists the available models, sources and estimators: name, kind, doc and, with `files`, the file.
 std::string PluginList(const PluginHost& host, bool files = false);
-/// The same, with files, as a JSON array of objects with `name`, `kind`, `family`, `doc`,
-/// `citation`, `file`.
+/// Returns the list as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`,
+/// `file`.
 std::string PluginListJson(const PluginHost& host);
 
-/// All there is to know of the entries called `name`: doc, citation, what they measure or move, and
-/// every parameter; also of the types of estimators that core has (`ekf`, `rts`, ...). Error:
-/// kPlugin where there is none.
+/// Describes the plugin entries and the built-in estimator (`ekf`, `rts`, ...) with a name: doc,
+/// citation, measured or moved quantities, and every parameter. Error: kPlugin if there is no such
+/// name.
 std::string PluginInfo(const PluginHost& host, const std::string& name);
-/// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
-/// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
+/// Returns the description as a JSON array: the keys of PluginListJson, `describes` (lines) and
+/// `parameters` (objects with `key`, `unit`, `type`, `range`, `default` if any, `choices`, `when`,
 /// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// x = identity (+) d. Vectors have elements of 0.03 to 30, all positive where `positive`.
+/// Draws x = identity (+) d. Vectors have elements of magnitude 0.03 to 30; `positive`: all > 0.
 std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random& random) {
   std::vector<double> x(static_cast<std::size_t>(geometry.ambient));
   std::vector<double> d;
@@ -43,7 +43,7 @@ std::vector<std::vector<double>> Edges(const Geometry& geometry) {
       break;
   }
   std::vector<std::vector<double>> edges;
-  if (geometry.kind == GeometryKind::kProduct) {  // of one part, the others at the neutral element
+  if (geometry.kind == GeometryKind::kProduct) {  // edges of one part, identity of the others
     geometry.ForEachPart([&](const Geometry& part, int a, int) {
       for (const std::vector<double>& edge : Edges(part)) {
         edges.emplace_back(static_cast<std::size_t>(geometry.ambient));
@@ -59,7 +59,7 @@ std::vector<std::vector<double>> Edges(const Geometry& geometry) {
   return edges;
 }
 
-/// dt of 1 ms to 3 s, and its edges.
+/// Draws dt from 1 ms to 3 s.
 double RandomStep(Random& random) { return std::pow(10.0, 3.5 * random.Uniform() - 3.0); }
 
 std::vector<double> RandomNoise(int size, Random& random) {

@@ -154,8 +154,8 @@ PluginHost Input::Host(const Config& loaded) const {
 }
 
 PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& other_configs) const {
-  std::set<std::string> names = WordsOf(loaded);
-  for (const Config& other : other_configs) names.merge(WordsOf(other));
+  std::set<std::string> names = KeysAndScalarsOf(loaded);
+  for (const Config& other : other_configs) names.merge(KeysAndScalarsOf(other));
   return PluginHost(PluginPathsOf(*this, loaded), OnRefusal::kThrow, names);
 }
 

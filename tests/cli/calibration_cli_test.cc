@@ -228,7 +228,8 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
 TEST_F(CalibrationCli, ASourceWithoutCalibrationRefusesTheKey) {
   const Outcome outcome = Run("config.yaml", "source.calibration=use");
   EXPECT_EQ(outcome.code, 78);
-  EXPECT_TRUE(Contains(outcome.err, "source.calibration: this source brings no calibration"))
+  EXPECT_TRUE(
+      Contains(outcome.err, "source.calibration: this source does not provide a calibration"))
       << outcome.err;
   Write("own.yaml", testing::kDepthConfig + "calibration: {camera: {fx: 5}}\n");
   EXPECT_TRUE(Contains(Run("own.yaml").err, "calibration: not a key of a config"));

@@ -73,7 +73,7 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   }
   const Outcome iekf = Call({"explain", "config.yaml", "--set", "estimators.ekf.type=iekf"});
   for (const char* part :
-       {"(iekf)", "max_iterations      10", "tolerance           1e-04 sigma of the posterior",
+       {"(iekf)", "max_iterations      10", "tolerance           1e-04 posterior sigma",
         "blocks estimated or constant; roles estimate, known;",
         "Not supported: consider blocks and roles, jacobian_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;

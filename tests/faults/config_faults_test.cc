@@ -104,7 +104,8 @@ const Fault kKeyFaults[] = {
     MakeFault("02_title_is_a_list", "depth", {{"alidade", "title: [a, b]\nalidade"}}, 1, "title: "),
     MakeFault("02_truth_of_no_block", "depth",
               {{kDepthSource, Rows("truth: {depth_rate: s,\n  detph: d}")}}, 29,
-              "source.truth.detph: truth of no block: no block has this name; expected the name "
+              "source.truth.detph: the truth does not match a block: no block has this name; "
+              "expected the name "
               "and size of one block, as in ENTRY.BLOCK; did you mean 'depth'?"),
     MakeFault("02_truth_sigma_of_no_truth", "depth",
               {After(kEkf, "evaluate: {truth_sigma: {dept: 0.01}}")}, 31,
@@ -148,7 +149,7 @@ const Fault kBlockFaults[] = {
     MakeFault(
         "25_constant_and_consider", "depth",
         {{"    noise:", "    consider: [depth_rate]\n    constant: [depth_rate]\n    noise:"}}, 7,
-        "constant: block 'depth_rate' is in `consider` too; expected a block in one of them"),
+        "constant: block 'depth_rate' is also in `consider`; expected the block in one of them"),
     MakeFault("25_cyclic_start", "depth",
               {{"{mean: 0.3, sigma: 0.1}", "{from_measurement: a_by_b}"},
                {"{mean: 3.3, sigma: 0.5}", "{from_measurement: b_by_a}"},
@@ -178,21 +179,24 @@ const Fault kBlockFaults[] = {
               5, "depth"),
     MakeFault("25_truth_given_twice", "depth",
               {{kDepthSource, Rows("truth: {target.depth: d,\n  depth: d}")}}, 29,
-              "source.truth.depth: truth of no block: target.depth has a truth of its full name"),
+              "source.truth.depth: the truth does not match a block: target.depth has another "
+              "truth with its full name"),
     MakeFault("25_truth_of_two_blocks", "depth",
               {{kTemplateBlocks, "{value: depth}"},
                {"{inverse_distance: {mean", "{depth: {mean"},
                {kTemplateBlock, "template.depth"},
                {kDepthSource, Rows("truth: {depth_rate: s,\n  depth: d}")}},
               29,
-              "source.truth.depth: truth of no block: it may be of target.depth or template.depth"),
+              "source.truth.depth: the truth does not match a block: it may belong to target.depth "
+              "or template.depth"),
     MakeFault("44_geometry_of_a_role", "depth",
               {After(kTemplateBlocks, "    size: 2"), {"mean: 3.3", "mean: [3.3, 1]"}}, 26,
-              "block 'template.inverse_distance' is of geometry vector(2); expected vector(1), as "
+              "block 'template.inverse_distance' has geometry vector(2); expected vector(1), as "
               "role 'inverse_distance' of model 'scale_2d'"),
     MakeFault("44_truth_of_another_size", "depth",
               {{kDepthSource, Rows("truth: {depth_rate: s,\n  target.depth: [d, s]}")}}, 29,
-              "source.truth.target.depth: truth of no block: target.depth has size 1, not 2"),
+              "source.truth.target.depth: the truth does not match a block: target.depth has size "
+              "1, not 2"),
 };
 
 const Fault kEstimatorFaults[] = {
@@ -204,17 +208,17 @@ const Fault kEstimatorFaults[] = {
               "you mean 'batch'?"),
     MakeFault("02_unknown_key_of_an_estimator", "depth", {{kEkf, "{type: ekf, gaet: 1}"}}, 30,
               "did you mean 'gate'"),
-    MakeFault(
-        "02_use_of_no_choice", "depth", {After(kEkf, "  other: {type: ekf, use: some}")}, 31,
-        "estimators.other.use: not a choice of data: 'some'; expected all, or {accepted_by: NAME}"),
+    MakeFault("02_use_of_no_choice", "depth", {After(kEkf, "  other: {type: ekf, use: some}")}, 31,
+              "estimators.other.use: 'some' is not a choice of data; expected all, or "
+              "{accepted_by: NAME}"),
     MakeFault("02_use_of_no_estimator", "depth",
               {After(kEkf, "  other: {type: ekf, use: {accepted_by: efk}}")}, 31,
               "estimators.other.use.accepted_by: no estimator 'efk'; expected a name from "
               "`estimators`; did you mean 'ekf'?"),
     MakeFault("10_estimator_name_taken", "depth", {{"ekf: {type: ekf}", "figures: {type: ekf}"}},
               30,
-              "estimators.figures: 'figures' cannot name an estimator: the run folder has one of "
-              "that name"),
+              "estimators.figures: 'figures' cannot name an estimator: the run folder uses this "
+              "name"),
     MakeFault("10_gate_one", "depth", {{kEkf, "{type: ekf, gate: 1, fuse: joint}"}}, 30,
               "estimators.ekf.gate: '1' is out of range; expected a number in (0, 1), or none"),
     MakeFault("10_gate_zero", "depth", {{kEkf, "{type: ekf, gate: 0, fuse: joint}"}}, 30,
@@ -222,15 +226,16 @@ const Fault kEstimatorFaults[] = {
     MakeFault("10_max_dt_zero", "depth", {{kEkf, "{type: ekf, max_dt_s: 0}"}}, 30, "max_dt_s"),
     MakeFault("10_one_iteration", "depth", {{kEkf, "{type: iekf, max_iterations: 1}"}}, 30,
               "max_iterations: '1' is out of range; expected an integer in [2, 1000]"),
-    MakeFault("25_use_of_a_smoother", "depth",
-              {{"ekf: {type: ekf}",
-                "smoother: {type: rts}\n  ekf: {type: ekf, use: {accepted_by: smoother}}"}},
-              31,
-              "estimators.ekf.use.accepted_by: 'smoother' has its estimates at the end only; "
-              "expected a filter"),
     MakeFault(
-        "25_use_of_itself", "depth", {{kEkf, "{type: ekf, use: {accepted_by: ekf}}"}}, 30,
-        "estimators.ekf.use.accepted_by: 'ekf' is this estimator itself; expected another one"),
+        "25_use_of_a_smoother", "depth",
+        {{"ekf: {type: ekf}",
+          "smoother: {type: rts}\n  ekf: {type: ekf, use: {accepted_by: smoother}}"}},
+        31,
+        "estimators.ekf.use.accepted_by: 'smoother' has estimates only at the end of the run; "
+        "expected a filter"),
+    MakeFault("25_use_of_itself", "depth", {{kEkf, "{type: ekf, use: {accepted_by: ekf}}"}}, 30,
+              "estimators.ekf.use.accepted_by: 'ekf' is this estimator itself; expected another "
+              "estimator"),
     MakeFault("25_use_of_one_listed_after", "depth",
               {After("estimators:", "  first: {type: ekf, use: {accepted_by: ekf}}")}, 30,
               "estimators.first.use.accepted_by: 'ekf' is listed after 'first'; expected an "
@@ -295,7 +300,7 @@ const Fault kLandmarkFaults[] = {
     MakeFault("camera_key_missing", "landmarks", {{"focal_px", "focal"}}, 2, "camera.focal_px"),
     MakeFault("landmarks_attempts_without_a_ratio", "landmarks",
               {After(kPrior, "  prune: {min_attempts: 30}")}, 11,
-              "landmarks.prune.min_attempts: without a use"),
+              "landmarks.prune.min_attempts: has no effect without"),
     MakeFault("landmarks_known_position_of_two", "landmarks",
               {After(kPrior, "  known:\n    - {id: 3, position: [0, 1], sigma: 0}")}, 12,
               "landmarks.known[0].position"),
@@ -321,18 +326,17 @@ const Fault kLandmarkFaults[] = {
     MakeFault(
         "landmarks_prior_missing", "landmarks", {{kPrior, "max_per_frame: 30"}}, 10,
         "landmarks: no prior: model 'pixels' of sensor 'pixels' does not determine the distance"),
-    MakeFault(
-        "landmarks_ransac_of_one", "pose",
-        {After("sigma_px: 1.0", "    outlier_rejection: {method: one_point_ransac}"),
-         {kEkf, "{type: ekf, fuse: per_measurement}"}},
-        27, "estimators.ekf.fuse: one match has no others to agree with, as sensor 'pixels' asks"),
+    MakeFault("landmarks_ransac_of_one", "pose",
+              {After("sigma_px: 1.0", "    outlier_rejection: {method: one_point_ransac}"),
+               {kEkf, "{type: ekf, fuse: per_measurement}"}},
+              27, "estimators.ekf.fuse: the `outlier_rejection` of sensor 'pixels' needs several"),
     MakeFault("landmarks_representation_unknown", "landmarks",
               {After(kPrior, "  representation: polar")}, 11, "landmarks.representation"),
     MakeFault("landmarks_role_of_a_block", "landmarks",
               {{"landmark: landmarks", "landmark: cam.position"}}, 15,
-              "sensors.pixels.roles.landmark: not the landmarks"),
+              "sensors.pixels.roles.landmark: not `landmarks`"),
     MakeFault("landmarks_that_cannot_begin", "landmarks", {{kPrior, "representation: xyz"}}, 10,
-              "landmarks: no sensor determines where a landmark is when it is first seen"),
+              "landmarks: no sensor can initialise a landmark from its first measurement"),
     MakeFault("landmarks_unknown_key", "landmarks", {After(kPrior, "  max_per_fram: 30")}, 11,
               "did you mean 'max_per_frame'?"),
     MakeFault("landmarks_unknown_key_of_prune", "landmarks",
@@ -350,7 +354,7 @@ const Fault kLandmarkFaults[] = {
     MakeFault(
         "landmarks_xyz_to_xyz", "landmarks",
         {After(kPrior, "  representation: xyz\n  convert_to_xyz: {max_linearity_index: 0.1}")}, 12,
-        "landmarks.convert_to_xyz: landmarks are xyz already"),
+        "landmarks.convert_to_xyz: landmarks already have the representation xyz"),
 };
 
 class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<Fault> {

@@ -315,7 +315,7 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0.1,0\n");
   const Outcome table = Run("map.yaml", columns, 65);
   EXPECT_TRUE(Contains(table.err,
-                       "turn.csv:3 orientation: a quaternion whose length is off by 0.004988; "
+                       "turn.csv:3 orientation: the length of a quaternion is off by 0.004988; "
                        "expected unit length to 1e-3"))
       << table.err;
 }
@@ -325,8 +325,8 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   Write("truth.tum", "1000 0 0 0 0 0 0 1\n");
   const Outcome run = Run("map.yaml");
   EXPECT_TRUE(Contains(run.out,
-                       "no frame has the truth of cam.position, cam.orientation; are its times "
-                       "those of the measurements?"))
+                       "no frame has the truth of cam.position, cam.orientation; do its times "
+                       "match those of the measurements?"))
       << run.out;
   Write("truth.tum", "0 0 0 0 0 0 0 1\n");
   EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));

@@ -628,12 +628,13 @@ class Aside : public Guide {
     at_.clear();
     for (const Measurement& m : frame.measurements) at_[m.landmark] = m.values;
   }
-  std::vector<Expected> Expect(int stream, Timestamp,
-                               const std::vector<std::int64_t>& ids) const override {
+  std::vector<ExpectedMeasurement> Expect(int stream, Timestamp,
+                                          const std::vector<std::int64_t>& ids) const override {
     EXPECT_EQ(stream, 0);
-    std::vector<Expected> all;
+    std::vector<ExpectedMeasurement> all;
     for (const std::int64_t id : ids) {
-      Expected& one = all.emplace_back(Expected{at_.at(id), {0.25, 0.0, 0.0, 0.25}});
+      ExpectedMeasurement& one =
+          all.emplace_back(ExpectedMeasurement{at_.at(id), {0.25, 0.0, 0.0, 0.25}});
       if (std::ssize(all) <= count_) one.z[1] += by_px_;
     }
     return all;
@@ -663,7 +664,7 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
     ASSERT_TRUE(source->Next(first));
     ASSERT_GT(first.measurements.size(), 15u);
     guide.Take(first);
-    source->LendGuide(&guide);
+    source->SetGuide(&guide);
     ASSERT_TRUE(source->Next(second));
     std::set<std::int64_t> before, kept;
     for (const Measurement& m : first.measurements) before.insert(m.landmark);
@@ -790,7 +791,7 @@ TEST_F(ImageTracks, AreFoundWithoutAGuideThatIsFarOff) {
   SourceFrame first, second;
   ASSERT_TRUE(source->Next(first));
   guide.Take(first);
-  source->LendGuide(&guide);
+  source->SetGuide(&guide);
   ASSERT_TRUE(source->Next(second));
   std::set<std::int64_t> kept;
   for (const Measurement& m : second.measurements) kept.insert(m.landmark);
@@ -851,14 +852,14 @@ TEST_F(ImageTracks, AGuideIsAFilterOfTheConfig) {
   EXPECT_TRUE(Contains(unknown.err, "did you mean 'ekf'")) << unknown.err;
   const Outcome held = Call({"run", "config.yaml", "--set", "out_of_sequence={policy: buffer}"});
   EXPECT_EQ(held.code, 78);
-  EXPECT_TRUE(Contains(held.err, "before the next is measured")) << held.err;
+  EXPECT_TRUE(Contains(held.err, "before the source measures the next")) << held.err;
   const Outcome blind = Call({"run", "config.yaml", "--set", "sensors.pixels.stream=other"});
   EXPECT_EQ(blind.code, 78) << blind.err;
   const Outcome batch = Call({"run", "config.yaml", "--set", "estimators.ekf={type: ceres_batch}"});
   EXPECT_EQ(batch.code, 78);
-  EXPECT_TRUE(Contains(batch.err, "estimator 'ekf' (ceres_batch) predicts no measurements"))
+  EXPECT_TRUE(Contains(batch.err, "estimator 'ekf' (ceres_batch) cannot predict measurements"))
       << batch.err;
-  EXPECT_TRUE(Contains(batch.err, "expected none, for `estimators` has no recursive filter"))
+  EXPECT_TRUE(Contains(batch.err, "expected none, as `estimators` has no recursive filter"))
       << batch.err;
   const Outcome other = Call({"run", "config.yaml", "--set", "estimators.all={type: ceres_batch}",
                               "--set", "source.guide=all"});

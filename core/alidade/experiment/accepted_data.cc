@@ -7,8 +7,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Whether each measurement of a sensor was used, in the order of the frame, as the report is.
-std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
+/// Returns whether each measurement of a sensor was used, in the order of the frame and the report.
+std::vector<bool> UsedMeasurements(int sensor, const UpdateReport& report) {
   std::vector<bool> used;
   for (const MeasurementReport& entry : report.measurements()) {
     if (entry.sensor != sensor) continue;
@@ -19,21 +19,21 @@ std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
 
 }  // namespace
 
-Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const Problem& problem,
-                 const UpdateReport& report) {
+Frame AcceptedMeasurements(const Frame& frame, const std::vector<StreamInfo>& streams,
+                           const Problem& problem, const UpdateReport& report) {
   Frame accepted{frame.timestamp, {}};
-  std::vector<std::optional<std::vector<bool>>> used(streams.size());  // none: of no sensor
+  std::vector<std::optional<std::vector<bool>>> used(streams.size());  // empty: no sensor reads it
   for (int sensor = 0; sensor < std::ssize(problem.sensors); ++sensor) {
     const std::string& stream = problem.sensors[static_cast<std::size_t>(sensor)].stream;
     const auto found = std::ranges::find(streams, stream, &StreamInfo::name);
     ALIDADE_EXPECTS(found != streams.end());
-    used[static_cast<std::size_t>(found - streams.begin())] = UsedOf(sensor, report);
+    used[static_cast<std::size_t>(found - streams.begin())] = UsedMeasurements(sensor, report);
   }
   std::vector<std::size_t> next(streams.size(), 0);
   for (const Measurement& m : frame.measurements) {
     const auto stream = static_cast<std::size_t>(m.stream);
-    const std::size_t at = next[stream]++;
-    const bool is_used = !used[stream] || (at < used[stream]->size() && (*used[stream])[at]);
+    const std::size_t index = next[stream]++;
+    const bool is_used = !used[stream] || (index < used[stream]->size() && (*used[stream])[index]);
     if (is_used) accepted.measurements.push_back(m);
   }
   return accepted;

@@ -7,9 +7,10 @@
 
 namespace alidade::internal {
 
-/// `frame` with those of its measurements alone that an estimator of `problem` accepted or took as
-/// first values, as its `report` of the frame says. Each of its streams goes to one sensor.
-Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const Problem& problem,
-                 const UpdateReport& report);
+/// Returns `frame` with only the measurements that an estimator of `problem` accepted, or with
+/// which it initialised a state, according to its `report`. Each stream must belong to one sensor
+/// only.
+Frame AcceptedMeasurements(const Frame& frame, const std::vector<StreamInfo>& streams,
+                           const Problem& problem, const UpdateReport& report);
 
 }  // namespace alidade::internal

@@ -16,15 +16,17 @@
 namespace alidade::internal {
 namespace {
 
-/// What the estimator of a plugin can do. One that does not state it refuses by itself the rest.
-const EstimatorCapabilities& SupportOf(const PluginEntry& entry) {
-  static constexpr EstimatorCapabilities kUnsaid = {
+/// Returns the capabilities of the estimator of a plugin. An estimator that does not declare them
+/// must itself reject problems that it does not support.
+const EstimatorCapabilities& CapabilitiesOf(const PluginEntry& entry) {
+  static constexpr EstimatorCapabilities kUndeclared = {
       .consider = true, .at_measurement = true, .from_measurement = true};
   const EstimatorCapabilities* const capabilities = EstimatorOf(entry).capabilities;
-  return capabilities != nullptr ? *capabilities : kUnsaid;
+  return capabilities != nullptr ? *capabilities : kUndeclared;
 }
 
-/// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
+/// Returns the index of the stream that the entry of a sensor or an input names. Its size must be
+/// `size`; the error names `wanted_by` as the reason.
 int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
                  const std::vector<StreamInfo>& streams) {
   const Node node = entry.At("stream");
@@ -43,7 +45,8 @@ int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
   return static_cast<int>(index);
 }
 
-/// Names of the sensors an estimator uses, in its own order; empty: all, in the config's.
+/// Returns the names of the sensors of an estimator in its own order; empty means all sensors in
+/// the order of the config.
 std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   std::vector<std::string> names;
   const auto list = entry.Find("sensors");
@@ -60,86 +63,88 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
     }
     names.push_back(name);
   }
-  if (names.empty()) list->Fail("empty", "at least one sensor, or leave the key out for all");
+  if (names.empty())
+    list->Fail("empty", "at least one sensor, or the key left out to use all sensors");
   return names;
 }
 
 void CheckName(const std::string& name, const Node& entry) {
   ExpectName(name, entry, "an estimator");
   if (name == "figures") {
-    entry.Fail("'figures' cannot name an estimator: the run folder has one of that name",
-               "another name");
+    entry.Fail("'figures' cannot name an estimator: the run folder uses this name", "another name");
   }
 }
 
-[[noreturn]] void FailOffered(const std::string& type, const PluginHost& host, const Node& node) {
+[[noreturn]] void FailUnknownType(const std::string& name, const PluginHost& host,
+                                  const Node& node) {
   std::vector<std::string> of_core, of_plugins;
-  for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
+  for (const EstimatorType& type : EstimatorTypes()) of_core.emplace_back(type.name);
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == kEstimatorKind) of_plugins.push_back(entry.name);
   }
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
-  const std::string expected = Join(of_core) + ", built in, or of a plugin: " +
-                               (of_plugins.empty() ? "none was found" : Join(of_plugins));
+  const std::string expected = "a built-in type: " + Join(of_core) + ", or the type of a plugin: " +
+                               (of_plugins.empty() ? "none found" : Join(of_plugins));
   constexpr const char* kHint =
-      "\n  batch estimators come with a build that found the Ceres solver: "
+      "\n  batch estimators need a build with the Ceres solver: "
       "cmake --preset release && cmake --build --preset release";
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
-                        "no estimator '" + type + "' is built in, and no plugin offers it",
-                        expected, Nearest(type, names)) +
+                        "no estimator type '" + name + "' is built in or offered by a plugin",
+                        expected, Nearest(name, names)) +
                   (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
 }
 
-/// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
-const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
+/// Returns the entry of the estimator `type` of a plugin. Error: kPlugin if no plugin offers it.
+const PluginEntry& FindPluginEstimator(const std::string& type, const PluginHost& host,
+                                       const Node& node) {
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == kEstimatorKind && entry.name == type) return entry;
   }
-  if (!host.complete()) FailOffered(type, host.Complete(), node);
-  FailOffered(type, host, node);
+  if (!host.complete()) FailUnknownType(type, host.Complete(), node);
+  FailUnknownType(type, host, node);
 }
 
-/// Refuses by name what `problem`, built from the config `root`, asks for beyond `capabilities`.
+/// Rejects a problem, read from the config `root`, that needs more than `capabilities`.
 void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& capabilities,
                        const Node& root, const Problem& problem) {
-  const auto asked = FindUnsupported(problem, capabilities);
-  if (!asked) return;
-  NodeOf(*asked, root, problem)
-      .Fail("estimator type '" + type + "' does not support " + asked->what,
-            asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
+  const auto defect = FindUnsupported(problem, capabilities);
+  if (!defect) return;
+  FindDefectNode(*defect, root, problem)
+      .Fail("estimator type '" + type + "' does not support " + defect->what,
+            defect->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 
-/// The same for the keys of an estimator's entry that other types have, where they are left unread
-/// once its own have been read.
+/// Rejects keys of other estimator types that are still unread after the keys of this type were
+/// read.
 void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
   constexpr std::pair<const char*, const char*> kKeys[] = {
       {"gate", "gate"},
       {"fuse", "choice of updates"},
       {"jacobian", "choice of Jacobian"},
       {"rejection_recovery", "rejection recovery"}};
-  for (const auto& [key, what] : kKeys) {
+  for (const auto& [key, feature] : kKeys) {
     if (!entry.HasUnread(key)) continue;
-    entry.At(key).Fail("estimator type '" + type + "' has no " + what,
+    entry.At(key).Fail("estimator type '" + type + "' has no " + feature,
                        "the key left out, or type: ekf");
   }
 }
 
-/// Refuses `fuse: per_measurement` where a sensor looks for matches that agree.
-void RefuseLoneMatches(const Node& entry, const Problem& problem) {
+/// Rejects `fuse: per_measurement` if a sensor has `outlier_rejection`, which compares matches.
+void RefuseSingleMatches(const Node& entry, const Problem& problem) {
   const auto fuse = entry.Find("fuse");
   if (!fuse || fuse->Text() != "per_measurement") return;
   for (const SensorBinding& sensor : problem.sensors) {
     if (!sensor.outlier_rejection) continue;
-    fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
-                   "' asks by its `outlier_rejection`",
+    fuse->Fail("the `outlier_rejection` of sensor '" + sensor.name +
+                   "' needs several matches in one update",
                "joint or per_sensor");
   }
 }
 
-/// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
-/// that is not one of `merged` either, for it has no model.
+/// Rejects overrides of keys that all estimators share. Also rejects an override of an entry that
+/// `root` does not have, unless `merged` has a model for it.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
   for (const auto& [key, value] : overrides.Entries()) {
     if (key == "initial_time_s" || key == "landmarks") continue;
@@ -158,83 +163,84 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
   }
 }
 
-/// Refuses `filter` where what it accepted does not tell what `spec` is to see.
-void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& by) {
+/// Rejects `filter` if its accepted measurements do not determine the data of `spec`. `key` is the
+/// node of the error.
+void CheckAccepts(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& key) {
   const std::string quoted = '\'' + filter.name + '\'';
   if (filter.estimator->offline()) {
-    by.Fail(quoted + " has its estimates at the end only", "a filter");
+    key.Fail(quoted + " has estimates only at the end of the run", "a filter");
   }
   for (const SensorBinding& sensor : spec.problem.sensors) {
     const int index = filter.problem.FindSensor(sensor.name);
-    const auto& theirs = filter.problem.sensors;
-    if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
-      by.Fail(
+    const auto& sensors = filter.problem.sensors;
+    if (index < 0 || sensors[static_cast<std::size_t>(index)].stream != sensor.stream) {
+      key.Fail(
           quoted + " does not use sensor '" + sensor.name + "' on stream '" + sensor.stream + "'",
           "an estimator with the same sensors");
     }
-    if (std::ranges::count(theirs, sensor.stream, &SensorBinding::stream) > 1) {
-      by.Fail("stream '" + sensor.stream + "' goes to several sensors of " + quoted +
-                  ": one may accept what another does not",
-              "a stream for each sensor");
+    if (std::ranges::count(sensors, sensor.stream, &SensorBinding::stream) > 1) {
+      key.Fail("several sensors of " + quoted + " use stream '" + sensor.stream +
+                   "', and may accept different measurements",
+               "a different stream for each sensor");
     }
   }
 }
 
-/// Refuses a control input of `spec` that is a measurement of `filter`, which may not accept it.
-void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& by) {
+/// Rejects a control input of `spec` that is also a measurement of `filter`, which may reject it.
+void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const Node& key) {
   for (const MotionBinding& motion : spec.problem.motions) {
     const std::string& stream = motion.input.stream;
-    const auto& theirs = filter.problem.sensors;
-    const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
-    if (!motion.model->has_input() || sensor == theirs.end()) continue;
-    by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
-                "' and goes to sensor '" + sensor->name + "' of '" + filter.name +
-                "': what that does not accept would be missing as an input",
-            "a filter without a sensor on that stream");
+    const auto& sensors = filter.problem.sensors;
+    const auto sensor = std::ranges::find(sensors, stream, &SensorBinding::stream);
+    if (!motion.model->has_input() || sensor == sensors.end()) continue;
+    key.Fail("stream '" + stream + "' is the control input of '" + motion.name +
+                 "' and the stream of sensor '" + sensor->name + "' of '" + filter.name +
+                 "', so rejected measurements would be missing as inputs",
+             "a filter without a sensor on that stream");
   }
 }
 
-/// Index of the estimator whose accepted measurements `spec` is to see, as the key `use` says; -1:
-/// it sees all. `before` are those listed before it. Error: kBadConfig.
+/// Returns the index of the estimator whose accepted measurements `spec` uses according to the key
+/// `use`; -1 if it uses all. `before` are the estimators listed before it. Error: kBadConfig.
 int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
             const std::vector<EstimatorSpec>& before) {
   if (!use.is_map()) {
     if (use.Text() == "all") return -1;
-    use.Fail("not a choice of data: '" + use.Text() + "'", "all, or {accepted_by: NAME}");
+    use.Fail("'" + use.Text() + "' is not a choice of data", "all, or {accepted_by: NAME}");
   }
-  const Node by = use.At("accepted_by", "use");
-  const std::string name = by.Text();
-  if (name == spec.name) by.Fail("'" + name + "' is this estimator itself", "another one");
+  const Node key = use.At("accepted_by", "use");
+  const std::string name = key.Text();
+  if (name == spec.name) key.Fail("'" + name + "' is this estimator itself", "another estimator");
   const auto found = std::ranges::find(before, name, &EstimatorSpec::name);
   if (found == before.end()) {
     std::vector<std::string> known;
-    for (const auto& [other, entry] : estimators.Entries()) known.push_back(other);
+    for (const auto& [listed, entry] : estimators.Entries()) known.push_back(listed);
     if (std::ranges::find(known, name) != known.end()) {
-      by.Fail("'" + name + "' is listed after '" + spec.name + "'",
-              "an estimator listed before, which has each frame first");
+      key.Fail("'" + name + "' is listed after '" + spec.name + "'",
+               "an estimator listed before it, which processes each frame first");
     }
     std::erase(known, spec.name);
-    by.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
+    key.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
   }
-  CheckAccepts(*found, spec, by);
+  CheckAccepts(*found, spec, key);
   const int first = static_cast<int>(found - before.begin());
   for (int i = first; i >= 0; i = before[static_cast<std::size_t>(i)].accepted_by) {
-    CheckInputs(before[static_cast<std::size_t>(i)], spec, by);
+    CheckInputs(before[static_cast<std::size_t>(i)], spec, key);
   }
   return first;
 }
 
-/// Makes the estimator of the entry `node`, of a plugin unless null. Error: kPlugin.
-std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const EstimatorSpec& spec,
-                                const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
-                                const Node& node) {
-  const auto made = [&] {
+/// Creates the estimator of the entry `node`. `plugin` is null for a built-in type. Error: kPlugin.
+std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const EstimatorSpec& spec,
+                                  const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
+                                  const Node& node) {
+  const auto create = [&] {
     return make(spec.problem, streams != nullptr ? *streams : spec.problem.streams);
   };
-  if (plugin == nullptr) return made();
+  if (plugin == nullptr) return create();
   std::string why = "an exception of unknown type";
   try {
-    return made();
+    return create();
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
@@ -249,7 +255,7 @@ std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const EstimatorSpec&
                             " failed while being created: " + why));
 }
 
-/// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
+/// Rejects an estimator that cannot roll back for out-of-sequence frames.
 void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
   if (spec.estimator->offline() || spec.estimator->Clone() != nullptr) return;
   entry.At("type").Fail(
@@ -269,10 +275,10 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
   spec.type = type.Text();
   const EstimatorType* const of_core = FindEstimatorType(spec.type);
   const PluginEntry* const of_plugin =
-      of_core == nullptr ? &FindOffered(spec.type, host, type) : nullptr;
+      of_core == nullptr ? &FindPluginEstimator(spec.type, host, type) : nullptr;
   spec.kind = of_core != nullptr ? of_core->kind : EstimatorOf(*of_plugin).kind;
   const EstimatorCapabilities& capabilities =
-      of_core != nullptr ? of_core->capabilities : SupportOf(*of_plugin);
+      of_core != nullptr ? of_core->capabilities : CapabilitiesOf(*of_plugin);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : CreateEstimator(host, spec.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -285,34 +291,35 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     const auto rollback = order ? order->Find("policy") : std::nullopt;
     if (spec.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
         rollback->Text() == "rollback") {
-      policy->Fail("a rollback gives frames of before again, with the sensor",
+      policy->Fail("a rollback processes earlier frames again, with the sensor",
                    "skip or abort, or another out_of_sequence.policy");
     }
   }
   const auto overrides = entry.Find("overrides");
-  const Config own = overrides ? config.Merged(*overrides) : config;
+  const Config merged = overrides ? config.Merged(*overrides) : config;
   if (overrides) {
-    CheckOverrides(*overrides, config.root(), own.root());
+    CheckOverrides(*overrides, config.root(), merged.root());
     spec.overrides = overrides->ToYaml();
   }
-  const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  const std::vector<std::string> sensor_names = ReadSensorList(entry, merged.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
   RefuseUnsupportedKeys(spec.type, entry);
   entry.RejectUnread();
-  spec.problem = ReadProblem(own.root(), host, only);
-  RefuseUnsupported(spec.type, capabilities, own.root(), spec.problem);
+  spec.problem = ReadProblem(merged.root(), host, sensor_names);
+  RefuseUnsupported(spec.type, capabilities, merged.root(), spec.problem);
   if (of_core != nullptr) {
-    RefuseLoneMatches(entry, spec.problem);
+    RefuseSingleMatches(entry, spec.problem);
   }
-  if (streams != nullptr) CheckStreams(own.root(), spec.problem, *streams);
-  const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
-  if (lent && spec.problem.landmarks) {
+  if (streams != nullptr) CheckStreams(merged.root(), spec.problem, *streams);
+  // Landmarks are initialised at the same frames as in the other estimator.
+  const bool uses_accepted = use && use->is_map();
+  if (uses_accepted && spec.problem.landmarks) {
     LandmarkOptions& landmarks = *spec.problem.landmarks;
     landmarks.min_observations = 1;
     if (landmarks.prior) landmarks.prior->min_observations = 0;
   }
-  spec.estimator = Make(make, spec, streams, of_plugin, entry);
+  spec.estimator = Create(make, spec, streams, of_plugin, entry);
   if (use) spec.accepted_by = ReadUse(*use, spec, config.root().At("estimators"), before);
   return spec;
 }
@@ -325,8 +332,8 @@ int FindStream(const Node& sensor, const SensorModel& model,
   if (known != model.known_size()) {
     sensor.At("stream").Fail(
         "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
-            std::to_string(known) + " known numbers with each measurement",
-        std::to_string(model.known_size()) + ", as model '" + model.name() + "' takes" +
+            std::to_string(known) + " known numbers per measurement",
+        std::to_string(model.known_size()) + ", as model '" + model.name() + "' requires" +
             (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
                                     : std::string()));
   }

@@ -8,23 +8,23 @@
 
 namespace alidade::internal {
 
-/// Index of the stream that `sensor`, an entry of the config with that model, names. Errors:
-/// kBadConfig for a stream that is not there, or of another size than the model measures.
+/// Returns the index of the stream that `sensor`, a config entry with `model`, names. Errors:
+/// kBadConfig if the stream does not exist, or if its size differs from that of the model.
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams);
 
-/// Refuses a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
+/// Rejects a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
 void CheckStreams(const Node& root, const Problem& problem, const std::vector<StreamInfo>& streams);
 
-/// The entry `name` of the config's `estimators:`, given the streams of its source (null: those
-/// that it takes) and the estimators before it. Errors: those of BuildExperiment.
+/// Builds the entry `name` of `estimators:`. `streams` are those of the source, or null for the
+/// streams that the entry names; `before` are the estimators listed before it. Errors: those of
+/// BuildExperiment.
 EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                              const PluginHost& host, const std::vector<StreamInfo>* streams,
                              const std::vector<EstimatorSpec>& before);
 
-/// Makes the entry `name` of the `estimators:` of a config that has the calibration of the data,
-/// and puts it behind those that the experiment has; nothing is added where that fails. Errors:
-/// those of BuildExperiment.
+/// Builds the entry `name` of `estimators:` and appends it to the experiment; appends nothing if
+/// that fails. `config` includes the calibration of the data. Errors: those of BuildExperiment.
 void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
                   Experiment& experiment);
 

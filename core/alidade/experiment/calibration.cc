@@ -6,10 +6,10 @@
 namespace alidade::internal {
 namespace {
 
-/// Counts all below `map` as read: no model needs to ask for all that the data tell.
-void ReadAll(const Node& map) {
+/// Marks all keys below `map` as read, as no model has to read every key of a calibration.
+void MarkAsRead(const Node& map) {
   for (const auto& [key, value] : map.Entries()) {
-    if (value.is_map()) ReadAll(value);
+    if (value.is_map()) MarkAsRead(value);
   }
 }
 
@@ -18,16 +18,16 @@ void ReadAll(const Node& map) {
 Config WithCalibration(const Config& config, const Source& source) {
   const Node root = config.root();
   if (const auto written = root.Find("calibration")) {
-    written->Fail("not a key of a config: calibration comes from the data", "'camera'");
+    written->Fail("not a key of a config: the data provide the calibration", "'camera'");
   }
   const auto use = root.At("source").Find("calibration");
   if (use && use->Choice({"use", "ignore"}) == 1) return config;
   const std::optional<Config> calibration = source.Calibration();
-  if (use && !calibration) use->Fail("this source brings no calibration", "no such key");
+  if (use && !calibration) use->Fail("this source does not provide a calibration", "no such key");
   if (!calibration) return config;
-  Config with = config.Merged(calibration->root());
-  ReadAll(with.root().At("calibration"));
-  return with;
+  Config calibrated = config.Merged(calibration->root());
+  MarkAsRead(calibrated.root().At("calibration"));
+  return calibrated;
 }
 
 }  // namespace alidade::internal

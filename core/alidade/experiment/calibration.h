@@ -6,9 +6,9 @@
 
 namespace alidade::internal {
 
-/// The config with the calibration that the data of its source bring, below the root key
-/// `calibration`, where models find it (ParamReader); the config itself where they bring none, or
-/// where `source.calibration` is `ignore`. Errors: kBadConfig, those of Source::Calibration.
+/// Returns the config with the calibration of the data below the root key `calibration`, from which
+/// models read it (ParamReader). Returns the config itself if the data have no calibration, or if
+/// `source.calibration` is `ignore`. Errors: kBadConfig, those of Source::Calibration.
 Config WithCalibration(const Config& config, const Source& source);
 
 }  // namespace alidade::internal

@@ -13,9 +13,9 @@
 namespace alidade::internal {
 namespace {
 
-/// The problem whose best filter is asked for: every measurement counts by its nominal noise, with
-/// its Jacobian at the state, and corrects all that it tells of.
-Problem Ideal(Problem problem) {
+/// Returns the problem of the optimal filter: without losses, with Jacobians at the state, and with
+/// updates of all roles.
+Problem IdealProblem(Problem problem) {
   for (SensorBinding& sensor : problem.sensors) {
     sensor.loss = {};
     for (RoleBinding& role : sensor.roles) {
@@ -26,26 +26,26 @@ Problem Ideal(Problem problem) {
   return problem;
 }
 
-/// Whether a measurement that counts could not be used.
-bool LostOne(const UpdateReport& report) {
-  return std::ranges::any_of(report.measurements(), [](const MeasurementReport& one) {
-    return one.outcome == Outcome::kNotPd || one.outcome == Outcome::kNotFinite ||
-           one.outcome == Outcome::kOutOfDomain;
+/// Returns whether a valid measurement could not be used.
+bool HasFailedMeasurement(const UpdateReport& report) {
+  return std::ranges::any_of(report.measurements(), [](const MeasurementReport& measurement) {
+    return measurement.outcome == Outcome::kNotPd || measurement.outcome == Outcome::kNotFinite ||
+           measurement.outcome == Outcome::kOutOfDomain;
   });
 }
 
-/// Why landmarks that `sensor` initialises cannot start at truth; "": they can.
+/// Returns why landmarks of `sensor` cannot start at truth, or "" if they can.
 std::string WhyNotAtTruth(const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
   const std::string name = '\'' + sensor.name + '\'';
-  if (!representation) return name + " has landmarks of a representation of its own";
+  if (!representation) return name + " has a custom landmark representation";
   if (IsXyz(*representation) && sensor.model->inverse().prior_size > 0) {
-    return name + " places landmarks as xyz by a prior, by whose mean the Jacobians are";
+    return name + " initialises xyz landmarks with a prior, and the Jacobians depend on its mean";
   }
   return "";
 }
 
-/// Of a problem with landmarks.
+/// Returns why a problem with landmarks has no bound, or "".
 std::string WhyNoMap(const Problem& problem) {
   for (std::size_t i = 0; i < problem.sensors.size(); ++i) {
     const SensorBinding& sensor = problem.sensors[i];
@@ -59,25 +59,27 @@ std::string WhyNoMap(const Problem& problem) {
   return "";
 }
 
-/// Of a block `landmarks.ID.role#N`.
+/// Returns the ID of a block `landmarks.ID.role#N`.
 std::int64_t LandmarkOf(const Block& block) {
   return std::stoll(block.name.substr(block.owner.size() + 1));
 }
 
-/// The landmark at p as a sensor's roles write it, from one metre before it along z. What is
-/// measured of it does not depend on from where.
-std::vector<double> Written(LandmarkRepresentation representation, const std::array<double, 3>& p) {
-  return WithRepresentation(representation, [&](auto as) {
-    using As = decltype(as);
-    std::vector<double> y(detail::Blocks<As>::kAmbient);
-    As::FromRay(Ray<double>{{p[0], p[1], p[2] - 1.0}, {0.0, 0.0, 1.0}, 1.0}, y.data());
+/// Returns the values of a landmark at p in the representation of the roles, anchored one metre
+/// before it along z. Its measurements do not depend on the anchor.
+std::vector<double> LandmarkValues(LandmarkRepresentation representation,
+                                   const std::array<double, 3>& p) {
+  return WithRepresentation(representation, [&](auto representation_type) {
+    using Type = decltype(representation_type);
+    std::vector<double> y(detail::Blocks<Type>::kAmbient);
+    Type::FromRay(Ray<double>{{p[0], p[1], p[2] - 1.0}, {0.0, 0.0, 1.0}, 1.0}, y.data());
     return y;
   });
 }
 
 }  // namespace
 
-std::string CramerRaoBound::WhyNone(const Problem& problem, const std::vector<StreamInfo>& truths) {
+std::string CramerRaoBound::WhyUnavailable(const Problem& problem,
+                                           const std::vector<StreamInfo>& truths) {
   if (problem.landmarks) {
     if (std::string why = WhyNoMap(problem); !why.empty()) return why;
   }
@@ -98,48 +100,51 @@ std::string CramerRaoBound::WhyNone(const Problem& problem, const std::vector<St
 
 CramerRaoBound::CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                                const std::vector<StreamInfo>& truths, TrueLandmark true_landmark)
-    : engine_(Ideal(problem), WithoutRecovery({}), streams, std::make_unique<EkfEquations>()),
+    : engine_(IdealProblem(problem), WithoutRecovery({}), streams,
+              std::make_unique<EkfEquations>()),
       true_landmark_(std::move(true_landmark)),
       truths_(MatchTruths(problem.layout, truths)) {
-  ALIDADE_EXPECTS(WhyNone(problem, truths).empty());
+  ALIDADE_EXPECTS(WhyUnavailable(problem, truths).empty());
   ALIDADE_EXPECTS(!problem.landmarks || true_landmark_);
   for (const StreamInfo& stream : streams) {
-    const auto at = std::ranges::find(problem.sensors, stream.name, &SensorBinding::stream);
-    const auto sensor = static_cast<int>(at - problem.sensors.begin());
-    sensors_.push_back(at == problem.sensors.end() ? -1 : sensor);
+    const auto found = std::ranges::find(problem.sensors, stream.name, &SensorBinding::stream);
+    const auto sensor = static_cast<int>(found - problem.sensors.begin());
+    sensors_.push_back(found == problem.sensors.end() ? -1 : sensor);
   }
 }
 
 bool CramerRaoBound::Add(const SourceFrame& frame) {
-  if (lost_) return false;
+  if (is_lost_) return false;
   FilterState& f = engine_.f;
-  if (f.timestamp == kNoTimestamp) lost_ = !MoveToTruth(frame.truth);
+  if (f.timestamp == kNoTimestamp) is_lost_ = !MoveToTruth(frame.truth);
   engine_.Process({frame.timestamp, {}});
-  lost_ = lost_ || !MoveToTruth(frame.truth);
+  is_lost_ = is_lost_ || !MoveToTruth(frame.truth);
   if (!engine_.landmarks) {
     engine_.Process(frame);
-  } else if (!lost_) {
+  } else if (!is_lost_) {
     Frame at_truth = frame;
-    bool all = !f.blocks.waiting;
-    lost_ = !MeasureAtTruth(at_truth, all);
+    bool has_all = !f.blocks.waiting;
+    is_lost_ = !ReplaceByPrediction(at_truth, has_all);
     engine_.Process(at_truth);
-    lost_ = lost_ || (!all && f.report.landmarks.initialised > 0);
+    is_lost_ = is_lost_ || (!has_all && f.report.landmarks.initialised > 0);
   }
-  lost_ = lost_ || LostOne(f.report) || f.health.ended || !MoveToTruth(frame.truth);
-  return !lost_;
+  is_lost_ =
+      is_lost_ || HasFailedMeasurement(f.report) || f.health.ended || !MoveToTruth(frame.truth);
+  return !is_lost_;
 }
 
-/// Puts what each sensor measures at truth in place of what is valid of the frame; `all` becomes
-/// false where that is beyond the sensor's limits, so that it stays as it was measured. False where
-/// a landmark has no truth.
-bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
+/// Replaces each valid measurement of the frame by its prediction at truth. A measurement with an
+/// invalid prediction stays unchanged, and `has_all` becomes false. Returns false if a landmark has
+/// no truth.
+bool CramerRaoBound::ReplaceByPrediction(Frame& frame, bool& has_all) const {
   const FilterState& f = engine_.f;
-  for (Measurement& one : frame.measurements) {
-    const int index = sensors_[static_cast<std::size_t>(one.stream)];
+  for (Measurement& measurement : frame.measurements) {
+    const int index = sensors_[static_cast<std::size_t>(measurement.stream)];
     if (index < 0) continue;
     const SensorBinding& sensor = f.problem_index->problem.sensors[static_cast<std::size_t>(index)];
     const SensorModel& model = *sensor.model;
-    if (f.blocks.waiting || model.Valid({one.values.data(), one.known.data()}) != Status::kOk)
+    if (f.blocks.waiting ||
+        model.Valid({measurement.values.data(), measurement.known.data()}) != Status::kOk)
       continue;
     std::vector<const double*> roles;
     for (const RoleBinding& role : sensor.roles) {
@@ -148,59 +153,60 @@ bool CramerRaoBound::MeasureAtTruth(Frame& frame, bool& all) const {
     }
     std::vector<double> landmark;
     if (model.has_landmark()) {
-      if (one.landmark < 0) continue;
-      const auto p = true_landmark_(one.landmark);
+      if (measurement.landmark < 0) continue;
+      const auto p = true_landmark_(measurement.landmark);
       if (!p) return false;
-      landmark = Written(*RepresentationOf(model.roles()), *p);
-      int at = 0;
+      landmark = LandmarkValues(*RepresentationOf(model.roles()), *p);
+      int offset = 0;
       roles.resize(model.roles().size());
       for (std::size_t i = 0; i < roles.size(); ++i) {
         if (!model.roles()[i].landmark()) continue;
-        roles[i] = landmark.data() + at;
-        at += model.roles()[i].geometry.ambient;
+        roles[i] = landmark.data() + offset;
+        offset += model.roles()[i].geometry.ambient;
       }
     }
-    std::vector<double> h(one.values.size());
-    const bool there = model.Predict(roles.data(), h.data(), one.known.data()) == Status::kOk &&
-                       model.Valid({h.data(), one.known.data()}) == Status::kOk;
-    if (there) one.values = std::move(h);
-    all = all && there;
+    std::vector<double> h(measurement.values.size());
+    const bool is_valid =
+        model.Predict(roles.data(), h.data(), measurement.known.data()) == Status::kOk &&
+        model.Valid({h.data(), measurement.known.data()}) == Status::kOk;
+    if (is_valid) measurement.values = std::move(h);
+    has_all = has_all && is_valid;
   }
   return true;
 }
 
-/// False where the truth of a block that has a covariance is not known.
+/// Returns false if the truth of a block with a covariance is unknown.
 bool CramerRaoBound::MoveToTruth(const Truth& truth) {
   State& state = engine_.f.state;
   std::vector<double> values = state.values();
   for (BlockId id = 0; id < std::ssize(truths_); ++id) {
     const Block& block = state.layout()[id];
     const auto t = static_cast<std::size_t>(truths_[static_cast<std::size_t>(id)]);
-    const bool known = t < truth.size() && !truth[t].empty();
-    if (block.has_covariance() && !known) return false;
-    if (block.present && known) std::ranges::copy(truth[t], values.begin() + block.value_offset);
+    const bool is_known = t < truth.size() && !truth[t].empty();
+    if (block.has_covariance() && !is_known) return false;
+    if (block.present && is_known) std::ranges::copy(truth[t], values.begin() + block.value_offset);
   }
   if (engine_.landmarks && !MoveLandmarks(values)) return false;
   state.MoveTo(values);
   return true;
 }
 
-/// What a block of a landmark that is new in this frame has at truth. Its anchor is among those of
-/// the frame, which are to be one: which of several it has, its block does not say.
-std::optional<std::vector<double>> CramerRaoBound::AtTruth(
+/// Returns the true value of a landmark block that is new in this frame. The anchors of the frame
+/// must be equal, because a block does not identify its anchor.
+std::optional<std::vector<double>> CramerRaoBound::TrueValue(
     const Block& block, const double* value, std::span<const Block* const> anchors) const {
-  const auto place = true_landmark_(LandmarkOf(block));
-  if (!place) return {};
+  const auto position = true_landmark_(LandmarkOf(block));
+  if (!position) return {};
   if (block.geometry().ambient == 3 && block.space.name == "landmark") {
-    return std::vector<double>(place->begin(), place->end());
+    return std::vector<double>(position->begin(), position->end());
   }
-  const bool anchored = block.space.name != "landmark";
-  if (anchored && anchors.empty()) return {};
-  const double* from = anchored ? landmarks_.at(anchors.front()->name).data() : value;
-  const Eigen::Map<const Eigen::Vector3d> a(from), p(place->data());
-  constexpr double kSame = 1e-9;  // m, what rounding may make of one camera
-  for (const Block* other : anchors) {
-    if (!((a - Eigen::Map<const Eigen::Vector3d>(landmarks_.at(other->name).data())).norm() <
+  const bool is_anchored = block.space.name != "landmark";
+  if (is_anchored && anchors.empty()) return {};
+  const double* origin = is_anchored ? landmarks_.at(anchors.front()->name).data() : value;
+  const Eigen::Map<const Eigen::Vector3d> a(origin), p(position->data());
+  constexpr double kSame = 1e-9;  // m, difference of equal anchors by rounding
+  for (const Block* anchor : anchors) {
+    if (!((a - Eigen::Map<const Eigen::Vector3d>(landmarks_.at(anchor->name).data())).norm() <
           kSame)) {
       return {};
     }
@@ -208,25 +214,25 @@ std::optional<std::vector<double>> CramerRaoBound::AtTruth(
   const double distance = (p - a).norm();
   const Eigen::Vector3d m = (p - a) / distance;
   if (block.space.name == "direction") return std::vector<double>{m.x(), m.y(), m.z()};
-  if (anchored) return std::vector<double>{1.0 / distance};
+  if (is_anchored) return std::vector<double>{1.0 / distance};
   std::vector<double> y(6);
   const Ray<double> ray{{a.x(), a.y(), a.z()}, {m.x(), m.y(), m.z()}, 1.0 / distance};
   if (!InverseDepth::FromRay(ray, y.data())) return {};
   return y;
 }
 
-/// False where the place of one is not known.
+/// Returns false if the true position of a landmark is unknown.
 bool CramerRaoBound::MoveLandmarks(std::vector<double>& values) {
   const std::vector<Block>& blocks = engine_.f.state.layout().blocks();
   std::map<std::string, std::vector<double>> present;
-  std::vector<const Block*> fresh, anchors;
+  std::vector<const Block*> new_blocks, anchors;
   for (std::size_t id = truths_.size(); id < blocks.size(); ++id) {
     const Block& block = blocks[id];
     if (!block.present) continue;
     if (auto known = landmarks_.extract(block.name)) {
       present.insert(std::move(known));
     } else {
-      (block.space.name == "anchor" ? anchors : fresh).push_back(&block);
+      (block.space.name == "anchor" ? anchors : new_blocks).push_back(&block);
     }
   }
   for (const Block* block : anchors) {
@@ -234,10 +240,10 @@ bool CramerRaoBound::MoveLandmarks(std::vector<double>& values) {
     present[block->name].assign(a, a + block->geometry().ambient);
   }
   landmarks_ = std::move(present);
-  for (const Block* block : fresh) {
-    auto at_truth = AtTruth(*block, values.data() + block->value_offset, anchors);
-    if (!at_truth) return false;
-    landmarks_[block->name] = std::move(*at_truth);
+  for (const Block* block : new_blocks) {
+    auto true_value = TrueValue(*block, values.data() + block->value_offset, anchors);
+    if (!true_value) return false;
+    landmarks_[block->name] = std::move(*true_value);
   }
   for (std::size_t id = truths_.size(); id < blocks.size(); ++id) {
     if (!blocks[id].present) continue;

@@ -15,53 +15,53 @@
 
 namespace alidade::internal {
 
-/// The Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller
-/// covariance, for the true path that the run has (the parametric bound of [Bergman1999], ch. 4).
-/// With F, G, Q, H, R at the true state x_k of each timestamp, and P_0 that of the prior,
+/// Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller covariance,
+/// for the true trajectory of the run (the parametric bound of [Bergman1999], ch. 4). With F, G, Q,
+/// H, R at the true state x_k of each timestamp, and P_0 of the prior,
 ///
 ///   P- = F P F' + G Q G',   P = (P-^-1 + H' R^-1 H)^-1
 ///
-/// which are the equations of Ekf, so that is what is run: it has no gate and no loss, and its
-/// state is set to truth before and after each of its steps. What measurements say decides nothing
-/// but which of them are valid, and, at the measured values, the covariance of blocks that start
-/// from one.
+/// These are the equations of Ekf. The class therefore runs an Ekf without gate and loss, and sets
+/// its state to truth before and after each step. The measured values only determine which
+/// measurements are valid, and the covariance of blocks that start from a measurement.
 ///
-/// Landmarks are set to truth as well, in the representation that they have, from where the camera
-/// truly was. So that they start there, too, a problem with landmarks is given h at truth in place
-/// of each valid measurement: no update moves the state, and a landmark is initialised with the
-/// Jacobians at truth. A prior of the inverse distance gives its sigma; its mean does not count.
+/// Landmarks are also set to truth, in their own representation, with the true camera position. In
+/// a problem with landmarks, h at truth replaces each valid measurement. Updates then do not move
+/// the state, and landmarks are initialised with the Jacobians at truth. A prior of the inverse
+/// distance contributes its sigma, but not its mean.
 class CramerRaoBound {
  public:
-  /// Where the landmark of an id truly is, m.
+  /// Returns the true position of the landmark with this id, m, if it is known.
   using TrueLandmark = std::function<std::optional<std::array<double, 3>>(std::int64_t id)>;
 
-  /// Why a problem has none here, in words that follow `no Cramer-Rao bound: `; "": it has one.
-  static std::string WhyNone(const Problem& problem, const std::vector<StreamInfo>& truths);
+  /// Returns why a problem has no bound, as text after `no Cramer-Rao bound: `, or "" if it has
+  /// one.
+  static std::string WhyUnavailable(const Problem& problem, const std::vector<StreamInfo>& truths);
 
-  /// Of a problem that has one.
+  /// Requires a problem with a bound.
   CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                  const std::vector<StreamInfo>& truths, TrueLandmark true_landmark = {});
 
-  /// The frames of a run, in the order of time. False, and for good, where the truth of a block or
-  /// landmark that is estimated is not known, a step failed, or a landmark could not start at
-  /// truth: there is no bound from here on.
+  /// Processes the next frame of a run, in the order of time. Returns false if the bound does not
+  /// exist from this frame on: the truth of an estimated block or landmark is unknown, a step
+  /// failed, or a landmark could not start at truth. All later calls then return false.
   bool Add(const SourceFrame& frame);
-  /// P, and the truth.
+  /// Returns the true values with the bound P as covariance.
   const State& state() const { return engine_.f.state; }
 
  private:
   bool MoveToTruth(const Truth& truth);
   bool MoveLandmarks(std::vector<double>& values);
-  std::optional<std::vector<double>> AtTruth(const Block& block, const double* value,
-                                             std::span<const Block* const> anchors) const;
-  bool MeasureAtTruth(Frame& frame, bool& all) const;
+  std::optional<std::vector<double>> TrueValue(const Block& block, const double* value,
+                                               std::span<const Block* const> anchors) const;
+  bool ReplaceByPrediction(Frame& frame, bool& has_all) const;
 
   FilterEngine engine_;
   TrueLandmark true_landmark_;
-  std::vector<int> sensors_;                              ///< by stream; -1: none
+  std::vector<int> sensors_;                              ///< by stream, or -1
   std::map<std::string, std::vector<double>> landmarks_;  ///< true values, by block
-  std::vector<int> truths_;                               ///< by block; -1: none
-  bool lost_ = false;
+  std::vector<int> truths_;                               ///< by block, or -1
+  bool is_lost_ = false;
 };
 
 }  // namespace alidade::internal

@@ -7,32 +7,32 @@
 namespace alidade::internal {
 namespace {
 
-std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
+std::string NameInEntry(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
-/// The item `block` of the list under `consider` of its state entry.
-Node ConsiderOf(const Node& state, const Block& block) {
+/// Returns the item `block` of the list `consider` of its state entry.
+Node FindConsiderItem(const Node& state, const Block& block) {
   const Node list = state.At("consider");
   for (const Node& item : list.Items()) {
-    if (item.Text() == NameIn(block)) return item;
+    if (item.Text() == NameInEntry(block)) return item;
   }
   return list;
 }
 
 }  // namespace
 
-Node NodeOf(const ProblemDefect& defect, const Node& root, const Problem& problem) {
+Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem& problem) {
   if (defect.block >= 0) {
     const Block& block = problem.layout[defect.block];
     const auto entry = root.At("state").Find(block.owner);
-    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
-    if (defect.key == std::string_view("consider")) return ConsiderOf(state, block);
-    return state.At("initial").At(NameIn(block)).At(defect.key);
+    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // the sensor owns it
+    if (defect.key == std::string_view("consider")) return FindConsiderItem(state, block);
+    return state.At("initial").At(NameInEntry(block)).At(defect.key);
   }
   if (defect.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
   const Node roles = root.At("sensors").At(sensor.name).At("roles");
   const auto role = roles.Find(sensor.model->roles()[static_cast<std::size_t>(defect.role)].name);
-  if (!role) return roles;  // one that a time offset adds
+  if (!role) return roles;  // a role added by a time offset
   return role->At(defect.key);
 }
 

@@ -6,7 +6,7 @@
 
 namespace alidade::internal {
 
-/// The node of the config `root`, of which `problem` was made, that a defect of it is about.
-Node NodeOf(const ProblemDefect& defect, const Node& root, const Problem& problem);
+/// Returns the node of the config `root` that causes a defect of `problem`, which was read from it.
+Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem& problem);
 
 }  // namespace alidade::internal

@@ -11,24 +11,26 @@
 namespace alidade::internal {
 namespace {
 
-/// An event `unit` for each sensor whose measurements are far from all that it predicts.
+/// Adds an event `unit` for each sensor whose measurements are far from all its predictions.
 void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResult& result) {
   for (const int index : metrics.far_off()) {
     const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(index)];
     const Space& measured = sensor.model->measurement();
-    const bool angle = measured.geometry.kind == GeometryKind::kAngle;
+    const bool is_angle = measured.geometry.kind == GeometryKind::kAngle;
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
         {kNoTimestamp, "unit",
          "sensor '" + sensor.name + "': the median of |z - h| is more than " +
-             (angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
-             "; is stream '" + sensor.stream + "' in " + (angle ? "rad" : unit) + '?'});
+             (is_angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
+             "; is stream '" + sensor.stream + "' in " + (is_angle ? "rad" : unit) + '?'});
   }
 }
 
-/// An event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS outside its 95 % bounds.
+/// Adds an event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS outside its 95 %
+/// bounds.
 void AddConsistencyEvents(EstimatorResult& result) {
-  const auto note = [&](const std::string& kind, const std::string& name, const std::string& what) {
+  const auto add_events = [&](const std::string& kind, const std::string& name,
+                              const std::string& subject_kind) {
     const std::string prefix = kind + ".mean:";
     for (const auto& [key, mean] : result.metrics) {
       if (!key.starts_with(prefix)) continue;
@@ -38,48 +40,50 @@ void AddConsistencyEvents(EstimatorResult& result) {
       if (low == result.metrics.end() || high == result.metrics.end()) continue;
       if (mean >= low->second && mean <= high->second) continue;
       result.events.push_back({kNoTimestamp, kind + "_bounds",
-                               name + " mean " + RoundedText(mean, 3) + " of " + what + subject +
-                                   " is outside its 95 % bounds [" + RoundedText(low->second, 3) +
-                                   ", " + RoundedText(high->second, 3) + "]: the filter is " +
+                               name + " mean " + RoundedText(mean, 3) + " of " + subject_kind +
+                                   subject + " is outside its 95 % bounds [" +
+                                   RoundedText(low->second, 3) + ", " +
+                                   RoundedText(high->second, 3) + "]: the filter is " +
                                    (mean > high->second ? "overconfident" : "underconfident")});
     }
   };
-  note("nees", "NEES", "");
-  note("nis", "NIS", "sensor ");
+  add_events("nees", "NEES", "");
+  add_events("nis", "NIS", "sensor ");
 }
 
-/// An event `truth` if no frame had the truth that the source names.
+/// Adds an event `truth` if no frame had the truth that the source declares.
 void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
   const std::vector<std::string> names = metrics.without_truth();
   if (names.empty()) return;
-  result.events.push_back(
-      {kNoTimestamp, "truth",
-       "no frame has the truth of " + Join(names) + "; are its times those of the measurements?"});
+  result.events.push_back({kNoTimestamp, "truth",
+                           "no frame has the truth of " + Join(names) +
+                               "; do its times match those of the measurements?"});
 }
 
-/// An event `unused` for each sensor of which the whole run used no measurement.
+/// Adds an event `unused` for each sensor without a used measurement in the whole run.
 void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
   for (const SensorBinding& sensor : problem.sensors) {
-    std::int64_t used = 0, all = 0;
-    std::vector<std::string> others;
+    std::int64_t used = 0, total = 0;
+    std::vector<std::string> unused_counts;
     for (const auto& [key, count] : result.counts) {
       const std::size_t colon = key.find(':');
       const std::string outcome = key.substr(0, colon);
       if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
-      all += count;
+      total += count;
       if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
         used += count;
       } else {
-        others.push_back(std::to_string(count) + ' ' + outcome);
+        unused_counts.push_back(std::to_string(count) + ' ' + outcome);
       }
     }
     if (used > 0) continue;
-    const std::string of_all =
-        all > 0
-            ? " used none of " + std::to_string(all) + " measurements: " + Join(others, ", ")
+    const std::string finding =
+        total > 0
+            ? " used none of " + std::to_string(total) +
+                  " measurements: " + Join(unused_counts, ", ")
             : ": stream '" + sensor.stream + "' had no measurement" +
                   (result.accepted_by.empty() ? "" : " that " + result.accepted_by + " accepted");
-    result.events.push_back({kNoTimestamp, "unused", "sensor '" + sensor.name + "'" + of_all});
+    result.events.push_back({kNoTimestamp, "unused", "sensor '" + sensor.name + "'" + finding});
   }
 }
 
@@ -92,14 +96,14 @@ void Diagnose(const Experiment& experiment, EstimatorRun& run) {
   result.counts = run.metrics.counts();
   if (run.stale_inputs > 0) result.counts["input_stale"] = run.stale_inputs;
   result.units = run.metrics.units();
-  const std::size_t before = result.events.size();
-  NoteMap(run.spec, *experiment.source, result);
+  const std::size_t event_count = result.events.size();
+  AddMapMetrics(run.spec, *experiment.source, result);
   const bool is_known = run.has_estimate && !estimator.failed();
   if (is_known) AddUnusedEvents(problem, result);
   if (is_known && experiment.reference < 0) AddTruthEvent(run.metrics, result);
   AddUnitEvents(problem, run.metrics, result);
   if (is_known) AddConsistencyEvents(result);
-  LogEvents(result.name, std::span(result.events).subspan(before));
+  LogEvents(result.name, std::span(result.events).subspan(event_count));
   run.AddEvents(run.metrics.events());
   result.diverged = run.diverged || (estimator.offline() && estimator.diverged());
   result.inconsistent = !run.metrics.events().empty();

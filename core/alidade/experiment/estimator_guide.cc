@@ -16,31 +16,33 @@ const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stre
 }
 
 EstimatorGuide::EstimatorGuide(Experiment& experiment) : experiment_(experiment) {
-  if (experiment.guide != nullptr) experiment.source->LendGuide(this);
+  if (experiment.guide != nullptr) experiment.source->SetGuide(this);
 }
 
-// A source that throws here keeps a guide that is gone; the run has ended, and asks it no more.
+// If SetGuide throws, the source has a dangling guide, but it does not use the guide after the run.
 EstimatorGuide::~EstimatorGuide() {
   try {
-    if (experiment_.guide != nullptr) experiment_.source->LendGuide(nullptr);
+    if (experiment_.guide != nullptr) experiment_.source->SetGuide(nullptr);
   } catch (...) {
     return;
   }
 }
 
-std::vector<Expected> EstimatorGuide::Expect(int stream, Timestamp timestamp,
-                                             const std::vector<std::int64_t>& landmarks) const {
-  std::vector<Expected> all(landmarks.size());
+std::vector<ExpectedMeasurement> EstimatorGuide::Expect(
+    int stream, Timestamp timestamp, const std::vector<std::int64_t>& landmarks) const {
+  std::vector<ExpectedMeasurement> expected(landmarks.size());
   const Filter& filter = *experiment_.guide;
   const std::string& name = experiment_.source->streams().at(static_cast<std::size_t>(stream)).name;
   const SensorBinding* const sensor = GuidingSensor(filter.problem(), name);
-  if (sensor == nullptr) return all;
-  const std::vector<std::optional<Prediction>> each =
+  if (sensor == nullptr) return expected;
+  const std::vector<std::optional<Prediction>> predictions =
       filter.ExpectEach(sensor->name, timestamp, landmarks);
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    if (each[i]) all[i] = {each[i]->z, {each[i]->s.data(), each[i]->s.data() + each[i]->s.size()}};
+  for (std::size_t i = 0; i < predictions.size(); ++i) {
+    if (!predictions[i]) continue;
+    const Prediction& prediction = *predictions[i];
+    expected[i] = {prediction.z, {prediction.s.data(), prediction.s.data() + prediction.s.size()}};
   }
-  return all;
+  return expected;
 }
 
 }  // namespace alidade::internal

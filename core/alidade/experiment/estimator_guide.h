@@ -9,12 +9,12 @@
 
 namespace alidade::internal {
 
-/// The first sensor on that stream that takes no known numbers; null: there is none.
+/// Returns the first sensor on `stream` without known numbers, or null.
 const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stream);
 
-/// Lends the experiment's source, as long as this lives, what the filter `experiment.guide` expects
-/// of it, as that filter is when it is asked, by its GuidingSensor of a stream. Does nothing where
-/// none guides.
+/// Guide of the source of an experiment: predicts its measurements with the current state of the
+/// filter `experiment.guide` and its GuidingSensor. Sets itself as the guide of the source in the
+/// constructor and removes itself in the destructor. Has no effect without a guiding filter.
 class EstimatorGuide : public Guide {
  public:
   explicit EstimatorGuide(Experiment& experiment);
@@ -22,8 +22,8 @@ class EstimatorGuide : public Guide {
   EstimatorGuide(const EstimatorGuide&) = delete;
   EstimatorGuide& operator=(const EstimatorGuide&) = delete;
 
-  std::vector<Expected> Expect(int stream, Timestamp timestamp,
-                               const std::vector<std::int64_t>& landmarks) const override;
+  std::vector<ExpectedMeasurement> Expect(
+      int stream, Timestamp timestamp, const std::vector<std::int64_t>& landmarks) const override;
 
  private:
   Experiment& experiment_;

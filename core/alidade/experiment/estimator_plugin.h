@@ -17,41 +17,42 @@ namespace alidade {
 
 inline constexpr const char* kEstimatorKind = "estimator";
 
-/// Makes an estimator, its options read, once its problem is known; `streams` are the source's.
+/// Creates an estimator with options that were read before; `streams` are those of the source.
 using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
     const Problem& problem, const std::vector<StreamInfo>& streams)>;
 
-/// What an estimator reads its options from.
+/// Arguments of the factory of an estimator.
 struct EstimatorArguments {
   Node entry;      ///< the config's entry of `estimators`
   Params& params;  ///< the same entry, read by declaration (numbers, flags, choices)
 };
 
-/// The factory of an estimator.
+/// Factory of an estimator.
 struct EstimatorEntry {
   const char* name;
   const char* doc;
   const char* citation;
-  /// Reads the options; what it returns makes the estimator once its problem is known. Errors of
-  /// both: an Error with a place, as of Node::Fail.
+  /// Reads the options and returns a function that creates the estimator for a problem. Errors of
+  /// both: an Error with a place, as thrown by Node::Fail.
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
   EstimatorKind kind = EstimatorKind::kFilter;
-  /// What it can do; what a problem asks for beyond is refused by name before `create`'s maker is
-  /// asked. Null: it takes no landmarks, and refuses by itself what else it cannot do.
+  /// Capabilities of the estimator. A problem that needs more is rejected with an error that names
+  /// the missing capability, before the estimator is created. Null: it does not support landmarks,
+  /// and must itself reject everything else that it does not support.
   const EstimatorCapabilities* capabilities = nullptr;
 };
 constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
   return {kEstimatorKind, estimator.name, estimator.doc, estimator.citation, "", &estimator};
 }
 
-/// The factory of `entry`, which is of an estimator.
+/// Returns the factory of `entry`, which must be an estimator.
 const EstimatorEntry& EstimatorOf(const PluginEntry& entry);
 
-/// The maker of the estimator `name`, whose options are in `node`. Errors: kPlugin with the places
-/// searched, kBadConfig, those of the estimator.
+/// Returns the maker of the estimator `name` with the options in `node`. Errors: kPlugin with the
+/// places searched, kBadConfig, those of the estimator.
 EstimatorMaker CreateEstimator(const PluginHost& host, const std::string& name, const Node& node);
 
-/// The parameters of the estimator `entry`.
+/// Returns the parameters of the estimator `entry`.
 std::vector<ParamInfo> EstimatorSchema(const PluginEntry& entry);
 
 }  // namespace alidade

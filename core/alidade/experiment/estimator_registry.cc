@@ -15,50 +15,57 @@
 namespace alidade::internal {
 namespace {
 
-/// What every recursive filter reads.
+/// Reads the options of every recursive filter.
 EkfOptions ReadCommon(Params& p) {
   EkfOptions options;
-  options.gate = p.NumberOrNone("gate", "", "probability with which a measurement that fits passes",
-                                {0.0, 1.0, true, true})
-                     .value_or(options.gate);
+  options.gate =
+      p.NumberOrNone("gate", "", "probability that the gate accepts a consistent measurement",
+                     {0.0, 1.0, true, true})
+          .value_or(options.gate);
   options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                            "how the measurements of one timestamp make updates",
+                                            "how the measurements of one timestamp form updates",
                                             static_cast<int>(options.fuse)));
   options.max_dt_s =
-      p.NumberOrNone("max_dt_s", "s", "longer gaps are stepped in equal parts", kPositive)
+      p.NumberOrNone("max_dt_s", "s", "longer gaps are divided into equal steps", kPositive)
           .value_or(options.max_dt_s);
   return options;
 }
 
-EkfOptions ReadRecovering(Params& p) {
+/// Reads the options of a filter with rejection recovery.
+EkfOptions ReadWithRecovery(Params& p) {
   EkfOptions options = ReadCommon(p);
-  options.rejection_recovery = static_cast<RejectionRecovery>(p.Choice(
-      "rejection_recovery.action", {"reset", "inflate", "none"},
-      "what is done after so many rejections", static_cast<int>(options.rejection_recovery)));
+  options.rejection_recovery = static_cast<RejectionRecovery>(
+      p.Choice("rejection_recovery.action", {"reset", "inflate", "none"},
+               "action after `rejection_recovery.after` rejections",
+               static_cast<int>(options.rejection_recovery)));
   options.rejection_recovery_after =
-      p.Integer("rejection_recovery.after", "rejections of one sensor in a row", 1, 1'000'000,
+      p.Integer("rejection_recovery.after", "consecutive rejections of one sensor", 1, 1'000'000,
                 options.rejection_recovery_after);
-  options.max_covariance_repairs = p.Integer(
-      "max_covariance_repairs", "most repairs of a covariance; the next one ends the estimator", 0,
-      1'000'000, options.max_covariance_repairs);
+  options.max_covariance_repairs =
+      p.Integer("max_covariance_repairs",
+                "maximum number of covariance repairs; the next one ends the estimator", 0,
+                1'000'000, options.max_covariance_repairs);
   return options;
 }
 
 EkfOptions ReadEkf(Params& p) {
-  EkfOptions options = ReadRecovering(p);
-  options.jacobian = static_cast<JacobianPolicy>(p.Choice(
-      "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
-      static_cast<int>(options.jacobian)));
+  EkfOptions options = ReadWithRecovery(p);
+  options.jacobian = static_cast<JacobianPolicy>(
+      p.Choice("jacobian", {"latest", "first_estimate"},
+               "linearisation point of H for blocks of stationary models",
+               static_cast<int>(options.jacobian)));
   return options;
 }
 
 IekfOptions ReadIekf(Params& p) {
-  IekfOptions options{ReadRecovering(p)};
-  options.max_iterations = p.Integer("max_iterations", "most linearisations of an update", 2, 1000,
-                                     options.max_iterations);
-  options.tolerance = p.Number(
-      "tolerance", "", "step, in posterior standard deviations, at which an update has converged",
-      {0.0, 1.0, true, false}, options.tolerance);
+  IekfOptions options{ReadWithRecovery(p)};
+  options.max_iterations =
+      p.Integer("max_iterations", "maximum number of linearisations per update", 2, 1000,
+                options.max_iterations);
+  options.tolerance =
+      p.Number("tolerance", "",
+               "step, in posterior standard deviations, below which an update has converged",
+               {0.0, 1.0, true, false}, options.tolerance);
   return options;
 }
 
@@ -66,10 +73,11 @@ UkfOptions ReadUkf(Params& p) {
   UkfOptions options;
   options.alpha = p.Number("alpha", "", "spread of the sigma points",
                            {UkfOptions::kLeastAlpha, 1.0, false, false}, options.alpha);
-  options.beta = p.NonNegative("beta", "", "weight of what the centre adds; 2: best for a Gaussian",
-                               options.beta);
-  options.kappa =
-      p.NonNegative("kappa", "", "spread beyond the number of directions", options.kappa);
+  options.beta = p.NonNegative(
+      "beta", "", "added covariance weight of the centre point; 2 is optimal for a Gaussian",
+      options.beta);
+  options.kappa = p.NonNegative(
+      "kappa", "", "added to the number of dimensions in the spread of the points", options.kappa);
   options.filter = ReadCommon(p);
   return options;
 }
@@ -79,12 +87,12 @@ Description DescribeEkf(const EkfOptions& options) {
   const bool latest = options.jacobian == JacobianPolicy::kLatest;
   return {options,
           {{"jacobian", latest ? "latest: H at the estimate"
-                               : "first_estimate: H where stationary blocks started from"}}};
+                               : "first_estimate: H at the first estimate of stationary blocks"}}};
 }
 Description DescribeIekf(const IekfOptions& options) {
   return {options,
           {{"max_iterations", std::to_string(options.max_iterations)},
-           {"tolerance", NumberText(options.tolerance) + " sigma of the posterior"}}};
+           {"tolerance", NumberText(options.tolerance) + " posterior sigma"}}};
 }
 Description DescribeUkf(const UkfOptions& options) {
   return {options.filter,
@@ -92,21 +100,22 @@ Description DescribeUkf(const UkfOptions& options) {
                                       ", " + NumberText(options.kappa)}}};
 }
 
-/// A type whose options `read` reads, an absent key as the default, and `describe` puts into words.
+/// Returns a type with options that `read` reads and `describe` describes. A missing key has its
+/// default.
 template <class Filter, class Options>
-EstimatorType TypeOf(const char* name, const char* doc, Options (*read)(Params&),
-                     Description (*describe)(const Options&),
-                     EstimatorKind kind = EstimatorKind::kFilter) {
-  const auto options_of = [=](const Node& entry) {
+EstimatorType MakeType(const char* name, const char* doc, Options (*read)(Params&),
+                       Description (*describe)(const Options&),
+                       EstimatorKind kind = EstimatorKind::kFilter) {
+  const auto read_options = [=](const Node& entry) {
     ParamReader reader(entry, std::string("estimator '") + name + "'");
     Params params(&reader.host());
     const Options options = read(params);
     reader.Check();
     return options;
   };
-  const auto maker_of = [=](const Node& entry) {
-    return [options = options_of(entry)](const Problem& problem,
-                                         const std::vector<StreamInfo>& streams) {
+  const auto make_maker = [=](const Node& entry) {
+    return [options = read_options(entry)](const Problem& problem,
+                                           const std::vector<StreamInfo>& streams) {
       return std::make_unique<Filter>(problem, options, streams);
     };
   };
@@ -118,22 +127,22 @@ EstimatorType TypeOf(const char* name, const char* doc, Options (*read)(Params&)
     });
     return recorder.Result();
   };
-  const auto description_of = [=](const Node& entry) { return describe(options_of(entry)); };
-  return {name, doc, Filter::kCapabilities, kind, maker_of, schema, description_of};
+  const auto describe_entry = [=](const Node& entry) { return describe(read_options(entry)); };
+  return {name, doc, Filter::kCapabilities, kind, make_maker, schema, describe_entry};
 }
 
 }  // namespace
 
 const std::vector<EstimatorType>& EstimatorTypes() {
   static const std::vector<EstimatorType> types = {
-      TypeOf<Ekf>("ekf", "Extended Kalman filter.", ReadEkf, DescribeEkf),
-      TypeOf<Iekf>("iekf", "Iterated extended Kalman filter.", ReadIekf, DescribeIekf),
-      TypeOf<RtsSmoother>("rts", "Fixed-interval smoother after an extended Kalman filter.",
-                          ReadCommon, DescribeCommon, EstimatorKind::kSmoother),
-      TypeOf<SquareRootEkf>("square_root_ekf",
-                            "Extended Kalman filter that carries a square root of P.", ReadCommon,
-                            DescribeCommon),
-      TypeOf<Ukf>("ukf", "Unscented Kalman filter.", ReadUkf, DescribeUkf),
+      MakeType<Ekf>("ekf", "Extended Kalman filter.", ReadEkf, DescribeEkf),
+      MakeType<Iekf>("iekf", "Iterated extended Kalman filter.", ReadIekf, DescribeIekf),
+      MakeType<RtsSmoother>("rts", "Fixed-interval smoother after an extended Kalman filter.",
+                            ReadCommon, DescribeCommon, EstimatorKind::kSmoother),
+      MakeType<SquareRootEkf>("square_root_ekf",
+                              "Extended Kalman filter that carries a square root of P.", ReadCommon,
+                              DescribeCommon),
+      MakeType<Ukf>("ukf", "Unscented Kalman filter.", ReadUkf, DescribeUkf),
   };
   return types;
 }

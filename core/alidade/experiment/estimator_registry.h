@@ -12,28 +12,28 @@
 
 namespace alidade::internal {
 
-/// The options of an estimator's entry.
+/// Options of an estimator entry, for display.
 struct Description {
-  EkfOptions common;         ///< of every filter
-  std::vector<TextRow> own;  ///< key and value in words, of what only some have
+  EkfOptions common;              ///< options of every filter
+  std::vector<TextRow> specific;  ///< keys and texts of the options of this type only
 };
 
-/// A type of estimator that core has itself, for `type:` of an entry of `estimators:`.
+/// Built-in type of estimator, for `type:` of an entry of `estimators:`.
 struct EstimatorType {
   const char* name;
   const char* doc;  ///< one line
   EstimatorCapabilities capabilities;
   EstimatorKind kind;
-  /// Reads the entry's keys. Errors: kBadConfig.
+  /// Reads the keys of the entry. Errors: kBadConfig.
   std::function<EstimatorMaker(const Node& entry)> read;
-  std::function<std::vector<ParamInfo>()> schema;  ///< what `read` asks for
-  /// The options that an entry sets, in words.
+  std::function<std::vector<ParamInfo>()> schema;  ///< parameters that `read` reads
+  /// Describes the options of an entry.
   std::function<Description(const Node& entry)> describe;
 };
 
-/// All of them; the first is `ekf`.
+/// Returns all built-in types; the first is `ekf`.
 const std::vector<EstimatorType>& EstimatorTypes();
-/// Null where there is none of that name.
+/// Returns the type with this name, or null.
 const EstimatorType* FindEstimatorType(std::string_view name);
 
 }  // namespace alidade::internal

@@ -13,37 +13,37 @@
 namespace alidade::internal {
 namespace {
 
-/// The frame without the streams that only failed sensors read; `failed` by sensor.
-Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams,
-                    const Problem& problem, const std::vector<char>& failed) {
-  const auto goes_on = [&](const Measurement& m) {
+/// Returns the frame without the streams that only failed sensors read; `failed` is by sensor.
+Frame WithoutFailedStreams(const Frame& frame, const std::vector<StreamInfo>& streams,
+                           const Problem& problem, const std::vector<char>& failed) {
+  const auto is_visible = [&](const Measurement& m) {
     const std::string& stream = streams[static_cast<std::size_t>(m.stream)].name;
-    bool read = false, works = false;
+    bool is_read = false, has_working_sensor = false;
     for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
       if (problem.sensors[s].stream != stream) continue;
-      read = true;
-      works = works || failed[s] == 0;
+      is_read = true;
+      has_working_sensor = has_working_sensor || failed[s] == 0;
     }
-    return works || !read;  // a control input, say
+    return has_working_sensor || !is_read;  // it may be a control input
   };
   Frame visible{frame.timestamp, {}};
-  std::ranges::copy_if(frame.measurements, std::back_inserter(visible.measurements), goes_on);
+  std::ranges::copy_if(frame.measurements, std::back_inserter(visible.measurements), is_visible);
   return visible;
 }
 
 }  // namespace
 
-EstimatorRun::AfterFrame EstimatorRun::Process(const Frame& frame,
-                                               const std::vector<StreamInfo>& streams,
-                                               const ProcessedFrame* rolled_back) const {
+EstimatorRun::FrameResult EstimatorRun::Process(const Frame& frame,
+                                                const std::vector<StreamInfo>& streams,
+                                                const ProcessedFrame* rolled_back) const {
   if (rolled_back != nullptr) return {*rolled_back->after, rolled_back->report, {}};
   Frame visible;
-  const bool all = failed_sensors.empty();
-  if (!all) visible = WithoutFailed(frame, streams, spec.problem, failed_sensors);
+  const bool sees_all = failed_sensors.empty();
+  if (!sees_all) visible = WithoutFailedStreams(frame, streams, spec.problem, failed_sensors);
   const auto started = std::chrono::steady_clock::now();
-  const UpdateReport& report = spec.estimator->Process(all ? frame : visible);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
-  return {*spec.estimator, report, took.count()};
+  const UpdateReport& report = spec.estimator->Process(sees_all ? frame : visible);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - started;
+  return {*spec.estimator, report, elapsed.count()};
 }
 
 std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
@@ -58,13 +58,13 @@ std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
              ", failed: " + sensor.model->error_text();
     }
     failed_sensors.resize(spec.problem.sensors.size(), 0);
-    char& failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
-    if (failed == 0) {
+    char& has_failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
+    if (has_failed == 0) {
       AddEvents({{spec.estimator->timestamp(), "sensor_disabled",
                   "sensor '" + sensor.name + "' has failed; its stream '" + sensor.stream +
-                      "' is no longer used, unless another sensor reads it"}});
+                      "' is ignored from now on, unless another sensor reads it"}});
     }
-    failed = 1;
+    has_failed = 1;
   }
   return {};
 }
@@ -89,22 +89,22 @@ void EstimatorRun::AddEstimate(std::size_t k, const FrameWithSegments& frame, co
 
 void EstimatorRun::AddEvents(const std::vector<Event>& events) {
   for (const Event& event : events) {
-    const auto same = [&](const Event& one) {
-      return one.kind == event.kind && one.text == event.text;
+    const auto is_equal = [&](const Event& earlier) {
+      return earlier.kind == event.kind && earlier.text == event.text;
     };
-    const bool stale = event.kind == "input_stale";
-    if (stale) ++stale_inputs;
-    if (stale && std::ranges::any_of(result.events, same)) continue;
+    const bool is_stale = event.kind == "input_stale";
+    if (is_stale) ++stale_inputs;
+    if (is_stale && std::ranges::any_of(result.events, is_equal)) continue;
     result.events.push_back(event);
-    const bool ends = spec.on_divergence == OnDivergence::kFail || finished;
-    LogEvents(spec.name, {&event, 1}, ends);
+    const bool ends_run = spec.on_divergence == OnDivergence::kFail || finished;
+    LogEvents(spec.name, {&event, 1}, ends_run);
   }
 }
 
 namespace {
 
-/// The result before the first frame.
-EstimatorResult ResultOf(const EstimatorSpec& spec, const Experiment& experiment) {
+/// Returns the result before the first frame.
+EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& experiment) {
   EstimatorResult result;
   result.name = spec.name;
   result.type = spec.type;
@@ -119,21 +119,21 @@ EstimatorResult ResultOf(const EstimatorSpec& spec, const Experiment& experiment
   if (position >= 0) result.position_block = spec.problem.layout[position].name;
   result.unobservable = UnobservableDirections(spec.problem);
   if (!ObservabilityIsTold(spec.problem)) {
-    result.events.push_back({kNoTimestamp, "observability",
-                             "not looked into: the state has more than " +
-                                 std::to_string(kMostObserved) + " elements"});
+    result.events.push_back(
+        {kNoTimestamp, "observability",
+         "not analysed: the state has more than " + std::to_string(kMostObserved) + " elements"});
   }
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoTimestamp, "unobservable",
                              "no sensor of this estimator determines " + Join(direction, " and ") +
-                                 (direction.size() > 1 ? " apart" : "")});
+                                 (direction.size() > 1 ? " separately" : "")});
   }
   return result;
 }
 
 }  // namespace
 
-std::vector<EstimatorRun> BeginAll(Experiment& experiment) {
+std::vector<EstimatorRun> CreateRuns(Experiment& experiment) {
   const int reference = experiment.reference;
   std::vector<StreamInfo> truths = experiment.source->truths();
   for (std::size_t t = 0; t < experiment.truth_sigmas.size(); ++t)
@@ -141,15 +141,15 @@ std::vector<EstimatorRun> BeginAll(Experiment& experiment) {
   if (reference >= 0) {
     truths = BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].problem);
   }
-  std::vector<EstimatorRun> running;
+  std::vector<EstimatorRun> runs;
   for (EstimatorSpec& spec : experiment.estimators) {
-    const int index = static_cast<int>(running.size());
+    const int index = static_cast<int>(runs.size());
     Metrics metrics(spec, index == reference ? std::vector<StreamInfo>() : truths,
                     experiment.segments);
-    running.push_back({spec, index, std::move(metrics), ResultOf(spec, experiment)});
-    running.back().needs_reference = reference >= 0;
+    runs.push_back({spec, index, std::move(metrics), InitialResult(spec, experiment)});
+    runs.back().needs_reference = reference >= 0;
   }
-  return running;
+  return runs;
 }
 
 }  // namespace alidade::internal

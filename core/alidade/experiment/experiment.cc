@@ -27,8 +27,7 @@ void CheckSchema(const Node& root) {
   if (found > kSchema) {
     version.Fail("schema version " + std::to_string(found),
                  std::to_string(kSchema) +
-                     ", the newest that this program knows; a newer alidade "
-                     "reads this file");
+                     ", the newest version that this program reads, or a newer alidade");
   }
 }
 
@@ -40,12 +39,11 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   if (const auto list = evaluate->Find("segments")) {
     for (const auto& [name, entry] : list->Entries()) {
       internal::ExpectName(name, entry, "a segment");
-      const auto with = entry.Find("with"), without = entry.Find("without");
-      if (with.has_value() == without.has_value()) {
-        entry.Fail("a segment is the timestamps with or without a valid measurement",
-                   "one of with: SENSOR, without: SENSOR");
+      const auto with_node = entry.Find("with"), without_node = entry.Find("without");
+      if (with_node.has_value() == without_node.has_value()) {
+        entry.Fail("needs exactly one condition", "one of with: SENSOR, without: SENSOR");
       }
-      const Node& sensor = with ? *with : *without;
+      const Node& sensor = with_node ? *with_node : *without_node;
       const int index = problem.FindSensor(sensor.Text());
       if (index < 0) {
         sensor.Fail("no sensor '" + sensor.Text() + "'", "a name from `sensors`",
@@ -54,7 +52,7 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
       const SensorBinding& binding = problem.sensors[static_cast<std::size_t>(index)];
       const int stream =
           internal::FindStream(root.At("sensors").At(binding.name), *binding.model, streams);
-      segments.push_back({name, stream, with.has_value(), binding.model});
+      segments.push_back({name, stream, with_node.has_value(), binding.model});
       entry.RejectUnread();
     }
   }
@@ -63,31 +61,31 @@ std::vector<Segment> ReadSegments(const Node& root, const Problem& problem,
   return segments;
 }
 
-/// Refuses a truth that the config names where it belongs to no block, be it of `whole` or of an
-/// estimator's own state.
-void CheckTruths(const Node& source, const Experiment& experiment, const Problem& whole) {
+/// Rejects a truth of the config that matches neither a block of `full_problem`, which has all
+/// sensors, nor a block of an estimator.
+void CheckTruths(const Node& source, const Experiment& experiment, const Problem& full_problem) {
   const auto listed = source.Find("truth");
   if (!listed || !listed->is_map()) return;
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const auto node = listed->Find(truths[t].name);
-    const auto has_block = [&](const EstimatorSpec& one) {
-      return internal::WhyNoBlock(one.problem.layout, truths, t).empty();
+    const auto has_block = [&](const EstimatorSpec& estimator) {
+      return internal::WhyNoBlock(estimator.problem.layout, truths, t).empty();
     };
-    const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
+    const std::string why = internal::WhyNoBlock(full_problem.layout, truths, t);
     if (!node || why.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
     std::vector<std::string> names;
-    for (const Block& block : whole.layout.blocks()) {
+    for (const Block& block : full_problem.layout.blocks()) {
       names.push_back(block.name);
       names.push_back(block.name.substr(block.owner.size() + 1));
     }
     std::erase(names, truths[t].name);
-    node->Fail("truth of no block: " + why, "the name and size of one block, as in ENTRY.BLOCK",
-               Nearest(truths[t].name, names));
+    node->Fail("the truth does not match a block: " + why,
+               "the name and size of one block, as in ENTRY.BLOCK", Nearest(truths[t].name, names));
   }
 }
 
-/// How the run takes frames that are not in the order of their timestamps.
+/// Reads the policy for frames that do not arrive in the order of their timestamps.
 OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   OutOfSequencePolicy policy;
   const auto entry = root.Find("out_of_sequence");
@@ -96,19 +94,20 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   policy.policy = static_cast<OutOfSequence>(chosen.Choice({"reject", "buffer", "rollback"}));
   const auto window = entry->Find("window_s");
   if (window && policy.policy == OutOfSequence::kReject) {
-    window->Fail("without a use: 'policy: reject' holds nothing back",
+    window->Fail("has no effect: 'policy: reject' does not buffer frames",
                  "'policy: buffer' or 'rollback'");
   }
   if (window) policy.window = TimestampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
     chosen.Fail("'rollback' without 'window_s'",
-                "'window_s', how far out of sequence a frame may be");
+                "'window_s', the largest lag of an out-of-sequence frame");
   }
   entry->RejectUnread();
   return policy;
 }
 
-/// For each stream the first sensor of the config that it goes to; behind them those of none.
+/// Returns the rank of each stream: the index of the first sensor that reads it, or the number of
+/// sensors.
 std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const Problem& problem) {
   std::vector<int> ranks;
   for (const StreamInfo& stream : streams) {
@@ -118,7 +117,7 @@ std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const Problem& 
   return ranks;
 }
 
-/// Index of the estimator that metrics compare with; -1: truth.
+/// Returns the index of the reference estimator of the metrics, or -1 for truth.
 int ReadReference(const Node& root, const std::vector<EstimatorSpec>& estimators) {
   const auto reference = root.Find("reference");
   if (!reference || reference->Text() == "truth") return -1;
@@ -133,67 +132,67 @@ int ReadReference(const Node& root, const std::vector<EstimatorSpec>& estimators
   return static_cast<int>(found - estimators.begin());
 }
 
-/// What may stand under `guide`: the recursive filters of the config.
-std::string GuidesOf(const std::vector<EstimatorSpec>& estimators) {
+/// Returns the accepted values of `guide`: the recursive filters of the config.
+std::string GuideChoices(const std::vector<EstimatorSpec>& estimators) {
   std::vector<std::string> names;
-  for (const EstimatorSpec& one : estimators) {
-    if (one.estimator->AsFilter() != nullptr) names.push_back(one.name);
+  for (const EstimatorSpec& spec : estimators) {
+    if (spec.estimator->AsFilter() != nullptr) names.push_back(spec.name);
   }
-  return names.empty() ? "none, for `estimators` has no recursive filter, as of type ekf"
+  return names.empty() ? "none, as `estimators` has no recursive filter, such as one of type ekf"
                        : "a recursive filter of `estimators`: " + internal::Join(names);
 }
 
-/// The filter that guides the source, by its key `guide`; null: none does.
+/// Returns the filter that guides the source according to its key `guide`, or null.
 const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
-  const std::string name = experiment.source->guided_by();
+  const std::string name = experiment.source->guide_name();
   if (name.empty()) return nullptr;
   const Node guide = source.At("guide");
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
-    guide.Fail("a filter that guides has to process each frame before the next is measured",
+    guide.Fail("a guiding filter must process each frame before the source measures the next",
                "out_of_sequence: {policy: reject}");
   }
   const std::vector<EstimatorSpec>& estimators = experiment.estimators;
   const auto found = std::ranges::find(estimators, name, &EstimatorSpec::name);
   if (found == estimators.end()) {
     const std::vector<std::string> names = NamesOf(estimators);
-    guide.Fail("no estimator '" + name + "'", GuidesOf(estimators), Nearest(name, names));
+    guide.Fail("no estimator '" + name + "'", GuideChoices(estimators), Nearest(name, names));
   }
   const auto* const filter = found->estimator->AsFilter();
   if (filter == nullptr) {
-    guide.Fail("estimator '" + name + "' (" + found->type + ") predicts no measurements",
-               GuidesOf(estimators));
+    guide.Fail("estimator '" + name + "' (" + found->type + ") cannot predict measurements",
+               GuideChoices(estimators));
   }
   const std::vector<StreamInfo>& streams = experiment.source->streams();
-  const bool can = std::ranges::any_of(streams, [&](const StreamInfo& stream) {
+  const bool can_guide = std::ranges::any_of(streams, [&](const StreamInfo& stream) {
     return internal::GuidingSensor(filter->problem(), stream.name) != nullptr;
   });
-  if (!can) {
-    guide.Fail("estimator '" + name + "' has no sensor that tells where features are",
-               "a sensor on a stream of the source that takes no known numbers");
+  if (!can_guide) {
+    guide.Fail("estimator '" + name + "' has no sensor that can guide the source",
+               "a sensor without known numbers, on a stream of the source");
   }
   return filter;
 }
 
-/// Keys of the root that are read before the calibration is there, or by other commands.
+/// Declares the keys of the root that are read before the calibration, or by other commands.
 void DeclareCommon(const Node& root) {
   for (const char* key :
        {"alidade", "plugins", "include", "title", "output", "source", "out_of_sequence"}) {
     root.Declare(key);
   }
-  // Of the calibration of a pair, one of whose cameras may be used alone.
+  // The calibration of a pair has a baseline, also if only one camera is used.
   if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
-/// `evaluate.truth_sigma` of the config's root: for each truth of the source the standard deviation
-/// of its elements; empty where the key is not there. Errors: kBadConfig for a name that is no
-/// truth's, a number below 0, and under a `reference` that is no truth.
+/// Reads `evaluate.truth_sigma`: for each truth of the source the standard deviation of its
+/// elements. Returns an empty list if the key is missing. Errors: kBadConfig for an unknown truth,
+/// a number below 0, or a `reference` that is not truth.
 std::vector<double> ReadTruthSigmas(const Node& root, const std::vector<StreamInfo>& truths,
-                                    bool is_reference) {
+                                    bool is_truth_reference) {
   const auto evaluate = root.Find("evaluate");
   const auto map = evaluate ? evaluate->Find("truth_sigma") : std::nullopt;
   if (!map) return {};
-  if (!is_reference)
-    map->Fail("without a use: the reference is an estimator", "'reference: truth'");
+  if (!is_truth_reference)
+    map->Fail("has no effect: the reference is an estimator", "'reference: truth'");
   std::vector<double> sigmas(truths.size(), 0.0);
   for (const auto& [name, entry] : map->Entries()) {
     const auto truth = std::ranges::find(truths, name, &StreamInfo::name);
@@ -209,15 +208,15 @@ std::vector<double> ReadTruthSigmas(const Node& root, const std::vector<StreamIn
   return sigmas;
 }
 
-void AddWords(const Node& node, std::set<std::string>& words) {
+void AddKeysAndScalars(const Node& node, std::set<std::string>& words) {
   if (node.kind() == Node::Kind::kScalar) words.insert(node.Text());
   if (node.kind() == Node::Kind::kList) {
-    for (const Node& item : node.Items()) AddWords(item, words);
+    for (const Node& item : node.Items()) AddKeysAndScalars(item, words);
   }
   if (!node.is_map()) return;
   for (const auto& [key, value] : node.Entries()) {
     words.insert(key);
-    AddWords(value, words);
+    AddKeysAndScalars(value, words);
   }
 }
 
@@ -235,10 +234,10 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
   return paths;
 }
 
-std::set<std::string> WordsOf(const Config& config) {
-  const Config copy = config.Copy();  // nothing of the original counts as read
+std::set<std::string> KeysAndScalarsOf(const Config& config) {
+  const Config copy = config.Copy();  // so that no key of the original counts as read
   std::set<std::string> words;
-  AddWords(copy.root(), words);
+  AddKeysAndScalars(copy.root(), words);
   return words;
 }
 
@@ -249,7 +248,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   }
 
   Experiment experiment;
-  const Node source = config.root().At("source", "a run: where measurements come from");
+  const Node source = config.root().At("source", "a run: the source of its measurements");
   if (const auto seed = source.Find("seed")) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
@@ -263,10 +262,10 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
   // Every sensor is checked, whether or not an estimator uses it.
-  const Problem whole = ReadProblem(root, host, {});
-  internal::CheckStreams(root, whole, streams);
-  experiment.out_of_sequence.ranks = RanksOf(streams, whole);
-  experiment.segments = ReadSegments(root, whole, streams);
+  const Problem full_problem = ReadProblem(root, host, {});
+  internal::CheckStreams(root, full_problem, streams);
+  experiment.out_of_sequence.ranks = RanksOf(streams, full_problem);
+  experiment.segments = ReadSegments(root, full_problem, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
     internal::AddEstimator(calibrated, host, name, experiment);
   }
@@ -277,7 +276,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.guide = ReadGuide(source, experiment);
   experiment.truth_sigmas =
       ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
-  CheckTruths(source, experiment, whole);
+  CheckTruths(source, experiment, full_problem);
   root.RejectUnread();
   return experiment;
 }

@@ -20,15 +20,18 @@ namespace alidade {
 
 class Filter;
 
-/// What Estimator::diverged() does to the run. The event `inconsistent` of the metrics, which takes
-/// truth, never ends one.
+/// Reaction of the run to Estimator::diverged(). The event `inconsistent` of the metrics, which
+/// needs truth, never ends a run.
 enum class OnDivergence { kReport, kFail };
 
-/// What a call of a sensor that fails does: that measurement is left out; so are all of its stream
-/// from then on, once every sensor of the estimator on it has failed; the run ends.
-enum class OnPluginFailure { kSkip, kDisable, kAbort };
+/// Reaction of the run to a failed call of a sensor model.
+enum class OnPluginFailure {
+  kSkip,     ///< omit the measurement
+  kDisable,  ///< omit the stream once every sensor of the estimator that reads it has failed
+  kAbort,    ///< end the run
+};
 
-/// One estimator to be run, on its own problem: the config with its overrides merged in.
+/// Estimator of a run, with its problem: the config with the overrides of the estimator merged in.
 struct EstimatorSpec {
   std::string name;
   std::string type;
@@ -37,57 +40,58 @@ struct EstimatorSpec {
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
   OnPluginFailure on_plugin_failure = OnPluginFailure::kSkip;
-  std::string overrides;  ///< of its entry, as YAML; "": none
-  /// Index of an estimator before it, not an offline one: it sees the measurements alone that this
-  /// one accepted or took as first values. -1: it sees all.
+  std::string overrides;  ///< from its entry, as YAML, or ""
+  /// Index of the earlier online estimator whose accepted measurements this one uses, with those
+  /// that initialised a state. -1: this estimator uses all measurements.
   int accepted_by = -1;
 };
 
-/// A share of the timestamps over which metrics are taken separately: those with (or without) a
-/// valid measurement of a sensor.
+/// Set of timestamps with separate metrics: those with, or those without, a valid measurement of a
+/// sensor.
 struct Segment {
   std::string name;
   int stream = -1;
-  bool with = true;     ///< timestamps with one, or timestamps without
-  SharedSensor sensor;  ///< decides validity
+  bool has_measurement = true;  ///< timestamps with one, or those without
+  SharedSensor sensor;          ///< determines validity
 };
 
-/// What is done with a frame whose timestamp is before that of a frame that came earlier.
+/// Treatment of a frame that is older than a frame that arrived earlier.
 enum class OutOfSequence {
-  kReject,    ///< estimators are given it as it comes, and count its measurements as stale
-  kBuffer,    ///< frames are held back while one before them can still come
-  kRollback,  ///< estimators take frames as they come, and roll back for one out of sequence
+  kReject,    ///< estimators receive it at once, and count its measurements as stale
+  kBuffer,    ///< frames are buffered while an older one may still arrive
+  kRollback,  ///< estimators process frames at once, and roll back for one out of sequence
 };
 
-/// How a run takes frames that are not in the order of their timestamps. But under kReject, frames
-/// of equal timestamps are merged.
+/// Policy for frames that do not arrive in the order of their timestamps. Frames of equal
+/// timestamps are merged, except under kReject.
 struct OutOfSequencePolicy {
   OutOfSequence policy = OutOfSequence::kReject;
-  /// A frame farther behind the newest is dropped, with the event `out_of_sequence`; none: no frame
-  /// is.
+  /// Largest lag behind the newest frame. A frame with a larger lag is dropped, with the event
+  /// `out_of_sequence`. Empty: no limit.
   std::optional<Timestamp> window;
-  std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
+  std::vector<int> ranks;  ///< of the streams, to order the measurements of merged frames
 };
 
-/// All that a config describes, made and checked, ready to run.
+/// Experiment of a config, created and checked, ready to run.
 struct Experiment {
   std::unique_ptr<Source> source;
   std::vector<EstimatorSpec> estimators;
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;
-  int reference = -1;             ///< index of the estimator that metrics compare with; -1: truth
-  const Filter* guide = nullptr;  ///< the filter that guides the source; null: none
-  std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
+  int reference = -1;                ///< index of the reference estimator of the metrics; -1: truth
+  const Filter* guide = nullptr;     ///< the filter that guides the source; null: none
+  std::vector<double> truth_sigmas;  ///< of the truths; empty: those of the source
 };
 
-/// The files and folders that a config's `plugins:` names, relative ones taken from its folder.
+/// Returns the files and folders under `plugins:`, resolved against the folder of the config.
 std::vector<std::filesystem::path> PluginPaths(const Config& config);
 
-/// Every key and every scalar of a config: with these alone a PluginHost has what it names.
-std::set<std::string> WordsOf(const Config& config);
+/// Returns every key and every scalar of a config. A PluginHost that has the plugins with these
+/// names is sufficient for the config.
+std::set<std::string> KeysAndScalarsOf(const Config& config);
 
-/// Makes everything a config names. Errors: kBadConfig, kPlugin, kInputMissing, ...
+/// Creates the experiment of a config. Errors: kBadConfig, kPlugin, kInputMissing, ...
 Experiment BuildExperiment(const Config& config, const PluginHost& host);
 
 }  // namespace alidade

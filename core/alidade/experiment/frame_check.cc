@@ -10,19 +10,20 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kCounted = 1e-9;
+constexpr double kCountedDefect = 1e-9;
 
-[[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
-  throw ContractViolation("the source gives " + what + " at t = " + SecondsText(frame.timestamp));
+[[noreturn]] void Reject(const Frame& frame, const std::string& defect) {
+  throw ContractViolation("the source returned " + defect +
+                          " at t = " + SecondsText(frame.timestamp));
 }
 
 void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<double>& values) {
   if (std::ssize(values) == info.size) return;
-  Refuse(frame, std::to_string(values.size()) + " values of '" + info.name + "', not " +
+  Reject(frame, std::to_string(values.size()) + " values of '" + info.name + "', not " +
                     std::to_string(info.size) + ',');
 }
 
-/// What the models of the experiment say of a stream.
+/// Returns the geometry of a stream in the models of the experiment, or a vector.
 Geometry GeometryOf(const Experiment& experiment, const StreamInfo& stream) {
   for (const EstimatorSpec& spec : experiment.estimators) {
     for (const SensorBinding& sensor : spec.problem.sensors) {
@@ -69,23 +70,23 @@ void FrameCheck::operator()(SourceFrame& frame) {
 void FrameCheck::Check(const SourceFrame& frame) const {
   for (const Measurement& m : frame.measurements) {
     if (m.stream < 0 || m.stream >= std::ssize(streams_)) {
-      Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
+      Reject(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
                         std::to_string(streams_.size()));
     }
-    const Kind& kind = streams_[static_cast<std::size_t>(m.stream)];
-    CheckSize(frame, kind.info, m.values);
-    if (std::ssize(m.known) != kind.info.known) {
-      Refuse(frame, std::to_string(m.known.size()) + " known numbers with '" + kind.info.name +
-                        "', not " + std::to_string(kind.info.known) + ',');
+    const Channel& channel = streams_[static_cast<std::size_t>(m.stream)];
+    CheckSize(frame, channel.info, m.values);
+    if (std::ssize(m.known) != channel.info.known) {
+      Reject(frame, std::to_string(m.known.size()) + " known numbers with '" + channel.info.name +
+                        "', not " + std::to_string(channel.info.known) + ',');
     }
-    const int tangent = kind.geometry.tangent;
+    const int tangent = channel.geometry.tangent;
     if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
-      Refuse(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
-                        kind.info.name + "', not " + std::to_string(tangent * tangent) + ',');
+      Reject(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
+                        channel.info.name + "', not " + std::to_string(tangent * tangent) + ',');
     }
   }
   if (frame.truth.size() > truths_.size()) {
-    Refuse(frame,
+    Reject(frame,
            std::to_string(frame.truth.size()) + " truths of " + std::to_string(truths_.size()));
   }
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
@@ -93,31 +94,31 @@ void FrameCheck::Check(const SourceFrame& frame) const {
   }
 }
 
-void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
-  kind.geometry.ForEachPart([&](const Geometry& part, int a, int) {
+void FrameCheck::Normalise(Channel& channel, std::vector<double>& value) {
+  channel.geometry.ForEachPart([&](const Geometry& part, int a, int) {
     const bool is_rotation = part.kind == GeometryKind::kUnitQuaternion;
     if (!is_rotation && part.kind != GeometryKind::kUnitVector) return;
     double* const x = value.data() + a;
     const double defect = DistanceFrom(part, x);
     if (!(defect <= kUnitTolerance)) {
-      throw Error(ExitCode::kBadData,
-                  ErrorLine(source_.place(), kind.info.name,
-                            std::string(is_rotation ? "a quaternion" : "a direction") +
-                                " whose length is off by " + RoundedText(defect, 4),
-                            "unit length to 1e-3"));
+      const std::string value_kind = is_rotation ? "quaternion" : "direction";
+      throw Error(ExitCode::kBadData, ErrorLine(source_.place(), channel.info.name,
+                                                "the length of a " + value_kind + " is off by " +
+                                                    RoundedText(defect, 4),
+                                                "unit length to 1e-3"));
     }
-    if (defect > kCounted) ++normalised_[kind.info.name];
+    if (defect > kCountedDefect) ++normalised_[channel.info.name];
     part.Normalise(x);
     if (is_rotation) ChooseSign({}, {x, 4});
   });
 }
 
-void FrameCheck::FollowTruth(SourceFrame& frame) {
+void FrameCheck::ChooseTruthSigns(SourceFrame& frame) {
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
-    Kind& kind = truths_[t];
-    if (frame.truth[t].empty() || kind.geometry.kind != GeometryKind::kUnitQuaternion) continue;
-    ChooseSign(kind.before, frame.truth[t]);
-    kind.before = frame.truth[t];
+    Channel& channel = truths_[t];
+    if (frame.truth[t].empty() || channel.geometry.kind != GeometryKind::kUnitQuaternion) continue;
+    ChooseSign(channel.previous, frame.truth[t]);
+    channel.previous = frame.truth[t];
   }
 }
 

@@ -10,36 +10,38 @@
 
 namespace alidade::internal {
 
-/// What every frame of a source passes before anything else sees it. Quaternions and directions,
-/// of measurements, control inputs and truth, are brought to unit length, and a quaternion to the
-/// sign that ChooseSign has for it: the signs of a source are not seen in what a run writes.
+/// Check and normalisation of every frame of a source, before any other use. Normalises quaternions
+/// and directions of measurements, control inputs and truth. Selects the sign of quaternions by
+/// ChooseSign, so that the output of a run does not depend on the signs of the source.
 class FrameCheck {
  public:
   using Counts = std::map<std::string, std::int64_t>;
 
-  /// `normalised` counts, by stream or truth, values whose length was off by more than 1e-9.
+  /// `normalised` counts, by stream or truth, values whose length differed from 1 by more than
+  /// 1e-9.
   FrameCheck(const Experiment& experiment, Counts& normalised);
 
-  /// Errors: ContractViolation for a frame that is not as Source::streams() and truths() say, as
-  /// whatever takes it afterwards indexes by stream and reads as many values as these tell;
-  /// kBadData for a length that is off by more than 1e-3.
+  /// Checks and normalises a frame. Errors: ContractViolation for a frame that contradicts
+  /// Source::streams() or truths(), as later code relies on their indices and sizes; kBadData for a
+  /// length that differs from 1 by more than 1e-3.
   void operator()(SourceFrame& frame);
-  /// Of the two signs of a true quaternion, that nearer to the one before. Takes frames in order.
-  void FollowTruth(SourceFrame& frame);
+  /// Selects the sign of each true quaternion that is nearer to the previous one. Requires frames
+  /// in the order of time.
+  void ChooseTruthSigns(SourceFrame& frame);
 
  private:
-  /// The values of one stream or truth.
-  struct Kind {
+  /// Stream or truth.
+  struct Channel {
     StreamInfo info;
-    Geometry geometry;                ///< a vector where none is known
-    std::vector<double> before = {};  ///< of a truth
+    Geometry geometry;                  ///< a vector if unknown
+    std::vector<double> previous = {};  ///< value of a truth
   };
 
   void Check(const SourceFrame& frame) const;
-  void Normalise(Kind& kind, std::vector<double>& value);
+  void Normalise(Channel& channel, std::vector<double>& value);
 
   const Source& source_;
-  std::vector<Kind> streams_, truths_;
+  std::vector<Channel> streams_, truths_;
   Counts& normalised_;
 };
 

@@ -10,12 +10,13 @@
 
 namespace alidade::internal {
 
-/// The innovations r = z (-) h of one sensor in one frame, of accepted measurements alone.
+/// Innovations r = z (-) h of the accepted measurements of one sensor in one frame.
 struct FrameInnovation {
   std::int64_t measurements = 0;
   double rms = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(mean r_i^2) over all elements
 };
 
+/// Computes the innovations of `sensor`, an index, in the frame of `report`.
 inline FrameInnovation FrameInnovationOf(const UpdateReport& report, int sensor) {
   FrameInnovation frame;
   double sum = 0.0, count = 0.0;
@@ -29,7 +30,7 @@ inline FrameInnovation FrameInnovationOf(const UpdateReport& report, int sensor)
   return frame;
 }
 
-/// Whether the rms of a frame is the reprojection error: of many landmarks, in one unit.
+/// Returns whether the rms of a frame is a reprojection error: of many landmarks, in one unit.
 inline bool HasReprojection(const SensorBinding& binding) {
   return binding.model->has_landmark() && !binding.model->measurement().unit.empty();
 }

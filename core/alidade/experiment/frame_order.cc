@@ -15,10 +15,10 @@
 namespace alidade::internal {
 namespace {
 
-/// ` in FILE:LINE`, where the source knows.
-std::string In(const Place& place) {
+/// Returns `; the first is in FILE:LINE`, or "" if the place is unknown.
+std::string FirstPlaceText(const Place& place) {
   const std::string text = ToString(Place{place.file, place.line, 0});
-  return text.empty() ? "" : " in " + text;
+  return text.empty() ? "" : "; the first is in " + text;
 }
 
 }  // namespace
@@ -26,9 +26,9 @@ std::string In(const Place& place) {
 FrameOrder::FrameOrder(Experiment& experiment, Check check)
     : experiment_(experiment), check_(std::move(check)), guide_(experiment) {
   if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
-  for (const EstimatorSpec& named : experiment.estimators) {
+  for (const EstimatorSpec& spec : experiment.estimators) {
     std::optional<Snapshots>& snapshots = snapshots_.emplace_back();
-    if (!named.estimator->offline()) snapshots.emplace(*named.estimator);
+    if (!spec.estimator->offline()) snapshots.emplace(*spec.estimator);
   }
 }
 
@@ -46,20 +46,20 @@ bool FrameOrder::Next(SourceFrame& frame) {
     Accept(frame);
     return true;
   }
-  while (!ended_ && (held_.empty() || !IsTooLate(held_.front().frame.timestamp))) {
+  while (!is_at_end_ && (buffer_.empty() || !IsTooLate(buffer_.front().frame.timestamp))) {
     try {
       Receive();
     } catch (...) {
       failure_ = std::current_exception();
-      ended_ = true;
+      is_at_end_ = true;
     }
   }
-  if (held_.empty()) {
+  if (buffer_.empty()) {
     if (failure_) std::rethrow_exception(failure_);
     return false;
   }
-  frame = std::move(held_.front().frame);
-  held_.pop_front();
+  frame = std::move(buffer_.front().frame);
+  buffer_.pop_front();
   for (std::optional<Snapshots>& snapshots : snapshots_) {
     if (snapshots) snapshots->Release();
   }
@@ -71,13 +71,13 @@ const ProcessedFrame* FrameOrder::processed(std::size_t estimator) const {
   return &snapshots_[estimator]->released();
 }
 
-/// Whether a frame of this timestamp, were it to come now, would come too late.
+/// Returns whether a frame with this timestamp would arrive too late now.
 bool FrameOrder::IsTooLate(Timestamp timestamp) const {
   return experiment_.out_of_sequence.window &&
          Lag(newest_, timestamp) > *experiment_.out_of_sequence.window;
 }
 
-/// Counts the frame; false where it is to be dropped.
+/// Counts the frame. Returns false if it must be dropped.
 bool FrameOrder::Accept(const Frame& frame) {
   if (frame.timestamp >= newest_) {
     newest_ = frame.timestamp;
@@ -89,13 +89,13 @@ bool FrameOrder::Accept(const Frame& frame) {
   if (!IsTooLate(frame.timestamp)) return true;
   ++arrivals_.dropped;
   events_.push_back({frame.timestamp, "out_of_sequence",
-                     "a frame " + Names(frame) + "came " + SecondsText(lag) +
-                         " behind the newest, beyond the window of " +
-                         SecondsText(*experiment_.out_of_sequence.window) + ": dropped"});
+                     "a frame " + StreamNames(frame) + "was dropped: it is " + SecondsText(lag) +
+                         " older than the newest, beyond the window of " +
+                         SecondsText(*experiment_.out_of_sequence.window)});
   return false;
 }
 
-std::string FrameOrder::Names(const Frame& frame) const {
+std::string FrameOrder::StreamNames(const Frame& frame) const {
   std::vector<std::string> names;
   for (const Measurement& m : frame.measurements) {
     const std::string& name =
@@ -105,111 +105,114 @@ std::string FrameOrder::Names(const Frame& frame) const {
   return names.empty() ? "" : "of " + Join(names) + ' ';
 }
 
-/// Takes a frame from the source.
+/// Reads a frame from the source into the buffer.
 void FrameOrder::Receive() {
-  Held received;
-  ended_ = !experiment_.source->Next(received.frame);
-  if (ended_) return;
+  BufferedFrame received;
+  is_at_end_ = !experiment_.source->Next(received.frame);
+  if (is_at_end_) return;
   check_(received.frame);
   received.places.assign(received.frame.measurements.size(), experiment_.source->place());
   if (!Accept(received.frame)) return;
-  const std::size_t at = Insert(std::move(received));
+  const std::size_t index = Insert(std::move(received));
   if (experiment_.out_of_sequence.policy != OutOfSequence::kRollback) return;
   try {
-    Replay(at);
+    Replay(index);
   } catch (...) {
-    held_.resize(at);  // what came before is as it was
+    buffer_.resize(index);  // the frames before it are unchanged
     throw;
   }
 }
 
-/// Where the frame is now in held_.
-std::size_t FrameOrder::Insert(Held&& received) {
-  const auto timestamp = [](const Held& held) { return held.frame.timestamp; };
-  const auto at = std::ranges::lower_bound(held_, received.frame.timestamp, {}, timestamp);
-  const auto index = static_cast<std::size_t>(at - held_.begin());
-  if (at == held_.end() || at->frame.timestamp != received.frame.timestamp) {
-    held_.insert(at, std::move(received));
+/// Inserts the frame into buffer_ and returns its index.
+std::size_t FrameOrder::Insert(BufferedFrame&& received) {
+  const auto timestamp = [](const BufferedFrame& buffered) { return buffered.frame.timestamp; };
+  const auto next = std::ranges::lower_bound(buffer_, received.frame.timestamp, {}, timestamp);
+  const auto index = static_cast<std::size_t>(next - buffer_.begin());
+  if (next == buffer_.end() || next->frame.timestamp != received.frame.timestamp) {
+    buffer_.insert(next, std::move(received));
   } else {
-    CheckMerge(*at, received.frame);
-    Merge(*at, std::move(received));
+    CheckMerge(*next, received.frame);
+    Merge(*next, std::move(received));
     ++arrivals_.merged;
   }
   return index;
 }
 
-/// Throws where both have a measurement of one stream, or another value of a truth.
-void FrameOrder::CheckMerge(const Held& held, const SourceFrame& part) const {
+/// Throws if both frames have a measurement of the same stream, or different values of a truth.
+void FrameOrder::CheckMerge(const BufferedFrame& buffered, const SourceFrame& part) const {
   const Source& source = *experiment_.source;
-  const SourceFrame& whole = held.frame;
-  const auto fail = [&](const std::string& what, const std::string& expected) {
-    throw Error(
-        ExitCode::kBadData,
-        ErrorLine(source.place(), {}, what + " at t = " + SecondsText(whole.timestamp), expected));
+  const SourceFrame& merged = buffered.frame;
+  const auto fail = [&](const std::string& defect, const std::string& expected) {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(source.place(), {}, defect + " at t = " + SecondsText(merged.timestamp),
+                          expected));
   };
   for (const Measurement& m : part.measurements) {
-    const auto same = [&](const Measurement& other) {
-      return other.stream == m.stream && other.landmark == m.landmark;
+    const auto is_same = [&](const Measurement& earlier) {
+      return earlier.stream == m.stream && earlier.landmark == m.landmark;
     };
-    const auto first = std::ranges::find_if(whole.measurements, same);
-    if (first == whole.measurements.end()) continue;
-    const auto index = static_cast<std::size_t>(first - whole.measurements.begin());
-    fail("stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name + "' twice",
-         "one measurement at a timestamp; the first is" + In(held.places[index]));
+    const auto first = std::ranges::find_if(merged.measurements, is_same);
+    if (first == merged.measurements.end()) continue;
+    const auto index = static_cast<std::size_t>(first - merged.measurements.begin());
+    fail("two measurements of stream '" +
+             source.streams()[static_cast<std::size_t>(m.stream)].name + "'",
+         "one measurement per timestamp" + FirstPlaceText(buffered.places[index]));
   }
-  for (std::size_t t = 0; t < std::min(whole.truth.size(), part.truth.size()); ++t) {
-    if (part.truth[t].empty() || whole.truth[t].empty() || part.truth[t] == whole.truth[t])
+  for (std::size_t t = 0; t < std::min(merged.truth.size(), part.truth.size()); ++t) {
+    if (part.truth[t].empty() || merged.truth[t].empty() || part.truth[t] == merged.truth[t])
       continue;
-    fail("another value of truth '" + source.truths()[t].name + "'", "one at a timestamp");
+    fail("two values of truth '" + source.truths()[t].name + "'", "one value per timestamp");
   }
 }
 
-/// Puts the measurements of both into the order of the config, and the truths that one of the two
-/// lacks.
-void FrameOrder::Merge(Held& held, Held&& received) const {
-  SourceFrame &whole = held.frame, &part = received.frame;
-  const auto key = [this](const Measurement& one) {
+/// Merges the measurements of both frames in the order of the config. Adds the truths that the
+/// buffered frame does not have.
+void FrameOrder::Merge(BufferedFrame& buffered, BufferedFrame&& received) const {
+  SourceFrame &merged = buffered.frame, &part = received.frame;
+  const auto key = [this](const Measurement& measurement) {
     const std::vector<int>& ranks = experiment_.out_of_sequence.ranks;
-    const auto stream = static_cast<std::size_t>(one.stream);
-    return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
+    const auto stream = static_cast<std::size_t>(measurement.stream);
+    return std::tuple(stream < ranks.size() ? ranks[stream] : 0, measurement.stream,
+                      measurement.landmark);
   };
-  std::ranges::move(part.measurements, std::back_inserter(whole.measurements));
-  held.places.insert(held.places.end(), received.places.begin(), received.places.end());
-  std::vector<std::size_t> order(whole.measurements.size());
+  std::ranges::move(part.measurements, std::back_inserter(merged.measurements));
+  buffered.places.insert(buffered.places.end(), received.places.begin(), received.places.end());
+  std::vector<std::size_t> order(merged.measurements.size());
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return key(whole.measurements[i]); });
-  const auto sorted = [&](auto& list) {
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return key(merged.measurements[i]); });
+  const auto apply_order = [&](auto& list) {
     std::remove_reference_t<decltype(list)> ordered;
     for (const std::size_t i : order) ordered.push_back(std::move(list[i]));
     list = std::move(ordered);
   };
-  sorted(whole.measurements);
-  sorted(held.places);
-  whole.truth.resize(std::max(whole.truth.size(), part.truth.size()));
+  apply_order(merged.measurements);
+  apply_order(buffered.places);
+  merged.truth.resize(std::max(merged.truth.size(), part.truth.size()));
   for (std::size_t t = 0; t < part.truth.size(); ++t) {
-    if (whole.truth[t].empty()) whole.truth[t] = std::move(part.truth[t]);
+    if (merged.truth[t].empty()) merged.truth[t] = std::move(part.truth[t]);
   }
 }
 
-/// Gives the frames held from index `from` on to the estimators, after what came before them.
-void FrameOrder::Replay(std::size_t from) {
+/// Processes the buffered frames from index `first` on again, after the earlier frames.
+void FrameOrder::Replay(std::size_t first) {
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
     if (!snapshots_[e]) continue;
-    EstimatorSpec& named = experiment_.estimators[e];
+    EstimatorSpec& spec = experiment_.estimators[e];
     std::vector<Frame> frames;
-    for (std::size_t i = from; i < held_.size(); ++i) {
-      frames.push_back(named.accepted_by < 0 ? held_[i].frame : Accepted(i, named.accepted_by));
+    for (std::size_t i = first; i < buffer_.size(); ++i) {
+      frames.push_back(spec.accepted_by < 0 ? buffer_[i].frame
+                                            : AcceptedFrame(i, spec.accepted_by));
     }
-    snapshots_[e]->Replace(from, std::move(frames), named.estimator);
+    snapshots_[e]->Replace(first, std::move(frames), spec.estimator);
   }
 }
 
-/// The frame held at `index` as an estimator sees it that uses what estimator `by` accepted.
-Frame FrameOrder::Accepted(std::size_t index, int by) const {
-  const auto filter = static_cast<std::size_t>(by);
+/// Returns the buffered frame at `index` with the measurements that `estimator` accepted.
+Frame FrameOrder::AcceptedFrame(std::size_t index, int estimator) const {
+  const auto filter = static_cast<std::size_t>(estimator);
   const ProcessedFrame& processed = snapshots_[filter]->frames()[index];
-  return AcceptedOf(processed.frame, experiment_.source->streams(),
-                    experiment_.estimators[filter].problem, processed.report);
+  return AcceptedMeasurements(processed.frame, experiment_.source->streams(),
+                              experiment_.estimators[filter].problem, processed.report);
 }
 
 }  // namespace alidade::internal

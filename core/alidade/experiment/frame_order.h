@@ -15,55 +15,55 @@
 
 namespace alidade::internal {
 
-/// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
-/// also steers the estimators: they take each frame as it comes, and what came after an
-/// out-of-sequence one again. The source is guided, where it asks for it.
+/// Sequence of the frames of a source, in the order of the OutOfSequencePolicy of the experiment.
+/// Under kRollback it also runs the estimators: they process each frame on arrival, and repeat the
+/// frames after an out-of-sequence frame. Guides the source if its config requests a guide.
 class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
 
-  /// `check` takes each frame first; it throws for one that the estimators must not see.
+  /// Calls `check` for each frame first; it throws if the estimators must not process the frame.
   FrameOrder(Experiment& experiment, Check check);
-  /// Takes back what the estimators were given beyond the frame that Next gave last.
+  /// Restores the estimators to their state after the last frame that Next returned.
   ~FrameOrder();
   FrameOrder(const FrameOrder&) = delete;
   FrameOrder& operator=(const FrameOrder&) = delete;
 
-  /// The next frame that no other can come before; false at the end. An error of the source, of
-  /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
-  /// a stream, or another value of a truth, comes twice at one timestamp.
+  /// Reads the next frame that no later arrival can precede; returns false at the end. An error of
+  /// the source, of `check` or of an estimator is thrown after all buffered frames were returned.
+  /// Errors: kBadData if one timestamp has two measurements of a stream, or two values of a truth.
   bool Next(SourceFrame& frame);
-  /// The frame that Next gave as the estimator processed it when it came, under kRollback; else
-  /// null. Good until the next call of Next.
+  /// Under kRollback, returns the last frame of Next as the estimator processed it on arrival; else
+  /// null. Valid until the next call of Next.
   const ProcessedFrame* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
-  /// `out_of_sequence` of each frame dropped since the last call.
-  std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }
+  /// Returns an event `out_of_sequence` for each frame dropped since the last call.
+  std::vector<Event> ExtractEvents() { return std::exchange(events_, {}); }
 
  private:
-  struct Held {
+  struct BufferedFrame {
     SourceFrame frame;
     std::vector<Place> places;  ///< of the measurements
   };
 
   bool Accept(const Frame& frame);
   void Receive();
-  std::size_t Insert(Held&& received);
-  void CheckMerge(const Held& held, const SourceFrame& part) const;
-  void Merge(Held& held, Held&& received) const;
-  void Replay(std::size_t from);
-  Frame Accepted(std::size_t index, int by) const;
+  std::size_t Insert(BufferedFrame&& received);
+  void CheckMerge(const BufferedFrame& buffered, const SourceFrame& part) const;
+  void Merge(BufferedFrame& buffered, BufferedFrame&& received) const;
+  void Replay(std::size_t first);
+  Frame AcceptedFrame(std::size_t index, int estimator) const;
   bool IsTooLate(Timestamp timestamp) const;
-  std::string Names(const Frame& frame) const;
+  std::string StreamNames(const Frame& frame) const;
 
   Experiment& experiment_;
   Check check_;
   EstimatorGuide guide_;
-  std::deque<Held> held_;  ///< by timestamp
-  /// By estimator, of the frames held; none if it is offline. Empty but under kRollback.
+  std::deque<BufferedFrame> buffer_;  ///< in the order of the timestamps
+  /// By estimator, for the buffered frames; empty if it is offline. Only under kRollback.
   std::vector<std::optional<Snapshots>> snapshots_;
   Timestamp newest_ = kNoTimestamp;
-  bool ended_ = false;
+  bool is_at_end_ = false;
   std::exception_ptr failure_;
   Arrivals arrivals_;
   std::vector<Event> events_;

@@ -9,7 +9,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Whether the block is a scalar that the sensor tells from a measurement alone.
+/// Returns whether the sensor can initialise a scalar block from a measurement alone.
 bool IsInvertible(const Problem& problem, const SensorBinding& binding) {
   const int role = binding.model->inverse().role;
   const int roles = static_cast<int>(binding.roles.size());
@@ -21,27 +21,27 @@ bool IsInvertible(const Problem& problem, const SensorBinding& binding) {
   return block >= 0 && problem.layout[block].geometry().ambient == 1;
 }
 
-/// Whether measurement and roles are scalars.
+/// Returns whether the measurement and all roles are scalars.
 bool IsScalar(const SensorBinding& binding) {
-  const auto scalar = [](const Space& space) {
+  const auto is_scalar = [](const Space& space) {
     return space.geometry.kind == GeometryKind::kVector && space.geometry.ambient == 1;
   };
-  return scalar(binding.model->measurement()) &&
-         std::ranges::all_of(binding.model->roles(), scalar);
+  return is_scalar(binding.model->measurement()) &&
+         std::ranges::all_of(binding.model->roles(), is_scalar);
 }
 
-/// x of the first role with h(x) = z, all scalar and the others as they are, by Newton's method
-/// from where it is; none where that does not converge.
-std::optional<double> SolveForFirst(const SensorModel& model, std::vector<const double*> roles,
-                                    double z) {
-  constexpr int kMostSteps = 20;
+/// Solves h(x) = z for the first role by Newton's method from its value, with the other roles
+/// unchanged; all are scalars. Returns nothing if that does not converge.
+std::optional<double> SolveForFirstRole(const SensorModel& model, std::vector<const double*> roles,
+                                        double z) {
+  constexpr int kMaxSteps = 20;
   double x = *roles[0];
   roles[0] = &x;
   double slope = 0.0, h = 0.0;
   std::vector<double*> jacobians(roles.size(), nullptr);
   jacobians[0] = &slope;
   const std::vector<int> strides(roles.size(), 1);
-  for (int i = 0; i < kMostSteps; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     if (model.Linearise(roles.data(), &h, jacobians.data(), strides.data()) != Status::kOk) break;
     const double step = (z - h) / slope;
     if (!std::isfinite(step)) break;
@@ -56,12 +56,12 @@ std::optional<double> SolveForFirst(const SensorModel& model, std::vector<const 
 std::vector<int> TruthsOfRoles(const Problem& problem, const SensorBinding& binding,
                                const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = MatchTruths(problem.layout, truths);
-  std::vector<int> found;
+  std::vector<int> indices;
   for (const RoleBinding& role : binding.roles) {
-    found.push_back(role.block < 0 ? -1 : match[static_cast<std::size_t>(role.block)]);
-    if (found.back() < 0) return {};
+    indices.push_back(role.block < 0 ? -1 : match[static_cast<std::size_t>(role.block)]);
+    if (indices.back() < 0) return {};
   }
-  return found;
+  return indices;
 }
 
 std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<int>& truths) {
@@ -76,25 +76,25 @@ std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<in
 
 std::optional<ImpliedState> ImpliedState::Of(const Problem& problem, const SensorBinding& binding,
                                              const std::vector<StreamInfo>& truths) {
-  if (binding.model->known_size() > 0) return {};  // they would be needed, too
+  if (binding.model->known_size() > 0) return {};  // x would depend on them
   if (IsInvertible(problem, binding)) {
     const auto role = static_cast<std::size_t>(binding.model->inverse().role);
     return ImpliedState(binding.model, binding.roles[role].block);
   }
-  std::vector<int> of_roles = TruthsOfRoles(problem, binding, truths);
-  if (of_roles.empty() || !IsScalar(binding)) return {};
+  std::vector<int> role_truths = TruthsOfRoles(problem, binding, truths);
+  if (role_truths.empty() || !IsScalar(binding)) return {};
   ImpliedState implied(binding.model, binding.roles[0].block);
-  implied.rest_at_truth_ = true;
-  implied.truths_ = std::move(of_roles);
+  implied.uses_true_roles_ = true;
+  implied.truths_ = std::move(role_truths);
   return implied;
 }
 
 std::optional<double> ImpliedState::From(const Truth& truth, const double* z) const {
   if (model_->Valid({z}) != Status::kOk) return {};
-  if (rest_at_truth_) {
+  if (uses_true_roles_) {
     const std::vector<const double*> roles = RolesAtTruth(truth, truths_);
     if (roles.empty()) return {};
-    return SolveForFirst(*model_, roles, *z);
+    return SolveForFirstRole(*model_, roles, *z);
   }
   double value = 0.0;
   const std::vector<const double*> roles(model_->roles().size(), nullptr);

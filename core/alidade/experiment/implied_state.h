@@ -10,21 +10,21 @@
 
 namespace alidade::internal {
 
-/// The state that one measurement implies, without a filter: the x of one scalar block with
-/// h(x) = z, as f B / d of a disparity d. A sensor that can initialise the block from a measurement
-/// alone does so; of another whose measurement and roles are scalars, x is that of its first role
-/// by Newton's method from truth, its other roles at truth.
+/// State implied by one measurement without a filter: the x of one scalar block with h(x) = z, such
+/// as f B / d for a disparity d. If the sensor can initialise the block from a measurement alone, x
+/// is that initial value. Otherwise measurement and roles must be scalars; x is then the value of
+/// the first role by Newton's method from truth, with the other roles at truth.
 class ImpliedState {
  public:
-  /// None where the sensor implies no scalar: it has a landmark, known numbers, more elements, or
-  /// roles whose truth the source does not name.
+  /// Returns nothing if the sensor does not imply a scalar: it has a landmark, known numbers, more
+  /// elements, or roles without truth.
   static std::optional<ImpliedState> Of(const Problem& problem, const SensorBinding& binding,
                                         const std::vector<StreamInfo>& truths);
 
   BlockId block() const { return block_; }
-  /// The other roles are at truth.
-  bool rest_at_truth() const { return rest_at_truth_; }
-  /// None where z is not valid, a truth is not known, or there is no such x.
+  /// Returns whether the other roles are at truth.
+  bool uses_true_roles() const { return uses_true_roles_; }
+  /// Returns x, or nothing if z is invalid, a truth is unknown, or x does not exist.
   std::optional<double> From(const Truth& truth, const double* z) const;
 
  private:
@@ -32,15 +32,15 @@ class ImpliedState {
 
   SharedSensor model_;
   BlockId block_;
-  bool rest_at_truth_ = false;
+  bool uses_true_roles_ = false;
   std::vector<int> truths_;  ///< by role
 };
 
-/// The truth of each role of a sensor; empty where one is unbound or has none.
+/// Returns the index of the truth of each role; empty if a role is unbound or has no truth.
 std::vector<int> TruthsOfRoles(const Problem& problem, const SensorBinding& binding,
                                const std::vector<StreamInfo>& truths);
 
-/// The values of roles at truth; empty where one is not known.
+/// Returns the true values of roles; empty if one is unknown.
 std::vector<const double*> RolesAtTruth(const Truth& truth, const std::vector<int>& truths);
 
 }  // namespace alidade::internal

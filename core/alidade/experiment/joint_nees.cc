@@ -6,22 +6,22 @@
 namespace alidade::internal {
 
 Nees JointNees(const State& state, std::span<const BlockError> errors) {
-  const auto is_used = [&](const BlockError& one) {
-    const Block& block = state.layout()[one.id];
+  const auto is_used = [&](const BlockError& error) {
+    const Block& block = state.layout()[error.id];
     return block.present && block.status == BlockStatus::kEstimated;
   };
-  const auto size = [&](const BlockError& one) {
-    return state.layout()[one.id].geometry().tangent;
+  const auto size = [&](const BlockError& error) {
+    return state.layout()[error.id].geometry().tangent;
   };
   Nees nees;
-  for (const BlockError& one : errors) nees.dof += is_used(one) ? size(one) : 0;
+  for (const BlockError& e : errors) nees.dof += is_used(e) ? size(e) : 0;
   if (nees.dof == 0) return nees;
   Eigen::MatrixXd c(nees.dof, nees.dof);
-  Eigen::VectorXd error(nees.dof);
+  Eigen::VectorXd joint_error(nees.dof);
   int row = 0;
   for (const BlockError& a : errors) {
     if (!is_used(a)) continue;
-    error.segment(row, size(a)) = *a.error;
+    joint_error.segment(row, size(a)) = *a.error;
     int column = 0;
     for (const BlockError& b : errors) {
       if (!is_used(b)) continue;
@@ -33,7 +33,7 @@ Nees JointNees(const State& state, std::span<const BlockError> errors) {
     c.diagonal().segment(row, size(a)).array() += a.truth_variance;
     row += size(a);
   }
-  nees.value = SquaredMahalanobis(c, error);
+  nees.value = SquaredMahalanobis(c, joint_error);
   return nees;
 }
 

@@ -8,20 +8,20 @@
 
 namespace alidade::internal {
 
-/// The error of a block, e = x_true (-) x in the tangent at the estimate.
+/// Error of a block, e = x_true (-) x in the tangent space at the estimate.
 struct BlockError {
   BlockId id;
   const Eigen::VectorXd* error;
   double truth_variance;  ///< of each element
 };
 
-/// e' C^-1 e and its degrees of freedom.
+/// NEES e' C^-1 e with its degrees of freedom.
 struct Nees {
-  double value = 0.0;  ///< NaN where C is singular or not finite
-  int dof = 0;         ///< 0: none of the blocks is estimated
+  double value = 0.0;  ///< NaN if C is singular or not finite
+  int dof = 0;         ///< 0 if no block is estimated
 };
 
-/// That of these blocks jointly, without those that are not estimated; C = P + T as in Metrics.
+/// Computes the joint NEES of those of the blocks that are estimated; C = P + T as in Metrics.
 Nees JointNees(const State& state, std::span<const BlockError> errors);
 
 }  // namespace alidade::internal

@@ -10,11 +10,10 @@
 
 namespace alidade {
 
-/// The filter that the entry `name` of a config's `estimators:` describes, for live use: the config
-/// needs no `source:`; keys of a run, such as `source` or `on_divergence`, have no effect. The
-/// filter's streams are those that its sensors and control inputs name. Errors: those of
-/// BuildExperiment, and kBadConfig where the entry is not there or its type is not a recursive
-/// filter of core.
+/// Creates the filter of the entry `name` of `estimators:`, for live use. The config does not need
+/// a `source:`; keys of a run, such as `source` or `on_divergence`, have no effect. The streams of
+/// the filter are those that its sensors and control inputs name. Errors: those of BuildExperiment,
+/// and kBadConfig if the entry does not exist or its type is not a built-in recursive filter.
 std::unique_ptr<Filter> MakeFilter(const Config& config, const PluginHost& host,
                                    const std::string& name);
 

@@ -15,25 +15,26 @@ double RootMeanSquare(const Eigen::Matrix3Xd& errors) {
 }  // namespace
 
 std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEstimate>& landmarks) {
-  Eigen::Matrix3Xd estimated(3, std::ssize(landmarks)), known = estimated;
+  Eigen::Matrix3Xd estimated(3, std::ssize(landmarks)), truth = estimated;
   Eigen::Index count = 0;
   for (const LandmarkEstimate& landmark : landmarks) {
     if (!landmark.true_position.allFinite() || !landmark.position.allFinite()) continue;
     estimated.col(count) = landmark.position;
-    known.col(count++) = landmark.true_position;
+    truth.col(count++) = landmark.true_position;
   }
   if (count == 0) return {};
   estimated.conservativeResize(Eigen::NoChange, count);
-  known.conservativeResize(Eigen::NoChange, count);
-  std::map<std::string, double> metrics = {{"map.rmse", RootMeanSquare(estimated - known)}};
-  if (const auto aligned = internal::AlignBySimilarity(estimated, known)) {
+  truth.conservativeResize(Eigen::NoChange, count);
+  std::map<std::string, double> metrics = {{"map.rmse", RootMeanSquare(estimated - truth)}};
+  if (const auto aligned = internal::AlignBySimilarity(estimated, truth)) {
     metrics["map.sim3.rmse"] = aligned->rmse;
     metrics["map.sim3.scale"] = aligned->scale;
   }
   return metrics;
 }
 
-void internal::NoteMap(const EstimatorSpec& spec, const Source& source, EstimatorResult& result) {
+void internal::AddMapMetrics(const EstimatorSpec& spec, const Source& source,
+                             EstimatorResult& result) {
   if (!spec.problem.landmarks) return;
   result.landmarks = spec.estimator->landmarks();
   for (std::vector<LandmarkEstimate>* map : {&*result.landmarks, &result.removed_landmarks}) {

@@ -11,15 +11,15 @@
 
 namespace alidade::internal {
 
-/// Over the landmarks of a finite place whose true one is known:
+/// Computes metrics over the landmarks with a finite position and a known true position:
 ///
 ///   map.rmse         sqrt(mean |p - p_true|^2), m
-///   map.sim3.rmse    the same of s R p + t, the similarity that makes it least [Umeyama1991]
-///   map.sim3.scale   s; both of three landmarks or more that are not all at one place
+///   map.sim3.rmse    the same for s R p + t, with the similarity that minimises it [Umeyama1991]
+///   map.sim3.scale   s; both need at least three landmarks, not all at one position
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
-/// The landmarks at the end and their metrics, in `result`; of these and of those removed before
-/// the true places that `source` knows. Nothing if `spec` has none.
-void NoteMap(const EstimatorSpec& spec, const Source& source, EstimatorResult& result);
+/// Adds the final landmarks and their metrics to `result`. Adds the true positions that `source`
+/// knows to these landmarks and to those removed earlier. Has no effect if `spec` has no landmarks.
+void AddMapMetrics(const EstimatorSpec& spec, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

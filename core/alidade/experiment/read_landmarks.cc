@@ -12,37 +12,38 @@ namespace alidade {
 namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-constexpr int kMost = 1'000'000;
+constexpr int kMaxCount = 1'000'000;
 
 LandmarkOptions::Prior ReadPrior(const Node& node) {
   LandmarkOptions::Prior prior;
   prior.inverse_distance = node.At("inverse_distance", "landmarks.prior").Number(0.0, kUnbounded);
   prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kUnbounded, true);
   if (const auto n = node.Find("adapt_after"))
-    prior.adapt_after = static_cast<int>(n->Integer(1, kMost));
+    prior.adapt_after = static_cast<int>(n->Integer(1, kMaxCount));
   if (const auto n = node.Find("min_observations"))
-    prior.min_observations = static_cast<int>(n->Integer(1, kMost));
+    prior.min_observations = static_cast<int>(n->Integer(1, kMaxCount));
   node.RejectUnread();
   return prior;
 }
 
 void ReadPrune(const Node& node, LandmarkOptions& options) {
   if (const auto frames = node.Find("max_missed_frames")) {
-    options.max_missed_frames = static_cast<int>(frames->Integer(1, kMost));
+    options.max_missed_frames = static_cast<int>(frames->Integer(1, kMaxCount));
   }
   const auto ratio = node.Find("min_match_ratio"), attempts = node.Find("min_attempts");
   if (ratio) options.min_match_ratio = ratio->Number(0.0, 1.0);
-  if (attempts && !ratio) attempts->Fail("without a use", "min_match_ratio in addition");
-  if (attempts) options.min_attempts = static_cast<int>(attempts->Integer(1, kMost));
+  if (attempts && !ratio)
+    attempts->Fail("has no effect without min_match_ratio", "both keys or neither");
+  if (attempts) options.min_attempts = static_cast<int>(attempts->Integer(1, kMaxCount));
   node.RejectUnread();
 }
 
-int ReadMost(const Node& node) {
+int ReadMaxPerFrame(const Node& node) {
   if (node.kind() == Node::Kind::kScalar && node.Text() == "unlimited") {
     return LandmarkOptions::kUnlimited;
   }
   try {
-    return static_cast<int>(node.Integer(1, kMost));
+    return static_cast<int>(node.Integer(1, kMaxCount));
   } catch (const Error& error) {
     throw Error(error.code(), std::string(error.what()) + ", or unlimited");
   }
@@ -52,27 +53,27 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
   std::vector<KnownLandmark> known;
   std::set<std::int64_t> ids;
   for (const Node& node : list.Items()) {
-    KnownLandmark& one = known.emplace_back();
+    KnownLandmark& landmark = known.emplace_back();
     const Node id = node.At("id", "a known landmark");
-    one.id = id.Integer(0, std::numeric_limits<std::int64_t>::max());
+    landmark.id = id.Integer(0, std::numeric_limits<std::int64_t>::max());
     const std::vector<double> position = node.At("position", "a known landmark").Numbers(3);
-    std::ranges::copy(position, one.position.begin());
-    one.sigma = node.At("sigma", "a known landmark").Number(0.0, kUnbounded);
+    std::ranges::copy(position, landmark.position.begin());
+    landmark.sigma = node.At("sigma", "a known landmark").Number(0.0, kUnbounded);
     node.RejectUnread();
-    if (!ids.insert(one.id).second) {
-      id.Fail("landmark " + std::to_string(one.id) + " is listed twice", "each id once");
+    if (!ids.insert(landmark.id).second) {
+      id.Fail("landmark " + std::to_string(landmark.id) + " is listed twice", "each id once");
     }
   }
   return known;
 }
 
-/// A sensor's map `outlier_rejection`: `method: one_point_ransac`, and the numbers by the names of
-/// OnePointRansac.
+/// Reads the map `outlier_rejection` of a sensor: `method: one_point_ransac`, and the members of
+/// OnePointRansac by their names.
 OnePointRansac ReadOnePointRansac(const Node& node) {
   OnePointRansac ransac;
   static_cast<void>(node.At("method", "outlier_rejection").Choice({"one_point_ransac"}));
   const auto read = [&node](const char* key, double& value) {
-    if (const auto given = node.Find(key)) value = given->Number(0.0, 1.0, true, true);
+    if (const auto entry = node.Find(key)) value = entry->Number(0.0, 1.0, true, true);
   };
   read("inlier_probability", ransac.inlier_probability);
   read("confidence", ransac.confidence);
@@ -81,14 +82,15 @@ OnePointRansac ReadOnePointRansac(const Node& node) {
   return ransac;
 }
 
-/// The config's map `landmarks`, but for `representation`, which the sensors read.
+/// Reads the map `landmarks` of the config except for `representation`, which the sensors read.
 LandmarkOptions ReadOptions(const Node& node) {
   LandmarkOptions options;
   node.Declare("representation");
   if (const auto prior = node.Find("prior")) options.prior = ReadPrior(*prior);
-  if (const auto most = node.Find("max_per_frame")) options.max_per_frame = ReadMost(*most);
+  if (const auto maximum = node.Find("max_per_frame"))
+    options.max_per_frame = ReadMaxPerFrame(*maximum);
   if (const auto observations = node.Find("min_observations")) {
-    options.min_observations = static_cast<int>(observations->Integer(1, kMost));
+    options.min_observations = static_cast<int>(observations->Integer(1, kMaxCount));
   }
   if (const auto prune = node.Find("prune")) ReadPrune(*prune, options);
   if (const auto convert = node.Find("convert_to_xyz")) {
@@ -114,43 +116,43 @@ std::vector<Space> LandmarkRoles(const SensorBinding& sensor) {
 
 std::string RepresentationText(const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
-  return representation ? ToString(*representation) : "a representation of its own";
+  return representation ? ToString(*representation) : "a custom representation";
 }
 
-/// Refuses a sensor that cannot share landmarks with `first`, or whose roles are not in order.
+/// Rejects a sensor that cannot share landmarks with `first`, or whose roles are not in order.
 void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first) {
   const auto is_landmark = [](const Space& role) { return role.landmark(); };
   if (!std::ranges::is_partitioned(sensor.model->roles(), std::not_fn(is_landmark))) {
-    model.Fail("model '" + sensor.model->name() + "' has roles behind those of its landmark",
-               "a model whose landmark comes last");
+    model.Fail("model '" + sensor.model->name() + "' has roles after those of its landmark",
+               "a model whose landmark roles come last");
   }
   if (sensor.model->inverse().prior_size > 1) {
     model.Fail("model '" + sensor.model->name() + "' needs a prior of " +
                    std::to_string(sensor.model->inverse().prior_size) + " numbers",
-               "a model that needs one, the inverse distance, or none");
+               "a model with a prior of one number, the inverse distance, or without a prior");
   }
-  const auto same = [](const Space& a, const Space& b) {
+  const auto is_same = [](const Space& a, const Space& b) {
     return a.name == b.name && a.geometry == b.geometry;
   };
-  if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), same)) {
-    model.Fail("model '" + sensor.model->name() + "' writes landmarks otherwise than sensor '" +
-                   first.name + "', as " + RepresentationText(sensor),
+  if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), is_same)) {
+    model.Fail("model '" + sensor.model->name() + "' represents landmarks as " +
+                   RepresentationText(sensor) + ", unlike sensor '" + first.name + '\'',
                "the same representation, " + RepresentationText(first));
   }
 }
 
-/// Refuses a sensor that does not say where it is seen from, which `key` needs to know.
+/// Rejects a sensor without the position from which it observes landmarks, which `key` needs.
 void CheckPosition(const Node& key, const SensorBinding& sensor) {
   if (std::ranges::find(sensor.model->roles(), "position", &Space::name) !=
       sensor.model->roles().end()) {
     return;
   }
   key.Fail("model '" + sensor.model->name() + "' of sensor '" + sensor.name +
-               "' has no role 'position', the place that landmarks are seen from",
+               "' has no role 'position', from which landmarks are observed",
            "the key left out");
 }
 
-/// Refuses what one sensor cannot do that `options` ask for.
+/// Rejects `options` that the sensor does not support.
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
   const auto representation = RepresentationOf(sensor.model->roles());
   const std::string model = "model '" + sensor.model->name() + "' of sensor '" + sensor.name + "'";
@@ -162,21 +164,24 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
     const Node prior = node.At("prior");
     if (representation == internal::XyzRepresentation() && sensor.model->inverse().prior_size > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
-      prior.At("inverse_distance").Fail("a landmark at infinity cannot be xyz", "above 0, 1/m");
+      prior.At("inverse_distance")
+          .Fail("a landmark at infinity cannot be xyz", "a value above 0, 1/m");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
   const bool has_xyz = representation == internal::XyzRepresentation() || sensor.xyz != nullptr;
   if (!options.known.empty() && !has_xyz) {
-    node.At("known").Fail(model + " has no landmarks of representation xyz", "no known landmarks");
+    node.At("known").Fail(model + " does not support the representation xyz", "no known landmarks");
   }
   if (!(options.max_linearity_index > 0.0)) return;
   if (representation == internal::XyzRepresentation()) {
     node.At("convert_to_xyz")
-        .Fail("landmarks are xyz already", "representation: inverse_depth, or the key left out");
+        .Fail("landmarks already have the representation xyz",
+              "representation: inverse_depth, or the key left out");
   }
   if (!has_xyz)
-    node.At("convert_to_xyz").Fail(model + " has no representation xyz", "the key left out");
+    node.At("convert_to_xyz")
+        .Fail(model + " does not support the representation xyz", "the key left out");
   CheckPosition(node.At("convert_to_xyz"), sensor);
 }
 
@@ -187,7 +192,7 @@ void internal::ReadLandmarkKeys(const std::string& name, const Node& entry,
                                 SensorOptions& options) {
   const Node role = entry.At("roles").At("landmark", "sensor '" + name + "'");
   if (role.is_map() || role.Text() != "landmarks") {
-    role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
+    role.Fail("not `landmarks`", "`landmarks`, for the landmark that a measurement names");
   }
   if (const auto node = entry.Find("outlier_rejection")) {
     options.outlier_rejection = ReadOnePointRansac(*node);
@@ -201,8 +206,10 @@ void internal::ReadLandmarkKeys(const std::string& name, const Node& entry,
 
 std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
                                                        const std::vector<SensorBinding>& sensors) {
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  const auto first = std::ranges::find_if(sensors, sees);
+  const auto observes_landmarks = [](const SensorBinding& sensor) {
+    return sensor.model->has_landmark();
+  };
+  const auto first = std::ranges::find_if(sensors, observes_landmarks);
   if (first == sensors.end()) {
     if (const auto node = root.Find("landmarks")) {
       node->Fail("no sensor measures landmarks", "a sensor with a landmark, or the key left out");
@@ -211,18 +218,19 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
   }
   const Node node = root.At("landmarks", "sensor '" + first->name + "'");
   LandmarkOptions options = ReadOptions(node);
-  bool can_begin = !options.known.empty();
+  bool can_initialise = !options.known.empty();
   for (const SensorBinding& sensor : sensors) {
-    if (!sees(sensor)) continue;
+    if (!observes_landmarks(sensor)) continue;
     const Node model = root.At("sensors").At(sensor.name).At("model");
     CheckRoles(model, sensor, *first);
     CheckOptions(node, options, sensor);
     const int role = sensor.model->inverse().role;
-    can_begin = can_begin ||
-                (role >= 0 && sensor.model->roles()[static_cast<std::size_t>(role)].landmark());
+    can_initialise =
+        can_initialise ||
+        (role >= 0 && sensor.model->roles()[static_cast<std::size_t>(role)].landmark());
   }
-  if (!can_begin) {
-    node.Fail("no sensor determines where a landmark is when it is first seen", "known landmarks");
+  if (!can_initialise) {
+    node.Fail("no sensor can initialise a landmark from its first measurement", "known landmarks");
   }
   node.RejectUnread();
   return options;

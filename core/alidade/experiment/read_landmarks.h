@@ -11,14 +11,13 @@
 
 namespace alidade::internal {
 
-/// What the entry `name` of a sensor of landmarks has besides: its landmark roles together, as the
-/// role `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
-/// kBadConfig.
+/// Reads the additional keys of the entry `name` of a landmark sensor: the role `landmark` and
+/// `outlier_rejection`. Also creates its model for the representation xyz. Errors: kBadConfig.
 void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
                       const PluginHost& host, SensorOptions& options);
 
-/// The map `landmarks` of the config's root, as the sensors need it; none where no sensor measures
-/// landmarks. Errors: kBadConfig where it does not fit them.
+/// Reads the map `landmarks` of the root; returns nothing if no sensor measures landmarks. Errors:
+/// kBadConfig, also if the map does not fit the sensors.
 std::optional<LandmarkOptions> ReadLandmarks(const Node& root,
                                              const std::vector<SensorBinding>& sensors);
 

@@ -21,7 +21,7 @@ namespace {
 
 using internal::NamesOf;
 
-/// Adds to the problem; what does not fit is an error at the place of the entry.
+/// Calls `add`, and rethrows its errors with the place of the entry.
 template <class Add>
 void AddAt(const Node& entry, const Add& add) {
   try {
@@ -31,7 +31,7 @@ void AddAt(const Node& entry, const Add& add) {
   }
 }
 
-/// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
+/// Reads the value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   std::vector<double> mean;
   if (geometry.kind == GeometryKind::kUnitQuaternion) {
@@ -47,11 +47,11 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   return mean;
 }
 
-/// Exactly one of sigma, covariance.
+/// Reads exactly one of `sigma` and `covariance`.
 Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
   const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
   if (sigma.has_value() == covariance.has_value()) {
-    node.Fail("needs its uncertainty once", "sigma or covariance");
+    node.Fail("needs exactly one uncertainty", "sigma or covariance");
   }
   if (covariance) {
     const std::vector<double> values = internal::ReadCovariance(*covariance, size);
@@ -67,7 +67,7 @@ Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
   return sigmas.cwiseAbs2().asDiagonal();
 }
 
-/// Blocks of the entry that a list such as `consider: [depth]` names.
+/// Reads the names of blocks of the entry in a list such as `consider: [depth]`.
 std::vector<std::string> ReadNames(const Node& entry, const char* key,
                                    const std::vector<std::string>& accepted) {
   std::vector<std::string> names;
@@ -87,33 +87,34 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Names of the blocks as the entry renames them, in the order of the model.
+/// Reads the names of the blocks, renamed by the entry, in the order of the model.
 std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
   std::vector<std::string> names = NamesOf(model.blocks());
   const auto renamed = entry.Find("blocks");
   for (std::string& name : names) {
-    const auto given = renamed ? renamed->Find(name) : std::nullopt;
-    if (given) name = given->Text();
-    internal::ExpectName(name, given.value_or(entry), "a block");
+    const auto new_name = renamed ? renamed->Find(name) : std::nullopt;
+    if (new_name) name = new_name->Text();
+    internal::ExpectName(name, new_name.value_or(entry), "a block");
   }
   if (!renamed) return names;
   renamed->RejectUnread();
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (std::count(names.begin(), names.end(), names[i]) > 1) {
-      renamed->Fail("two blocks are called '" + names[i] + "'", "a name of its own for each block");
+      renamed->Fail("two blocks have the name '" + names[i] + "'",
+                    "a different name for each block");
     }
   }
   return names;
 }
 
-/// How the block `name` of the problem starts, which is `space` of the model.
+/// Reads the initial value of the block `name` of the problem, which is `space` of the model.
 InitialValue ReadInitial(const Node& initial, const Space& space, const std::string& name,
                          BlockStatus status) {
   InitialValue value = InitialValue::Constant(space.name, {});
   value.name = name;
   value.status = status;
-  if (const auto from = initial.Find("from_measurement")) {
-    value.from = from->Text();
+  if (const auto sensor = initial.Find("from_measurement")) {
+    value.from = sensor->Text();
   } else {
     value.mean = ReadMean(initial.At("mean", "the initial value"), space.geometry);
     if (status != BlockStatus::kConstant) {
@@ -126,13 +127,13 @@ InitialValue ReadInitial(const Node& initial, const Space& space, const std::str
   return value;
 }
 
-/// `input: {stream: NAME, timeout_s: S}` of a model that takes a control input.
+/// Reads `input: {stream: NAME, timeout_s: S}` of a model with a control input.
 InputBinding ReadInput(const Node& entry, const MotionModel& model) {
-  constexpr double kMostSeconds = 1e9;
+  constexpr double kMaxSeconds = 1e9;
   InputBinding binding;
   if (!model.has_input()) {
     if (const auto input = entry.Find("input")) {
-      input->Fail("model '" + model.name() + "' takes no control input", "the key left out");
+      input->Fail("model '" + model.name() + "' has no control input", "the key left out");
     }
     return binding;
   }
@@ -142,7 +143,7 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
   binding.stream = input.At("stream", needed_by).Text();
   if (const auto timeout = input.Find("timeout_s")) {
-    binding.timeout_s = timeout->Number(0.0, kMostSeconds, true);
+    binding.timeout_s = timeout->Number(0.0, kMaxSeconds, true);
   }
   input.RejectUnread();
   return binding;
@@ -155,21 +156,21 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   const std::vector<std::string> names = ReadBlockNames(entry, *model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto constant = ReadNames(entry, "constant", names);
-  for (const std::string& both : constant) {
-    if (!Contains(considered, both)) continue;
+  for (const std::string& block : constant) {
+    if (!Contains(considered, block)) continue;
     entry.At("constant")
-        .Fail("block '" + both + "' is in `consider` too",
-              "a block in one of them: a constant is exact, a consider state uncertain");
+        .Fail("block '" + block + "' is also in `consider`",
+              "the block in one of them: a constant is exact, a consider state is uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   std::vector<InitialValue> values;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const Space& space = model->blocks()[i];
-    const bool owned = (space.flags & ALIDADE_ROLE_OWNED) != 0;
-    if (owned && !initial.Find(names[i]) && !Contains(considered, names[i])) {
-      std::vector<double> neutral(static_cast<std::size_t>(space.geometry.ambient));
-      space.geometry.Identity(neutral.data());
-      values.push_back(InitialValue::Constant(space.name, neutral));
+    const bool is_owned = (space.flags & ALIDADE_ROLE_OWNED) != 0;
+    if (is_owned && !initial.Find(names[i]) && !Contains(considered, names[i])) {
+      std::vector<double> identity(static_cast<std::size_t>(space.geometry.ambient));
+      space.geometry.Identity(identity.data());
+      values.push_back(InitialValue::Constant(space.name, identity));
       values.back().name = names[i];
       continue;
     }
@@ -184,7 +185,8 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   AddAt(entry, [&] { problem.AddState(name, model, values, input); });
 }
 
-/// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
+/// Reads one standard deviation, or one for each of `size` elements. Returns the square root of the
+/// covariance.
 std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
   const auto n = static_cast<std::size_t>(size);
   std::vector<double> sigma = node.Numbers();
@@ -200,21 +202,21 @@ std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
   return root;
 }
 
-/// `constant`, {random_walk: sigma after one second} or {gauss_markov: {sigma, time_constant_s}},
-/// sigma that of the stationary process.
+/// Reads `constant`, {random_walk: sigma after one second} or
+/// {gauss_markov: {sigma, time_constant_s}}, with sigma of the stationary process.
 void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
   owned.dynamics = OwnedDynamics::kConstant;
   owned.sqrt_density.clear();
   constexpr const char* kKinds =
       "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, time_constant_s: S}}";
   if (!node.is_map()) {
-    if (node.Text() != "constant") node.Fail("no kind of dynamics", kKinds);
+    if (node.Text() != "constant") node.Fail("not a kind of dynamics", kKinds);
     return;
   }
   const auto walk = node.Find("random_walk"), markov = node.Find("gauss_markov");
   if (walk.has_value() == markov.has_value()) {
     node.RejectUnread();
-    node.Fail("not one kind of dynamics", kKinds);
+    node.Fail("needs exactly one kind of dynamics", kKinds);
   }
   node.RejectUnread();
   if (walk) {
@@ -222,22 +224,23 @@ void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
     owned.sqrt_density = ReadSqrtDiagonal(*walk, size);
     return;
   }
-  constexpr double kMostSeconds = 1e9;
+  constexpr double kMaxSeconds = 1e9;
   owned.dynamics = OwnedDynamics::kGaussMarkov;
   owned.time_constant_s =
-      markov->At("time_constant_s", "gauss_markov").Number(0.0, kMostSeconds, true);
+      markov->At("time_constant_s", "gauss_markov").Number(0.0, kMaxSeconds, true);
   owned.sqrt_density = ReadSqrtDiagonal(markov->At("sigma", "gauss_markov"), size);
-  for (double& one : owned.sqrt_density) one *= std::sqrt(2.0 / owned.time_constant_s);
+  for (double& density : owned.sqrt_density) density *= std::sqrt(2.0 / owned.time_constant_s);
   markov->RejectUnread();
 }
 
-/// What a sensor entry says of the states that the sensor owns: `initial` and `dynamics` by role,
-/// `consider` and `constant` as lists, `time_offset_s`. Where it says nothing the model does.
-class OwnedReader {
+/// Reader of the keys of a sensor entry for the states that the sensor owns: `initial` and
+/// `dynamics` by role, `consider` and `constant` as lists, `time_offset_s`. The model provides the
+/// defaults.
+class OwnedStateReader {
   static constexpr const char* kTimeOffset = "time_offset";
 
  public:
-  OwnedReader(std::string name, const Node& entry, const Node& roles, const SensorModel& model)
+  OwnedStateReader(std::string name, const Node& entry, const Node& roles, const SensorModel& model)
       : name_(std::move(name)), entry_(entry), offset_(entry.Find("time_offset_s")) {
     std::vector<std::string> owned;
     for (const Space& role : model.roles()) {
@@ -254,54 +257,57 @@ class OwnedReader {
     dynamics_ = entry.Find("dynamics");
   }
 
-  /// The state of a role, of which its model says `owned`.
+  /// Reads the state of a role. `owned` has the defaults of the model.
   OwnedState Read(const Space& role, const OwnedRole& owned, const Problem& problem) {
-    const auto taken = [&](const Block& block) { return block.owner == name_; };
-    if (!std::exchange(read_, true) && std::ranges::any_of(problem.layout.blocks(), taken)) {
-      entry_.Fail(
-          "it brings the state '" + name_ + '.' + role.name + "', and a state entry has its name",
-          "another name for the sensor, or the role bound under `roles`");
+    const auto has_name = [&](const Block& block) { return block.owner == name_; };
+    if (!std::exchange(has_read_state_, true) &&
+        std::ranges::any_of(problem.layout.blocks(), has_name)) {
+      entry_.Fail("the sensor owns the state '" + name_ + '.' + role.name +
+                      "', but a state entry has its name",
+                  "another name for the sensor, or the role bound under `roles`");
     }
     const bool is_offset = role.name == kTimeOffset;
-    const auto own = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
-                     : initial_ ? initial_->Find(role.name)
-                                : std::nullopt;
-    const bool considered = Contains(considered_, role.name);
-    const bool constant = Contains(constant_, role.name) || (!own && owned.sqrt_prior.empty());
-    if (considered && constant) {
+    const auto initial = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
+                         : initial_ ? initial_->Find(role.name)
+                                    : std::nullopt;
+    const bool is_considered = Contains(considered_, role.name);
+    const bool is_constant =
+        Contains(constant_, role.name) || (!initial && owned.sqrt_prior.empty());
+    if (is_considered && is_constant) {
       entry_.At("consider")
           .Fail("'" + role.name + "' is constant: it has no uncertainty",
                 "`initial` with a sigma, and `constant` without it");
     }
     OwnedState state = OwnedState::Of(owned);
-    state.initial.status = constant     ? BlockStatus::kConstant
-                           : considered ? BlockStatus::kConsider
-                                        : BlockStatus::kEstimated;
-    if (own) {
-      if (const auto from = own->Find("from_measurement")) {
-        from->Fail("a state that a sensor owns starts from no measurement", "mean and sigma");
+    state.initial.status = is_constant     ? BlockStatus::kConstant
+                           : is_considered ? BlockStatus::kConsider
+                                           : BlockStatus::kEstimated;
+    if (initial) {
+      if (const auto sensor = initial->Find("from_measurement")) {
+        sensor->Fail("a state that a sensor owns cannot start from a measurement",
+                     "mean and sigma");
       }
-      state.initial = ReadInitial(*own, role, role.name, state.initial.status);
+      state.initial = ReadInitial(*initial, role, role.name, state.initial.status);
     }
     if (is_offset) CheckOffset(state.initial);
     const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt;
     if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, state.process);
-    if (constant && dynamics && state.process.dynamics != OwnedDynamics::kConstant) {
-      dynamics->Fail("'" + role.name + "' is constant",
-                     "a sigma where it starts, or the key left out");
+    if (is_constant && dynamics && state.process.dynamics != OwnedDynamics::kConstant) {
+      dynamics->Fail("'" + role.name + "' is constant", "an initial sigma, or the key left out");
     }
     return state;
   }
 
-  /// The time offset of a sensor whose roles are bound; nothing where none is given, or 0.
+  /// Adds the time offset of a sensor whose roles are bound. Has no effect if the offset is missing
+  /// or 0.
   void AddTimeOffset(Problem& problem, SensorBinding& sensor) {
     if (!offset_ || (!offset_->is_map() && offset_->Number() == 0.0)) return;
-    OwnedRole at_first;
-    at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
+    OwnedRole defaults;
+    defaults.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
     const Space space{
         kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
     const BlockId id =
-        internal::AddOwnedState(problem, name_, space, Read(space, at_first, problem));
+        internal::AddOwnedState(problem, name_, space, Read(space, defaults, problem));
     const std::string why = internal::OffsetInTime(problem, id, sensor);
     if (!why.empty()) offset_->Fail(why, "the key left out");
   }
@@ -312,17 +318,17 @@ class OwnedReader {
   }
 
  private:
-  /// Of a clock that is off by more than a filter can look ahead.
+  /// Rejects an offset that is longer than a filter can predict.
   void CheckOffset(const InitialValue& offset) const {
-    constexpr double kMostSeconds = 60.0;
+    constexpr double kMaxSeconds = 60.0;
     const double sigma = offset.covariance.size() == 0 ? 0.0 : std::sqrt(offset.covariance(0, 0));
-    if (std::abs(offset.mean[0]) <= kMostSeconds && sigma <= kMostSeconds) return;
-    offset_->Fail("more than a motion model can look ahead", "at most 60 s, sigma too");
+    if (std::abs(offset.mean[0]) <= kMaxSeconds && sigma <= kMaxSeconds) return;
+    offset_->Fail("longer than a motion model can predict", "at most 60 s, also for sigma");
   }
 
   std::string name_;
   Node entry_;
-  bool read_ = false;  ///< one of its states
+  bool has_read_state_ = false;
   std::optional<Node> offset_, initial_, dynamics_;
   std::vector<std::string> considered_, constant_;
 };
@@ -346,35 +352,36 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     if (const auto mode = node.Find("mode")) {
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
-    if (const auto at = node.Find("jacobian_at")) {
-      binding.jacobian_at = static_cast<JacobianAt>(at->Choice({"prediction", "measurement"}));
+    if (const auto choice = node.Find("jacobian_at")) {
+      binding.jacobian_at = static_cast<JacobianAt>(choice->Choice({"prediction", "measurement"}));
     }
     node.RejectUnread();
   }
   const Block& block = problem.layout[binding.block];
   if (!(block.geometry() == role.geometry)) {
     node.Fail(
-        "block '" + block.name + "' is of geometry " + ToString(block.geometry()),
+        "block '" + block.name + "' has geometry " + ToString(block.geometry()),
         ToString(role.geometry) + ", as role '" + role.name + "' of model '" + model.name() + "'");
   }
   return binding;
 }
 
-/// `{NAME: SCALE}` of one of kLosses but none.
+/// Reads `{NAME: SCALE}` for one of kLosses except `none`.
 RobustLoss ReadLoss(const Node& node) {
   std::optional<RobustLoss> loss;
   std::vector<std::string> known;
-  int given = 0;
+  int count = 0;
   for (std::size_t i = 1; i < kLosses.size(); ++i) {
     known.push_back(std::string("{") + kLosses[i].name + ": SCALE}");
     const auto scale = node.Find(kLosses[i].name);
     if (!scale) continue;
-    ++given;
+    ++count;
     loss = {static_cast<LossKind>(i),
             scale->Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
   }
   node.RejectUnread();
-  if (given != 1) node.Fail("not one loss with its scale", "one of " + internal::Join(known));
+  if (count != 1)
+    node.Fail("needs exactly one loss with its scale", "one of " + internal::Join(known));
   return *loss;
 }
 
@@ -385,87 +392,89 @@ void ReadSensor(const std::string& name, const Node& entry, const PluginHost& ho
   const SharedSensor model = host.CreateSensor(model_name, entry);
   if (const auto loss = entry.Find("loss")) options.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
-  OwnedReader owned(name, entry, roles, *model);
-  std::vector<RoleBinding> bound;
+  OwnedStateReader owned_states(name, entry, roles, *model);
+  std::vector<RoleBinding> bindings;
   for (std::size_t i = 0; i < model->roles().size(); ++i) {
     const Space& role = model->roles()[i];
-    if (role.landmark()) break;  // the rest of them
+    if (role.landmark()) break;  // all remaining roles are landmark roles
     const auto node = roles.Find(role.name);
-    const bool brings = !node && (role.flags & ALIDADE_ROLE_OWNED) != 0;
-    if (brings) options.owned.emplace(i, owned.Read(role, model->owned(i), problem));
-    if (brings || (!node && role.optional())) {
-      bound.emplace_back();
+    const bool is_owned = !node && (role.flags & ALIDADE_ROLE_OWNED) != 0;
+    if (is_owned) options.owned.emplace(i, owned_states.Read(role, model->owned(i), problem));
+    if (is_owned || (!node && role.optional())) {
+      bindings.emplace_back();
       continue;
     }
-    const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
-    bound.push_back(ReadRole(given, role, *model, problem));
-    const BlockId block = bound.back().block;
-    if (std::ranges::count(bound, block, &RoleBinding::block) > 1) {
-      given.Fail("block '" + problem.layout[block].name + "' already fills another role",
-                 "a block of its own for each role");
+    const Node role_node = node ? *node : roles.At(role.name, "model '" + model_name + "'");
+    bindings.push_back(ReadRole(role_node, role, *model, problem));
+    const BlockId block = bindings.back().block;
+    if (std::ranges::count(bindings, block, &RoleBinding::block) > 1) {
+      role_node.Fail("block '" + problem.layout[block].name + "' is already bound to another role",
+                     "a different block for each role");
     }
   }
   if (model->has_landmark()) internal::ReadLandmarkKeys(name, entry, *model, host, options);
-  AddAt(entry, [&] { problem.AddSensor(name, model, bound, options); });
-  owned.AddTimeOffset(problem, problem.sensors.back());
+  AddAt(entry, [&] { problem.AddSensor(name, model, bindings, options); });
+  owned_states.AddTimeOffset(problem, problem.sensors.back());
   roles.RejectUnread();
-  owned.RejectUnread();
+  owned_states.RejectUnread();
   entry.RejectUnread();
 }
 
-/// The problem with the named sensors alone, in that order, and the state entries that they touch.
-Problem WithSensors(Problem problem, const std::vector<std::string>& names) {
+/// Returns the problem with only the named sensors, in this order, and the state entries that they
+/// use.
+Problem SelectSensors(Problem problem, const std::vector<std::string>& names) {
   std::vector<SensorBinding> sensors;
-  std::vector<std::string> touched;
+  std::vector<std::string> used_entries;
   for (const std::string& name : names) {
     const int index = problem.FindSensor(name);
     if (index >= 0) sensors.push_back(problem.sensors[static_cast<std::size_t>(index)]);
   }
   for (const SensorBinding& sensor : sensors) {
     for (const RoleBinding& role : sensor.roles) {
-      if (role.block >= 0) touched.push_back(problem.layout[role.block].owner);
+      if (role.block >= 0) used_entries.push_back(problem.layout[role.block].owner);
     }
   }
-  Problem kept;
-  kept.initial_time_s = problem.initial_time_s;
-  kept.landmarks = std::move(problem.landmarks);
-  std::vector<BlockId> moved;
+  Problem selected;
+  selected.initial_time_s = problem.initial_time_s;
+  selected.landmarks = std::move(problem.landmarks);
+  std::vector<BlockId> new_ids;
   for (const Block& block : problem.layout.blocks()) {
-    moved.push_back(Contains(touched, block.owner)
-                        ? kept.layout.Declare(block.name, block.owner, block.space, block.status)
-                        : -1);
+    new_ids.push_back(
+        Contains(used_entries, block.owner)
+            ? selected.layout.Declare(block.name, block.owner, block.space, block.status)
+            : -1);
   }
-  const auto follow = [&moved](BlockId& id) {
-    if (id >= 0) id = moved[static_cast<std::size_t>(id)];
+  const auto update = [&new_ids](BlockId& id) {
+    if (id >= 0) id = new_ids[static_cast<std::size_t>(id)];
   };
   for (MotionBinding& motion : problem.motions) {
-    if (!Contains(touched, motion.name)) continue;
-    for (BlockId& id : motion.blocks) follow(id);
-    kept.motions.push_back(std::move(motion));
+    if (!Contains(used_entries, motion.name)) continue;
+    for (BlockId& id : motion.blocks) update(id);
+    selected.motions.push_back(std::move(motion));
   }
   for (Prior& prior : problem.priors) {
-    follow(prior.block);
-    if (prior.block >= 0) kept.priors.push_back(std::move(prior));
+    update(prior.block);
+    if (prior.block >= 0) selected.priors.push_back(std::move(prior));
   }
   for (SensorBinding& sensor : sensors) {
-    for (RoleBinding& role : sensor.roles) follow(role.block);
+    for (RoleBinding& role : sensor.roles) update(role.block);
   }
-  kept.sensors = std::move(sensors);
+  selected.sensors = std::move(sensors);
   for (const StreamInfo& stream : problem.streams) {
-    const auto reads = [&](const auto& one) { return one == stream.name; };
+    const auto is_stream = [&](const auto& name) { return name == stream.name; };
     const auto input = [](const MotionBinding& motion) { return motion.input.stream; };
-    if (std::ranges::any_of(kept.sensors, reads, &SensorBinding::stream) ||
-        std::ranges::any_of(kept.motions, reads, input)) {
-      kept.streams.push_back(stream);
+    if (std::ranges::any_of(selected.sensors, is_stream, &SensorBinding::stream) ||
+        std::ranges::any_of(selected.motions, is_stream, input)) {
+      selected.streams.push_back(stream);
     }
   }
-  return kept;
+  return selected;
 }
 
 }  // namespace
 
 Problem ReadProblem(const Node& root, const PluginHost& host,
-                    const std::vector<std::string>& only) {
+                    const std::vector<std::string>& sensor_names) {
   Problem problem;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     internal::ExpectName(name, entry, "a state entry");
@@ -477,14 +486,17 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
     ReadSensor(name, entry, host, problem);
   }
   problem.landmarks = internal::ReadLandmarks(root, problem.sensors);
-  constexpr double kLatestSeconds = 4.6e9;  // two timestamps may differ by twice that
+  constexpr double kMaxInitialTime = 4.6e9;  // two timestamps may differ by twice that
   if (const auto start = root.Find("initial_time_s"))
-    problem.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
-  if (!only.empty()) problem = WithSensors(std::move(problem), only);
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  if (std::ranges::none_of(problem.sensors, sees)) problem.landmarks.reset();
+    problem.initial_time_s = start->Number(-kMaxInitialTime, kMaxInitialTime);
+  if (!sensor_names.empty()) problem = SelectSensors(std::move(problem), sensor_names);
+  const auto observes_landmarks = [](const SensorBinding& sensor) {
+    return sensor.model->has_landmark();
+  };
+  if (std::ranges::none_of(problem.sensors, observes_landmarks)) problem.landmarks.reset();
   if (const auto defect = FindDefect(problem)) {
-    internal::NodeOf(*defect, root, problem).Fail(defect->what, defect->remedy, defect->nearest);
+    internal::FindDefectNode(*defect, root, problem)
+        .Fail(defect->what, defect->remedy, defect->nearest);
   }
   return problem;
 }

@@ -10,9 +10,10 @@
 
 namespace alidade {
 
-/// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of a config's root. `only`
-/// keeps named sensors, in its own order, and the state entries that they touch; empty: everything.
-/// Errors: kBadConfig with place and remedy, kPlugin.
-Problem ReadProblem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
+/// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of the root of a config.
+/// `sensor_names` selects sensors, in this order, with the state entries that they use; if it is
+/// empty, all sensors and entries. Errors: kBadConfig with place and remedy, kPlugin.
+Problem ReadProblem(const Node& root, const PluginHost& host,
+                    const std::vector<std::string>& sensor_names);
 
 }  // namespace alidade

@@ -25,17 +25,18 @@ std::vector<StreamInfo> BlocksOf(const Problem& problem) {
 }
 
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
-                    const std::vector<FrameWithSegments>& seen, Metrics& metrics) {
-  std::vector<const Estimate*> at(seen.size(), nullptr);
-  for (const Estimate& one : reference) at[one.frame] = &one;
-  for (const Estimate& one : estimates) {
-    if (at[one.frame] == nullptr) continue;
-    const FrameWithSegments& frame = seen[one.frame];
-    std::vector<std::vector<double>> known = at[one.frame]->values;
-    for (std::vector<double>& value : known) {
+                    const std::vector<FrameWithSegments>& frames, Metrics& metrics) {
+  std::vector<const Estimate*> reference_by_frame(frames.size(), nullptr);
+  for (const Estimate& estimate : reference) reference_by_frame[estimate.frame] = &estimate;
+  for (const Estimate& estimate : estimates) {
+    if (reference_by_frame[estimate.frame] == nullptr) continue;
+    const FrameWithSegments& frame = frames[estimate.frame];
+    std::vector<std::vector<double>> reference_values = reference_by_frame[estimate.frame]->values;
+    for (std::vector<double>& value : reference_values) {
       if (!AllFinite(value)) value.clear();
     }
-    metrics.AddDifference(frame.frame.timestamp, known, frame.in_segment, one.values);
+    metrics.AddDifference(frame.frame.timestamp, reference_values, frame.in_segment,
+                          estimate.values);
   }
 }
 

@@ -5,31 +5,31 @@
 
 #include "alidade/experiment/metrics.h"
 
-/// An estimator in the place of truth.
+/// Metrics with an estimator as reference instead of truth.
 namespace alidade::internal {
 
-/// The blocks of a problem as a source names its truths.
+/// Returns the blocks of a problem in the form of the truths of a source.
 std::vector<StreamInfo> BlocksOf(const Problem& problem);
 
-/// An estimate, as far as errors are taken from it, and the index of its frame in the run.
+/// Values of an estimate, with the index of its frame in the run.
 struct Estimate {
   std::size_t frame;
-  std::vector<std::vector<double>> values;  ///< by block of the problem; empty where it has none
+  std::vector<std::vector<double>> values;  ///< by block of the problem; empty without a value
 };
 
-/// The values of the first `blocks` blocks of a state.
+/// Returns the values of the first `blocks` blocks of a state.
 std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks);
 
-/// A frame of a run, and which segments it is in.
+/// Frame of a run, with its membership in each segment.
 struct FrameWithSegments {
   SourceFrame frame;
   std::vector<bool> in_segment;
 };
 
-/// Gives `metrics`, made for BlocksOf the reference's problem, the differences of `estimates` from
-/// those of the reference at the same frames of `seen`. A value of the reference that is not finite
-/// counts as unknown.
+/// Adds the differences between `estimates` and the reference at the same frames to `metrics`,
+/// which was created with BlocksOf the problem of the reference. `frames` are all frames of the
+/// run. A reference value that is not finite counts as unknown.
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
-                    const std::vector<FrameWithSegments>& seen, Metrics& metrics);
+                    const std::vector<FrameWithSegments>& frames, Metrics& metrics);
 
 }  // namespace alidade::internal

@@ -18,16 +18,20 @@
 namespace alidade {
 namespace {
 
-/// ` at t = 0.033000 s`
-std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.timestamp); }
+/// Returns a text such as ` at t = 0.033000 s`.
+std::string TimeText(const Frame& frame) {
+  return " at t = " + internal::SecondsText(frame.timestamp);
+}
 
-/// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
-bool InSegment(const Segment& segment, const Frame& frame) {
-  const auto seen = [&](const Measurement& m) {
+/// Returns whether the frame belongs to the segment: whether it has a valid measurement of the
+/// sensor of the segment, or does not have one, as the segment requires.
+bool IsInSegment(const Segment& segment, const Frame& frame) {
+  const auto is_valid = [&](const Measurement& m) {
     return m.stream == segment.stream &&
            segment.sensor->Valid({m.values.data(), m.known.data()}) == Status::kOk;
   };
-  return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
+  return std::any_of(frame.measurements.begin(), frame.measurements.end(), is_valid) ==
+         segment.has_measurement;
 }
 
 using internal::EstimatorRun;
@@ -44,113 +48,116 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.reason = std::move(reason);
 }
 
-/// The text of the event by which the estimator diverged or failed, else of the last one.
-std::string Cause(const std::vector<Event>& events, const char* otherwise) {
+/// Returns the text of the event of the divergence or failure, else of the last event, else
+/// `fallback`.
+std::string Cause(const std::vector<Event>& events, const char* fallback) {
   const auto cause = std::ranges::find(events, true, &Event::divergence);
   if (cause != events.end()) return cause->text;
-  return events.empty() ? otherwise : events.back().text;
+  return events.empty() ? fallback : events.back().text;
 }
 
-/// One frame through one estimator, which sees `visible` of it, unless it was `rolled_back` to it;
-/// false if the whole run has to end.
-bool Advance(EstimatorRun& one, const FrameWithSegments& seen, const Frame& visible,
+/// Processes one frame with one estimator. `visible` is the frame with the measurements that the
+/// estimator uses. `rolled_back` is its result if it processed the frame on arrival, else null.
+/// Returns false if the whole run must end.
+bool Advance(EstimatorRun& run, const FrameWithSegments& frame, const Frame& visible,
              const ProcessedFrame* rolled_back, const Source& source, const RunOptions& options,
              RunResult& result) {
-  one.last_report = nullptr;
-  if (one.finished) return true;
-  const auto [after, report, wall_s] = one.Process(visible, source.streams(), rolled_back);
+  run.last_report = nullptr;
+  if (run.finished) return true;
+  const auto [after, report, wall_s] = run.Process(visible, source.streams(), rolled_back);
   if (wall_s) {
-    one.result.wall_s += *wall_s;
-    std::ranges::transform(one.result.parts_s, report.spent_s, one.result.parts_s.begin(),
+    run.result.wall_s += *wall_s;
+    std::ranges::transform(run.result.parts_s, report.spent_s, run.result.parts_s.begin(),
                            std::plus<>());
-    for (RunObserver* const observer : options.observers) observer->OnTime(one.index, *wall_s);
+    for (RunObserver* const observer : options.observers) observer->OnTime(run.index, *wall_s);
   }
-  one.last_report = &report;
-  one.finished = after.failed();
-  one.diverged = after.diverged();
-  one.AddEvents(report.events);
-  if (!one.finished && !after.offline()) {
-    const auto takes_since = Clock::now();
-    one.AddEstimate(static_cast<std::size_t>(result.frames), seen, after.state(), report, options);
-    one.result.record_s += SecondsSince(takes_since);
+  run.last_report = &report;
+  run.finished = after.failed();
+  run.diverged = after.diverged();
+  run.AddEvents(report.events);
+  if (!run.finished && !after.offline()) {
+    const auto start = Clock::now();
+    run.AddEstimate(static_cast<std::size_t>(result.frames), frame, after.state(), report, options);
+    run.result.record_s += SecondsSince(start);
   }
-  if (const std::string why = one.HandleFailures(report); !why.empty()) {
+  if (const std::string why = run.HandleFailures(report); !why.empty()) {
     if (result.status == RunStatus::kOk) {
       Fail(result, ExitCode::kPlugin,
-           "estimator '" + one.spec.name + "'" + At(seen.frame) + ": " + why);
+           "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + why);
     }
     return false;
   }
-  const bool policy = one.spec.on_divergence == OnDivergence::kFail && one.diverged;
-  if (!one.finished && !policy) return true;
+  const bool ends_run = run.spec.on_divergence == OnDivergence::kFail && run.diverged;
+  if (!run.finished && !ends_run) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = Cause(report.events, "diverged");
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + one.spec.name + "'" + At(seen.frame) + ": " + why);
+         "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + why);
   }
-  return !policy;
+  return !ends_run;
 }
 
-/// The measurements of the frame that filter `by`, which has had what it sees of it, accepted.
-Frame AcceptedBy(int by, const std::vector<EstimatorRun>& running, const Frame& frame,
+/// Returns the frame with the measurements that the estimator with this index accepted. It must
+/// have processed the frame.
+Frame AcceptedBy(int estimator, const std::vector<EstimatorRun>& runs, const Frame& frame,
                  const Source& source) {
-  const EstimatorRun& filter = running[static_cast<std::size_t>(by)];
+  const EstimatorRun& filter = runs[static_cast<std::size_t>(estimator)];
   const int before = filter.spec.accepted_by;
-  return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
-                              source.streams(), filter.spec.problem,
-                              filter.last_report ? *filter.last_report : UpdateReport());
+  return internal::AcceptedMeasurements(
+      before < 0 ? frame : AcceptedBy(before, runs, frame, source), source.streams(),
+      filter.spec.problem, filter.last_report ? *filter.last_report : UpdateReport());
 }
 
-/// The next frame, as the experiment's OutOfSequencePolicy has it; false at the end. What became of
-/// others on the way is noted.
-bool NextFrame(internal::FrameOrder& frames, std::vector<EstimatorRun>& running, RunResult& result,
+/// Reads the next frame according to the OutOfSequencePolicy; returns false at the end. Records the
+/// arrivals and events of other frames.
+bool NextFrame(internal::FrameOrder& frames, std::vector<EstimatorRun>& runs, RunResult& result,
                SourceFrame& frame) {
-  const auto note = [&] {
+  const auto record = [&] {
     result.arrivals = frames.arrivals();
-    const std::vector<Event> events = frames.TakeEvents();
-    for (EstimatorRun& one : running) one.AddEvents(events);
+    const std::vector<Event> events = frames.ExtractEvents();
+    for (EstimatorRun& run : runs) run.AddEvents(events);
   };
   try {
-    const bool more = frames.Next(frame);
-    note();
-    return more;
+    const bool has_frame = frames.Next(frame);
+    record();
+    return has_frame;
   } catch (...) {
-    note();
+    record();
     throw;
   }
 }
 
-/// The frames one by one through all estimators. They are kept where an estimator is offline or
-/// metrics wait for one.
-void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& running,
-               const RunOptions& options, RunResult& result, std::vector<FrameWithSegments>& kept) {
-  FrameWithSegments seen;
-  seen.in_segment.resize(experiment.segments.size());
+/// Processes the frames one by one with all estimators. Adds them to `stored` if an estimator is
+/// offline, or if metrics need the estimates of the reference.
+void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& runs, const RunOptions& options,
+               RunResult& result, std::vector<FrameWithSegments>& stored) {
+  FrameWithSegments frame;
+  frame.in_segment.resize(experiment.segments.size());
   const std::int64_t size = experiment.source->size();
-  const bool keep = std::ranges::any_of(running, [](const EstimatorRun& one) {
-    return one.needs_reference || one.spec.estimator->offline();
+  const bool stores_frames = std::ranges::any_of(runs, [](const EstimatorRun& run) {
+    return run.needs_reference || run.spec.estimator->offline();
   });
   internal::FrameCheck check(experiment, result.normalised);
-  internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
-  while (NextFrame(frames, running, result, seen.frame)) {
-    check.FollowTruth(seen.frame);
+  internal::FrameOrder frames(experiment, [&check](SourceFrame& received) { check(received); });
+  while (NextFrame(frames, runs, result, frame.frame)) {
+    check.ChooseTruthSigns(frame.frame);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
-      seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
+      frame.in_segment[i] = IsInSegment(experiment.segments[i], frame.frame);
     }
-    for (RunObserver* const observer : options.observers) observer->OnFrame(seen.frame);
-    if (keep) kept.push_back(seen);
-    bool go_on = true;
-    for (std::size_t e = 0; e < running.size(); ++e) {
+    for (RunObserver* const observer : options.observers) observer->OnFrame(frame.frame);
+    if (stores_frames) stored.push_back(frame);
+    bool can_continue = true;
+    for (std::size_t e = 0; e < runs.size(); ++e) {
       const ProcessedFrame* const rolled_back = frames.processed(e);
-      const int by = rolled_back != nullptr ? -1 : running[e].spec.accepted_by;
+      const int filter = rolled_back != nullptr ? -1 : runs[e].spec.accepted_by;
       Frame accepted;
-      if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
-      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, rolled_back,
-                      *experiment.source, options, result) &&
-              go_on;
+      if (filter >= 0) accepted = AcceptedBy(filter, runs, frame.frame, *experiment.source);
+      can_continue = Advance(runs[e], frame, filter < 0 ? frame.frame : accepted, rolled_back,
+                             *experiment.source, options, result) &&
+                     can_continue;
     }
     ++result.frames;
-    if (!go_on || std::ranges::all_of(running, &EstimatorRun::finished)) return;
+    if (!can_continue || std::ranges::all_of(runs, &EstimatorRun::finished)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
       if (result.status != RunStatus::kOk) return;
@@ -163,84 +170,85 @@ void RunFrames(Experiment& experiment, std::vector<EstimatorRun>& running,
   }
 }
 
-/// The metrics of the estimator; where memory, say, does not last for them, the rest is kept.
-void Measure(EstimatorRun& one, RunResult& result) {
+/// Computes the metrics of an estimator. If that fails, for example for lack of memory, the other
+/// results remain.
+void ComputeMetrics(EstimatorRun& run, RunResult& result) {
   try {
-    one.result.metrics = one.metrics.Finish();
+    run.result.metrics = run.metrics.Finish();
   } catch (...) {
     Failure failure = CaughtFailure();
     if (result.status == RunStatus::kOk) Fail(result, failure.code, std::move(failure.reason));
   }
 }
 
-/// The smoothing of `one` was stopped; the others keep theirs.
-void NoteStop(EstimatorRun& one, const char* why, RunResult& result) {
-  one.AddEvents({{one.spec.estimator->timestamp(), "stopped", why}});
+/// Records that the smoothing of an estimator was stopped. The results of the others remain.
+void RecordStop(EstimatorRun& run, const char* why, RunResult& result) {
+  run.AddEvents({{run.spec.estimator->timestamp(), "stopped", why}});
   if (result.status != RunStatus::kOk) return;
   result.status = RunStatus::kStopped;
   result.code = ExitCode::kStopped;
-  result.reason = "estimator '" + one.spec.name + "': " + why;
+  result.reason = "estimator '" + run.spec.name + "': " + why;
 }
 
-/// The estimates of those that needed all frames.
-void SmoothAll(std::vector<EstimatorRun>& running, const std::vector<FrameWithSegments>& kept,
+/// Computes the estimates of the offline estimators.
+void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegments>& stored,
                const RunOptions& options, RunResult& result) {
-  for (EstimatorRun& one : running) {
-    Estimator& estimator = *one.spec.estimator;
-    if (one.finished || !estimator.offline()) continue;
+  for (EstimatorRun& run : runs) {
+    Estimator& estimator = *run.spec.estimator;
+    if (run.finished || !estimator.offline()) continue;
     std::vector<Event> events;
-    auto works_since = Clock::now();  // rather than the record and the metrics
+    auto start = Clock::now();  // of the time without records and metrics
     try {
       estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
-        one.result.wall_s += SecondsSince(works_since);
-        one.AddEstimate(k, kept[k], state, report, options);
+        run.result.wall_s += SecondsSince(start);
+        run.AddEstimate(k, stored[k], state, report, options);
         events = report.events;
-        works_since = Clock::now();
+        start = Clock::now();
       });
-      one.result.wall_s += SecondsSince(works_since);
+      run.result.wall_s += SecondsSince(start);
     } catch (const Error& e) {
-      one.result.wall_s += SecondsSince(works_since);
+      run.result.wall_s += SecondsSince(start);
       if (e.code() == ExitCode::kStopped) {
-        NoteStop(one, e.what(), result);
+        RecordStop(run, e.what(), result);
         continue;
       }
-      if (!estimator.failed()) throw;  // it is the record, say, that failed
+      if (!estimator.failed()) throw;  // another part failed, such as a record
       events.push_back({estimator.timestamp(), "failed", e.what()});
     }
-    one.finished = estimator.failed();
-    one.AddEvents(events);
-    if (!one.finished || result.status == RunStatus::kFailed) continue;
+    run.finished = estimator.failed();
+    run.AddEvents(events);
+    if (!run.finished || result.status == RunStatus::kFailed) continue;
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + one.spec.name + "': " + Cause(events, "failed"));
+         "estimator '" + run.spec.name + "': " + Cause(events, "failed"));
   }
 }
 
-/// Why the estimates of a reference are of no use to compare with; "": they are of use.
+/// Returns why the estimates of a reference are not usable for a comparison, or "".
 std::string WhyNoReference(const EstimatorRun& reference) {
   const Estimator& estimator = *reference.spec.estimator;
-  const char* why = nullptr;
+  const char* state = nullptr;
   if (reference.finished || estimator.failed()) {
-    why = "failed";
+    state = "failed";
   } else if (reference.diverged || estimator.diverged()) {
-    why = "diverged";
+    state = "diverged";
   } else if (reference.estimates.empty()) {
-    why = "has no estimates";
+    state = "has no estimates";
   }
-  if (why == nullptr) return "";
-  return "no reference: estimator '" + reference.spec.name + "' " + why +
+  if (state == nullptr) return "";
+  return "no reference: estimator '" + reference.spec.name + "' " + state +
          ", the comparison with it is withheld";
 }
 
-/// The metrics that waited for the estimates of the reference; what does not last for them is kept.
-void Compare(std::vector<EstimatorRun>& running, int index,
-             const std::vector<FrameWithSegments>& kept, RunResult& result) {
-  const EstimatorRun& reference = running[static_cast<std::size_t>(index)];
+/// Adds the differences from the reference to the metrics of the other estimators.
+void Compare(std::vector<EstimatorRun>& runs, int index,
+             const std::vector<FrameWithSegments>& stored, RunResult& result) {
+  const EstimatorRun& reference = runs[static_cast<std::size_t>(index)];
   result.withheld = WhyNoReference(reference);
   if (!result.withheld.empty()) return;
-  for (EstimatorRun& one : running) {
-    if (one.index == index) continue;
-    internal::AddDifferences(one.estimates, reference.estimates, kept, one.metrics);
+  for (EstimatorRun& run : runs) {
+    if (run.index == index) continue;
+    internal::AddDifferences(run.estimates, reference.estimates, stored, run.metrics);
   }
 }
 
@@ -264,37 +272,37 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   if (reference >= 0) {
     result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;
   }
-  std::vector<EstimatorRun> running;
-  std::vector<FrameWithSegments> kept;
-  const auto guarded = [&result](const auto& call) {
+  std::vector<EstimatorRun> runs;
+  std::vector<FrameWithSegments> stored;
+  const auto run_guarded = [&result](const auto& call) {
     try {
       call();
     } catch (...) {
-      // What was done so far is kept.
+      // The results so far remain.
       Failure failure = CaughtFailure();
-      const bool stopped = failure.code == ExitCode::kStopped;
-      if (stopped && result.status != RunStatus::kOk) return;  // a failure stays one
+      const bool was_stopped = failure.code == ExitCode::kStopped;
+      if (was_stopped && result.status != RunStatus::kOk) return;  // it stays a failure
       Fail(result, failure.code, std::move(failure.reason));
-      if (stopped) result.status = RunStatus::kStopped;
+      if (was_stopped) result.status = RunStatus::kStopped;
     }
   };
-  guarded([&] {
-    running = internal::BeginAll(experiment);
+  run_guarded([&] {
+    runs = internal::CreateRuns(experiment);
     for (RunObserver* const observer : options.observers) observer->Begin(experiment);
     internal::LogExperiment(experiment);
-    for (const EstimatorRun& one : running) internal::LogEvents(one.spec.name, one.result.events);
-    RunFrames(experiment, running, options, result, kept);
-    SmoothAll(running, kept, options, result);
+    for (const EstimatorRun& run : runs) internal::LogEvents(run.spec.name, run.result.events);
+    RunFrames(experiment, runs, options, result, stored);
+    SmoothAll(runs, stored, options, result);
   });
-  if (reference >= 0 && !running.empty()) {
-    guarded([&] { Compare(running, reference, kept, result); });
+  if (reference >= 0 && !runs.empty()) {
+    run_guarded([&] { Compare(runs, reference, stored, result); });
   }
-  for (EstimatorRun& one : running) {
-    guarded([&] {
-      Measure(one, result);
-      internal::Diagnose(experiment, one);
+  for (EstimatorRun& run : runs) {
+    run_guarded([&] {
+      ComputeMetrics(run, result);
+      internal::Diagnose(experiment, run);
     });
-    result.estimators.push_back(std::move(one.result));
+    result.estimators.push_back(std::move(run.result));
   }
   internal::LogDurations(result);
   return result;

@@ -13,91 +13,94 @@
 
 namespace alidade {
 
-/// How the frames of a run came.
+/// Statistics of the arrival order of the frames of a run.
 struct Arrivals {
-  std::int64_t out_of_sequence = 0;  ///< before one that came earlier
-  std::int64_t merged = 0;           ///< into another of the same timestamp
-  std::int64_t dropped = 0;          ///< of those out of sequence: beyond the window
-  Timestamp longest_lag = 0;         ///< of one of those behind the newest, ns
+  std::int64_t out_of_sequence = 0;  ///< frames that are older than an earlier frame
+  std::int64_t merged = 0;           ///< frames merged into one of the same timestamp
+  std::int64_t dropped = 0;          ///< out-of-sequence frames beyond the window
+  Timestamp longest_lag = 0;         ///< largest lag behind the newest frame, ns
 };
 
 enum class RunStatus { kOk, kStopped, kFailed };
-/// `ok`, `stopped`, `failed`, as in run.json.
+/// Returns `ok`, `stopped` or `failed`, as in run.json.
 const char* ToString(RunStatus status);
 
-/// One estimator and its outcome, at the end of a run.
+/// Result of one estimator at the end of a run.
 struct EstimatorResult {
   std::string name, type;
   EstimatorKind kind = EstimatorKind::kFilter;
-  bool smoothed = false;    ///< its estimates depend on later data too
-  std::string accepted_by;  ///< the estimator that chose its measurements, or ""
-  std::string overrides;    ///< of the config, as YAML, or ""
+  bool smoothed = false;    ///< whether its estimates also depend on later data
+  std::string accepted_by;  ///< the estimator that selected its measurements, or ""
+  std::string overrides;    ///< from the config, as YAML, or ""
   std::vector<std::string> sensors;
-  std::string position_block;  ///< the block of a position that landmarks are seen from, or ""
-  std::map<std::string, double> metrics;       ///< as in docs/metrics.md
-  std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
-  std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
-  bool diverged = false;                       ///< the estimator said so
-  bool inconsistent = false;                   ///< its error was; the event of that name
-  bool failed = false;                         ///< it diverged, or had nothing to go on with
+  std::string position_block;             ///< position from which landmarks are observed, or ""
+  std::map<std::string, double> metrics;  ///< as in docs/metrics.md
+  std::map<std::string, std::int64_t> counts;  ///< with keys such as `accepted:stereo`
+  std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; incomplete
+  bool diverged = false;                       ///< as the estimator reported
+  bool inconsistent = false;                   ///< whether it has an event of that name
+  bool failed = false;                         ///< it diverged, or could not continue
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
-  /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.
+  /// Final map, for `landmarks.csv`; empty if the estimator has no landmarks.
   std::optional<std::vector<LandmarkEstimate>> landmarks;
-  /// Landmarks that were removed during the run, in the order of that, as they were then.
+  /// Landmarks removed during the run, in the order of removal, with their last estimates.
   std::vector<LandmarkEstimate> removed_landmarks;
-  /// Time of the wall clock that its frames and smoothing took; not under kRollback.
+  /// Wall-clock time of its frames and its smoothing; zero under kRollback.
   double wall_s = 0.0;
-  /// Of that, what filters with landmarks tell of their parts, by FramePart.
+  /// Shares of `wall_s` by FramePart, which filters with landmarks report.
   std::array<double, kFrameParts> parts_s{};
-  double record_s = 0.0;  ///< time that its metrics and its records took besides
+  double record_s = 0.0;  ///< additional time of its metrics and records
 };
 
+/// Result of a run.
 struct RunResult {
   RunStatus status = RunStatus::kOk;
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::int64_t frames = 0;
   Arrivals arrivals;
-  /// Quaternions and directions of a stream or truth that were brought to unit length.
+  /// Number of quaternions and directions that were normalised, by stream or truth.
   std::map<std::string, std::int64_t> normalised;
-  std::string reference = "truth";  ///< what metrics compare with: truth, or an estimator's name
-  std::string withheld;             ///< why there is no comparison with that estimator, or ""
+  std::string reference = "truth";  ///< of the metrics: truth, or an estimator
+  std::string withheld;             ///< why the comparison with that estimator is omitted, or ""
   std::vector<EstimatorResult> estimators;
 };
 
-/// Follows a run on its own thread. What it throws ends the run, and is its reason.
+/// Observer of a run, called on the thread of the run. An exception that it throws ends the run and
+/// becomes its reason.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// Once, before the first frame.
+  /// Called once, before the first frame.
   virtual void Begin(const Experiment& /*experiment*/) {}
-  /// Each frame before the estimators take it; the truth they are not given.
+  /// Called for each frame before the estimators process it. They do not receive the truth.
   virtual void OnFrame(const SourceFrame& /*frame*/) {}
-  /// The wall clock that an estimator needed for a frame; before its estimate, if there is one, and
-  /// not under kRollback.
+  /// Called with the wall-clock time that an estimator needed for a frame, before OnEstimate. Not
+  /// called under kRollback.
   virtual void OnTime(int /*estimator*/, double /*wall_s*/) {}
-  /// Each estimate as it is made, with the index of its estimator; those of an offline estimator
-  /// after the last frame.
+  /// Called for each estimate with the index of its estimator; for an offline estimator, after the
+  /// last frame.
   virtual void OnEstimate(int /*estimator*/, const SourceFrame& /*frame*/, const State& /*state*/,
                           const UpdateReport& /*report*/) {}
 };
 
+/// Options of a run.
 struct RunOptions {
-  std::vector<RunObserver*> observers;  ///< given all that happens, in this order
-  std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
-  std::function<bool()> stop;                                ///< true: finish the frame and stop
+  std::vector<RunObserver*> observers;                       ///< called in this order
+  std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames processed, total or -1
+  std::function<bool()> stop;                                ///< true: finish the frame, then stop
 };
 
-/// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
-/// and divergence under `fail` end the run early; an estimator that has nothing left to go on with
-/// ends by itself; a frame that is not as the source's streams() and truths() say ends the run, as
-/// does a quaternion or direction that is not of unit length to 1e-3. All that, and whatever else
-/// goes wrong, is in the result; nothing is thrown.
+/// Runs all estimators on the source, frame by frame, so that all process the same data. Data
+/// errors, and divergence under `fail`, end the run early. An estimator that cannot continue ends
+/// alone. A frame that contradicts streams() or truths() of the source ends the run. So does a
+/// quaternion or direction whose length differs from 1 by more than 1e-3. The result reports all
+/// errors; the function does not throw.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
-/// A table of the estimators' main metrics, one column each, for a terminal; below it what they
-/// compare with, where that is not truth.
+/// Returns a table of the main metrics for a terminal, with one column for each estimator. Names
+/// the reference below the table if it is not truth.
 std::string ComparisonTable(const RunResult& result);
 
 }  // namespace alidade

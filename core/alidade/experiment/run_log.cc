@@ -28,16 +28,16 @@ void LogEvents(const std::string& estimator, std::span<const Event> events, bool
   for (const Event& event : events) {
     const LogLevel level = event.divergence && !is_reason ? LogLevel::kWarning : LogLevel::kInfo;
     if (!IsLogged(level)) continue;
-    const std::string at =
+    const std::string time =
         event.timestamp == kNoTimestamp ? "" : " at t = " + SecondsText(event.timestamp);
-    Log(level, estimator + ": " + event.kind + at + ": " + event.text);
+    Log(level, estimator + ": " + event.kind + time + ": " + event.text);
   }
 }
 
 void LogDurations(const RunResult& result) {
   if (!IsLogged(LogLevel::kDebug)) return;
-  for (const EstimatorResult& one : result.estimators) {
-    Log(LogLevel::kDebug, one.name + ": " + FixedText(one.wall_s, 3) + " s for " +
+  for (const EstimatorResult& estimator : result.estimators) {
+    Log(LogLevel::kDebug, estimator.name + ": " + FixedText(estimator.wall_s, 3) + " s for " +
                               std::to_string(result.frames) + " frames");
   }
 }

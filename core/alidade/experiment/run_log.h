@@ -5,17 +5,18 @@
 
 #include "alidade/experiment/run.h"
 
-/// What a run says in the log.
+/// Log messages of a run.
 namespace alidade::internal {
 
-/// Level info: streams and truth of the source, and of each estimator type, sensors and blocks.
+/// Logs, at level info, the streams and truths of the source, and the type, sensors and blocks of
+/// each estimator.
 void LogExperiment(const Experiment& experiment);
 
-/// One message an event: a divergence is a warning, anything else info. `is_reason`: the run
-/// returns the divergence as its reason, and it is info too.
+/// Logs one message for each event: a divergence as a warning, all others as info. With
+/// `is_reason`, the run reports the divergence as its reason, so it is logged as info.
 void LogEvents(const std::string& estimator, std::span<const Event> events, bool is_reason = false);
 
-/// Level debug: the wall clock of each estimator.
+/// Logs, at level debug, the wall-clock time of each estimator.
 void LogDurations(const RunResult& result);
 
 }  // namespace alidade::internal

@@ -8,11 +8,11 @@
 
 #include "alidade/state/eigen_alignment.h"
 
-/// The similarity that brings points p, columns of `from`, nearest to q, those of `to`: s R p + t
-/// with sum |q - s R p - t|^2 least [Umeyama1991].
+/// Alignment by a similarity: s R p + t that minimises sum |q - s R p - t|^2 over points p, the
+/// columns of `source`, and q, the columns of `target` [Umeyama1991].
 namespace alidade {
 
-/// x_in_reference = scale rotation x_in_estimate + translation
+/// Similarity transform: x_in_reference = scale rotation x_in_estimate + translation.
 struct Similarity {
   double scale = 1.0;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
@@ -21,55 +21,58 @@ struct Similarity {
 
 namespace internal {
 
-/// With a scale, or with scale 1.
-Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, bool with_scale);
+/// Computes the similarity, with scale 1 unless `has_scale`.
+Similarity Umeyama(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target, bool has_scale);
 
-/// Mean of |p - mean p|^2; exactly 0 where all points are one.
+/// Computes the mean of |p - mean p|^2; exactly 0 if all points are equal.
 double SquaredExtent(const Eigen::Matrix3Xd& points);
 
-/// Nothing of fewer than three points, and where the points do not determine s > 0.
-std::optional<Similarity> FindSimilarity(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
+/// Computes the similarity. Returns nothing for fewer than three points, or if the points do not
+/// determine s > 0.
+std::optional<Similarity> FindSimilarity(const Eigen::Matrix3Xd& source,
+                                         const Eigen::Matrix3Xd& target);
 
-/// What the similarity that brings points nearest to others leaves, and its scale.
-struct Aligned {
+/// Residual RMSE and scale of the best similarity.
+struct SimilarityFit {
   double rmse = 0.0, scale = 1.0;
 };
 
-/// Of the columns; nothing where FindSimilarity finds none.
-std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
-                                         const Eigen::Matrix3Xd& onto);
+/// Aligns the columns of `source` to those of `target`. Returns nothing if FindSimilarity does.
+std::optional<SimilarityFit> AlignBySimilarity(const Eigen::Matrix3Xd& source,
+                                               const Eigen::Matrix3Xd& target);
 
-/// The similarity that brings a trajectory nearest to another [Umeyama1991], from sums alone, so
-/// that a long trajectory takes no memory. Points p, q of both, n of them, with means p0, q0:
+/// Alignment of a trajectory with a target trajectory by the best similarity [Umeyama1991]. It
+/// stores only sums, so its memory does not grow. For n pairs of points p, q with means p0, q0:
 ///
 ///   C = sum (q - q0) (p - p0)' / n,    t = max tr(R' C) over rotations R
 ///   scale = t / var p,    rmse^2 = var q - t^2 / var p
 ///
-/// rmse is good to 1e-8 of the extent of the trajectory, as its square is a difference.
+/// The rmse is accurate to 1e-8 of the extent of the trajectory, as its square is a difference.
 class TrajectoryAlignment {
  public:
-  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& onto) {
+  /// Adds a pair of points.
+  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& target) {
     if (count_ == 0) {
       origin_ = point;
-      onto_origin_ = onto;
+      target_origin_ = target;
     }
-    const Eigen::Vector3d p = point - origin_, q = onto - onto_origin_;
+    const Eigen::Vector3d p = point - origin_, q = target - target_origin_;
     ++count_;
     sum_ += p;
-    onto_sum_ += q;
+    target_sum_ += q;
     products_ += q * p.transpose();
     squares_ += p.squaredNorm();
-    onto_squares_ += q.squaredNorm();
+    target_squares_ += q.squaredNorm();
   }
-  /// Nothing where FindSimilarity finds none.
-  std::optional<Aligned> Result() const;
+  /// Returns the alignment, or nothing if FindSimilarity returns nothing.
+  std::optional<SimilarityFit> Result() const;
 
  private:
   std::int64_t count_ = 0;
-  Eigen::Vector3d origin_, onto_origin_;
-  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero(), onto_sum_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d origin_, target_origin_;
+  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero(), target_sum_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products_ = Eigen::Matrix3d::Zero();
-  double squares_ = 0.0, onto_squares_ = 0.0;
+  double squares_ = 0.0, target_squares_ = 0.0;
 };
 
 }  // namespace internal

@@ -14,11 +14,11 @@ namespace alidade {
 
 inline constexpr const char* kSourceKind = "source";
 
-/// The factory of a source.
+/// Factory of a source.
 struct SourceEntry {
   const char* name;
   const char* doc;
-  /// Keys that are not read through Params, one a line: `key  meaning`.
+  /// Keys that are not read through Params, one per line: `key  meaning`.
   const char* keys;
   std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
 };
@@ -26,12 +26,12 @@ constexpr CppEntry EntryOf(const SourceEntry& source) {
   return {kSourceKind, source.name, source.doc, "", source.keys, &source};
 }
 
-/// The source of a config, of its map `source`; `any_order` as in SourceArguments. Errors: kPlugin
-/// with the places searched, kBadConfig, those of the source.
+/// Creates the source of a config from its map `source`; `any_order` as in SourceArguments. Errors:
+/// kPlugin with the places searched, kBadConfig, those of the source.
 std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
                                      std::uint64_t seed, bool any_order = false);
 
-/// The parameters of the source `entry`.
+/// Returns the parameters of the source `entry`.
 std::vector<ParamInfo> SourceSchema(const PluginEntry& entry);
 
 }  // namespace alidade

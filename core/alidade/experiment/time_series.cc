@@ -31,17 +31,17 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A series less its mean, with the sums of its first k values and squares.
-struct Centred {
+/// Series minus its mean, with the sums of its first k values and of their squares.
+struct CentredSeries {
   Eigen::VectorXd values, sums, squares;
 
-  explicit Centred(const std::vector<double>& series)
+  explicit CentredSeries(const std::vector<double>& series)
       : values(Eigen::VectorXd::Map(series.data(), static_cast<Eigen::Index>(series.size()))),
         sums(values.size() + 1),
         squares(values.size() + 1) {
     const double scale = values.cwiseAbs().maxCoeff();
     values.array() -= values.mean();
-    // What is left of a constant is rounding.
+    // The remainder of a constant is rounding.
     if (!(values.cwiseAbs().maxCoeff() > 1e-13 * scale)) values.setZero();
     sums[0] = squares[0] = 0.0;
     for (Eigen::Index i = 0; i < values.size(); ++i) {
@@ -52,14 +52,14 @@ struct Centred {
   double Sum(Eigen::Index first, Eigen::Index count) const {
     return sums[first + count] - sums[first];
   }
-  /// Sum of squares about the mean of the window.
+  /// Returns the sum of squares about the mean of the window.
   double Spread(Eigen::Index first, Eigen::Index count) const {
     const double sum = Sum(first, count);
     return squares[first + count] - squares[first] - sum * sum / static_cast<double>(count);
   }
 };
 
-/// The samples of two series of n values where both are, one `shift` after the other.
+/// Overlap of two series of n values, one shifted by `shift`: first indices and length.
 struct Overlap {
   Eigen::Index signal, reference, count;
 
@@ -69,8 +69,9 @@ struct Overlap {
         count(n - std::abs(shift)) {}
 };
 
-/// Correlation coefficient of reference(i) and signal(i + shift).
-double Correlation(const Centred& signal, const Centred& reference, Eigen::Index shift) {
+/// Computes the correlation coefficient of reference(i) and signal(i + shift).
+double Correlation(const CentredSeries& signal, const CentredSeries& reference,
+                   Eigen::Index shift) {
   const Overlap o(reference.values.size(), shift);
   const double product =
       reference.values.segment(o.reference, o.count).dot(signal.values.segment(o.signal, o.count)) -
@@ -80,7 +81,7 @@ double Correlation(const Centred& signal, const Centred& reference, Eigen::Index
   return spread > 0.0 ? product / std::sqrt(spread) : kNaN;
 }
 
-/// Minus the mean of (reference(i) - signal(i + shift))^2.
+/// Computes minus the mean of (reference(i) - signal(i + shift))^2.
 double Closeness(const std::vector<double>& signal, const std::vector<double>& reference,
                  Eigen::Index shift) {
   const Overlap o(std::ssize(reference), shift);
@@ -89,17 +90,18 @@ double Closeness(const std::vector<double>& signal, const std::vector<double>& r
   return -(r - s).squaredNorm() / static_cast<double>(o.count);
 }
 
-/// Whether the series looks like itself at every shift up to `reach`, but for offset and scale.
-bool IsRamp(const Centred& series, Eigen::Index reach) {
-  constexpr double kAlike = 0.9;
+/// Returns whether the series correlates with itself at every shift up to `reach`.
+bool IsRamp(const CentredSeries& series, Eigen::Index reach) {
+  constexpr double kMinCorrelation = 0.9;
   for (Eigen::Index k = 1; k <= reach; ++k) {
-    if (!(Correlation(series, series, k) > kAlike)) return false;
+    if (!(Correlation(series, series, k) > kMinCorrelation)) return false;
   }
   return true;
 }
 
-/// Where a parabola through the largest score and its neighbours has its top, from the middle. NaN
-/// where the largest one is at the edge, or no higher than its neighbours but for rounding.
+/// Returns the position, from the middle, of the maximum of a parabola through the largest score
+/// and its neighbours. Returns NaN if the largest score is at the edge, or exceeds its neighbours
+/// only by rounding.
 double Peak(const Eigen::VectorXd& scores) {
   constexpr double kRounding = 1e-12;
   const Eigen::Index middle = scores.size() / 2;
@@ -120,37 +122,37 @@ double Lag(const std::vector<double>& signal, const std::vector<double>& referen
   constexpr Eigen::Index kMinSize = 8, kMaxShift = 2000;
   const Eigen::Index n = static_cast<Eigen::Index>(signal.size());
   if (n < kMinSize) return kNaN;
-  const Centred s(signal), r(reference);
+  const CentredSeries s(signal), r(reference);
   if (!s.values.allFinite() || s.values.isZero(0.0) || r.values.isZero(0.0)) return kNaN;
   const Eigen::Index reach = std::min(n / 4, kMaxShift);
-  const bool ramp = IsRamp(r, reach);
+  const bool is_ramp = IsRamp(r, reach);
   const double variance = r.Spread(0, n) / static_cast<double>(n);
   Eigen::VectorXd scores(2 * reach + 1);
   for (Eigen::Index k = -reach; k <= reach; ++k) {
-    scores[k + reach] = ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
+    scores[k + reach] = is_ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
   }
   return Peak(scores) * step;
 }
 
 Settling SettlingOf(const std::vector<double>& rms) {
-  constexpr std::ptrdiff_t kFewest = 40, kReach = 4;
+  constexpr std::ptrdiff_t kMinValues = 40, kReach = 4;
   constexpr double kBand = 0.2;
   const std::ptrdiff_t n = std::ssize(rms);
-  if (n < kFewest) return {kNaN, kNaN};
+  if (n < kMinValues) return {kNaN, kNaN};
   std::vector<double> last(rms.begin() + n / 2, rms.end());
   std::ranges::sort(last);
   const double level = Quantile(last, 0.5);
   const auto values = Eigen::VectorXd::Map(rms.data(), n);
-  std::ptrdiff_t outside = n - kReach - 1;  // the last centre that is outside the band, or -1
+  std::ptrdiff_t outside = n - kReach - 1;  // the last centre outside the band, or -1
   for (; outside >= 0; --outside) {
     const std::ptrdiff_t reach = std::min(outside, kReach);
     const auto window = values.segment(outside - reach, 2 * reach + 1);
     const double centred = window.norm() / std::sqrt(static_cast<double>(window.size()));
     if (!(std::abs(centred - level) <= kBand * level)) break;
   }
-  const bool never = outside == n - kReach - 1;
-  return {level,
-          never ? std::numeric_limits<double>::infinity() : static_cast<double>(outside + 2)};
+  const bool never_settles = outside == n - kReach - 1;
+  return {level, never_settles ? std::numeric_limits<double>::infinity()
+                               : static_cast<double>(outside + 2)};
 }
 
 }  // namespace alidade

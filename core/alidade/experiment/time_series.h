@@ -3,31 +3,36 @@
 
 #include <vector>
 
-/// Statistics of values that follow one another in time.
+/// Statistics of time series.
 namespace alidade {
 
-/// Integrated autocorrelation time tau = 1 + 2 sum rho(k) of an even series, 1 to n: its n values
-/// tell of their mean as n / tau independent ones do. rho is taken about `mean`, the value that is
-/// expected, and up to where rho(k) + rho(k + 1) is not positive any more [Geyer1992, sec. 3.3].
+/// Computes the integrated autocorrelation time tau = 1 + 2 sum rho(k) of an evenly sampled series,
+/// from 1 to n. The mean of its n values is as certain as that of n / tau independent values. rho
+/// is the autocorrelation about the expected value `mean`. The sum ends before the first pair with
+/// rho(k) + rho(k + 1) <= 0 [Geyer1992, sec. 3.3].
 double AutocorrelationTime(const std::vector<double>& series, double mean);
 
-/// Delay of `signal` after `reference`, both sampled every `step`, in the unit of step: the shift
-/// k, |k| <= min(n/4, 2000), with the largest correlation coefficient over the n - |k| samples
-/// that overlap, refined by a parabola. On a ramp, where `reference` correlates with itself by more
-/// than 0.9 at every such k, that tells nothing: there it is the k with the least mean of
-/// (signal(i + k) - reference(i))^2, and an offset counts as delay. NaN where one of them is
-/// constant, the best k lies at the edge or is no better than its neighbours, or n < 8.
+/// Computes the delay of `signal` after `reference`, both sampled every `step`, in the unit of
+/// step. It is the shift k, |k| <= min(n/4, 2000), with the largest correlation coefficient over
+/// the n - |k| overlapping samples, refined by a parabola.
+///
+/// If `reference` is a ramp, which correlates with itself by more than 0.9 at every such k, all
+/// coefficients are similar. The delay is then the k with the smallest mean of
+/// (signal(i + k) - reference(i))^2, so that an offset counts as delay.
+///
+/// Returns NaN if one series is constant, if the best k lies at the edge or does not exceed its
+/// neighbours, or if n < 8.
 double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step);
 
-/// How a series of rms values comes to its steady level; NaN if there are fewer than 40 values.
+/// Settling of a series of rms values to its steady level; NaN for fewer than 40 values.
 struct Settling {
-  double level;  ///< the median of the last half
-  /// The number, from 1, of the first value from which on the centred rms stays within 20 % of the
-  /// level; infinity if it is outside at the end. The centred rms of value i is that of the values
-  /// i - r to i + r, r = min(i - 1, 4). The last four values have none of their own.
+  double level;  ///< median of the second half
+  /// Number, counted from 1, of the value from which the centred rms stays within 20 % of the
+  /// level; infinity if the last one is outside. The centred rms of value i covers the values i - r
+  /// to i + r, r = min(i - 1, 4). The last four values do not have a centred rms.
   double count;
 };
-/// When a series of rms values, one for each frame say, has settled.
+/// Computes the settling of a series of rms values, for example one per frame.
 Settling SettlingOf(const std::vector<double>& rms);
 
 }  // namespace alidade

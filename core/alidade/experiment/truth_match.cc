@@ -27,9 +27,9 @@ std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<Stream
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
     if (layout.Find(truths[t].name) >= 0) continue;
-    const auto named = [&](const Block& b) { return LastComponent(b.name) == truths[t].name; };
-    const auto first = std::find_if(blocks.begin(), blocks.end(), named);
-    if (first == blocks.end() || std::any_of(first + 1, blocks.end(), named)) continue;
+    const auto has_name = [&](const Block& b) { return LastComponent(b.name) == truths[t].name; };
+    const auto first = std::find_if(blocks.begin(), blocks.end(), has_name);
+    if (first == blocks.end() || std::any_of(first + 1, blocks.end(), has_name)) continue;
     const auto block = static_cast<std::size_t>(first - blocks.begin());
     if (fits(block, truths[t])) match[block] = static_cast<int>(t);
   }
@@ -41,17 +41,18 @@ std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>&
   const StreamInfo& truth = truths[t];
   const std::vector<int> match = MatchTruths(layout, truths);
   if (std::find(match.begin(), match.end(), static_cast<int>(t)) != match.end()) return {};
-  std::vector<std::string> fitting;
+  std::vector<std::string> candidates;
   int size = 0;
   for (const Block& block : layout.blocks()) {
     if (block.name != truth.name && LastComponent(block.name) != truth.name) continue;
-    fitting.push_back(block.name);
+    candidates.push_back(block.name);
     size = block.geometry().ambient;
   }
-  if (fitting.empty()) return "no block has this name";
-  if (fitting.size() > 1) return "it may be of " + Join(fitting, " or ");
-  if (size == truth.size) return fitting[0] + " has a truth of its full name";
-  return fitting[0] + " has size " + std::to_string(size) + ", not " + std::to_string(truth.size);
+  if (candidates.empty()) return "no block has this name";
+  if (candidates.size() > 1) return "it may belong to " + Join(candidates, " or ");
+  if (size == truth.size) return candidates[0] + " has another truth with its full name";
+  return candidates[0] + " has size " + std::to_string(size) + ", not " +
+         std::to_string(truth.size);
 }
 
 }  // namespace alidade::internal

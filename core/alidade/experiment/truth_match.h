@@ -9,12 +9,12 @@
 
 namespace alidade::internal {
 
-/// For each block the index of its truth, or -1. A truth is named like the block (`target.depth`)
-/// or like its last component (`depth`), the full name first; a last component that fits two blocks
-/// fits none, and so does a truth of another size.
+/// Returns the index of the truth of each block, or -1. A truth has the name of its block
+/// (`target.depth`) or the last component of that name (`depth`); a full name has precedence. A
+/// last component that fits two blocks, or a truth of another size, does not match.
 std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<StreamInfo>& truths);
 
-/// Why truth `t` belongs to no block of `layout`; "" where it belongs to one.
+/// Returns why truth `t` does not match a block of `layout`, or "" if it matches one.
 std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>& truths,
                        std::size_t t);
 

@@ -96,9 +96,9 @@ class ImageTarget : public Source {
     const std::int64_t remaining = start_.Remaining(left_->size());
     return max_frames_ > 0 ? std::min(max_frames_, remaining) : remaining;
   }
-  bool sees() const override { return true; }
-  SeenImage Seen() const override {
-    SeenImage seen{ToGreyImage(image_[0])};
+  bool measures_images() const override { return true; }
+  MeasuredImage LastImage() const override {
+    MeasuredImage seen{ToGreyImage(image_[0])};
     if (const auto corners = tracker_->outline()) {
       for (const cv::Point2f& corner : *corners) seen.outline.push_back({corner.x, corner.y});
     }

@@ -71,15 +71,15 @@ class ImageTracks : public Source {
     const std::int64_t remaining = start_.Remaining(images_->size());
     return most_ > 0 ? std::min(most_, remaining) : remaining;
   }
-  bool sees() const override { return true; }
-  SeenImage Seen() const override { return {ToGreyImage(image_)}; }
+  bool measures_images() const override { return true; }
+  MeasuredImage LastImage() const override { return {ToGreyImage(image_)}; }
   std::optional<Config> Calibration() const override {
     if (!calibration_) return std::nullopt;
     return ReadCalibrationFile(*calibration_);
   }
 
-  std::string guided_by() const override { return guided_by_; }
-  void LendGuide(const Guide* guide) override { guide_ = guide; }
+  std::string guide_name() const override { return guided_by_; }
+  void SetGuide(const Guide* guide) override { guide_ = guide; }
 
   bool Next(SourceFrame& frame) override {
     if (frames_ == most_ && most_ > 0) return false;
@@ -138,7 +138,7 @@ class ImageTracks : public Source {
     std::vector<std::int64_t> ids;
     for (const FeatureTracker::Feature& feature : tracker_.features()) ids.push_back(feature.id);
     FeatureTracker::Expectations expectations;
-    for (const Expected& one : guide_->Expect(0, timestamp, ids)) {
+    for (const ExpectedMeasurement& one : guide_->Expect(0, timestamp, ids)) {
       std::optional<ExpectedPoint>& point = expectations.emplace_back();
       if (one.z.size() != 2) continue;
       point = {cv::Point2f(cv::Point2d(one.z[0], one.z[1])),

@@ -131,22 +131,22 @@ TEST(CramerRaoBound, EndsWhereTruthIsNotKnown) {
 
 TEST(CramerRaoBound, TellsWhyThereIsNone) {
   const Problem problem = testing::DepthFilter();
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, kTruths), "");
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, {{"depth"}, {"depth_rate"}}),
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, kTruths), "");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, {{"depth"}, {"depth_rate"}}),
             "'template.inverse_distance' has no truth");
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, {{"depth", 1, 0.1}, {"depth_rate"}}),
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, {{"depth", 1, 0.1}, {"depth_rate"}}),
             "the truth of 'target.depth' is not exact");
-  EXPECT_EQ(CramerRaoBound::WhyNone(
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(
                 testing::WithStatus(problem, "target.depth_rate", BlockStatus::kConsider), kTruths),
             "'target.depth_rate' is a consider state");
   const Problem constant =
       testing::WithStatus(problem, "template.inverse_distance", BlockStatus::kConstant);
-  EXPECT_EQ(CramerRaoBound::WhyNone(constant, {{"depth"}, {"depth_rate"}}), "");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(constant, {{"depth"}, {"depth_rate"}}), "");
   Problem slam = problem;
   slam.landmarks.emplace();
-  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths), "");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(slam, kTruths), "");
   slam.sensors[1].stream = slam.sensors[0].stream;
-  EXPECT_EQ(CramerRaoBound::WhyNone(slam, kTruths),
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(slam, kTruths),
             "'disparity' and 'inverse_scale' share a stream");
 }
 
@@ -436,13 +436,14 @@ struct XyzByPrior : testing::XyzPixels {
 TEST(CramerRaoBound, TellsWhyLandmarksCannotStartAtTruth) {
   const std::vector<StreamInfo> truths{{"position", 3}};
   Problem problem = testing::MapSystem(testing::Offset(0.1), LandmarkOptions());
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths), "");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, truths), "");
   problem.sensors[0].model = MakeSensor(OnGround(), "ground");
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths),
-            "'tracks' has landmarks of a representation of its own");
+  EXPECT_EQ(CramerRaoBound::WhyUnavailable(problem, truths),
+            "'tracks' has a custom landmark representation");
   problem.sensors[0].model = MakeSensor(XyzByPrior(), "xyz");
-  EXPECT_EQ(CramerRaoBound::WhyNone(problem, truths),
-            "'tracks' places landmarks as xyz by a prior, by whose mean the Jacobians are");
+  EXPECT_EQ(
+      CramerRaoBound::WhyUnavailable(problem, truths),
+      "'tracks' initialises xyz landmarks with a prior, and the Jacobians depend on its mean");
 }
 
 TEST(CramerRaoBound, EndsAtALandmarkWithoutTruth) {

@@ -71,8 +71,8 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
     ASSERT_NE(event, one.events.end());
     EXPECT_EQ(event->timestamp, beyond.timestamp);
     EXPECT_EQ(event->text,
-              "a frame of disparity, inverse_scale came 0.100000 s behind the newest, beyond the "
-              "window of 0.100000 s: dropped");
+              "a frame of disparity, inverse_scale was dropped: it is 0.100000 s older than the "
+              "newest, beyond the window of 0.100000 s");
   }
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
@@ -94,9 +94,10 @@ TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
                 GetParam());
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kBadData);
-  EXPECT_EQ(result.reason,
-            "rows.csv:6: stream 'inverse_scale' twice at t = 0.050000 s; expected one measurement "
-            "at a timestamp; the first is in rows.csv:3");
+  EXPECT_EQ(
+      result.reason,
+      "rows.csv:6: two measurements of stream 'inverse_scale' at t = 0.050000 s; expected one "
+      "measurement per timestamp; the first is in rows.csv:3");
   EXPECT_EQ(result.frames, 3);  // what came before it is kept
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
@@ -142,8 +143,8 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
       GetParam());
   experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
-            "rows.csv:4: stream 'aside' twice at t = 0.000000 s; expected one measurement at a "
-            "timestamp; the first is in rows.csv:3");
+            "rows.csv:4: two measurements of stream 'aside' at t = 0.000000 s; expected one "
+            "measurement per timestamp; the first is in rows.csv:3");
 }
 
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
@@ -166,9 +167,9 @@ TEST_P(FrameOrder, TwoTruthsAtOneTimestampAreAnError) {
   experiment = MakeGiven({one, same, other}, GetParam());
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kBadData);
-  EXPECT_EQ(
-      result.reason,
-      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a timestamp");
+  EXPECT_EQ(result.reason,
+            "rows.csv:4: two values of truth 'depth' at t = 0.000000 s; expected one value per "
+            "timestamp");
 }
 
 TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {

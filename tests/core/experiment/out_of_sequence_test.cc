@@ -212,12 +212,10 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(ranks["disparity_all"], 2);  // of no sensor
   EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
             "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
-            "'window_s', how "
-            "far out of sequence a frame may be");
+            "'window_s', the largest lag of an out-of-sequence frame");
   EXPECT_EQ(Refused("out_of_sequence: {policy: reject, window_s: 1}"),
-            "order.yaml:25:45 out_of_sequence.window_s: without a use: 'policy: reject' holds "
-            "nothing back; "
-            "expected 'policy: buffer' or 'rollback'");
+            "order.yaml:25:45 out_of_sequence.window_s: has no effect: 'policy: reject' does not "
+            "buffer frames; expected 'policy: buffer' or 'rollback'");
   EXPECT_NE(Refused("out_of_sequence: {policy: buffered}").find("did you mean 'buffer'?"),
             std::string::npos);
   EXPECT_NE(Refused("out_of_sequence: {policy: buffer, window_s: -1}")
@@ -250,8 +248,8 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
   }
   EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", buffer).reason,
             (folder / "rows.csv").string() +
-                ":4: stream 'disparity' twice at t = 0.200000 s; expected one measurement at a "
-                "timestamp; the first is in " +
+                ":4: two measurements of stream 'disparity' at t = 0.200000 s; expected one "
+                "measurement per timestamp; the first is in " +
                 (folder / "rows.csv").string() + ":2");
 }
 

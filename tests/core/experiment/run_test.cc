@@ -603,7 +603,7 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
     experiment.source = std::make_unique<Spoiling>(one.spoil);
     const RunResult result = alidade::Run(experiment, {});
     EXPECT_EQ(result.code, ExitCode::kInternal);
-    EXPECT_NE(result.reason.find("the source gives " + one.reason), std::string::npos)
+    EXPECT_NE(result.reason.find("the source returned " + one.reason), std::string::npos)
         << result.reason;
     EXPECT_NE(result.reason.find("at t = 0.099000 s"), std::string::npos) << result.reason;
     EXPECT_EQ(result.frames, 3);
@@ -617,10 +617,10 @@ TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
             alidade::Run(second, {}).estimators[0].metrics);
 }
 
-TEST(Experiment, WordsOfAConfigAreItsKeysAndScalars) {
+TEST(Experiment, KeysAndScalarsOfAConfig) {
   const Config config =
       Config::FromText("a: {model: b, list: [c, {d: 1.5}]}\ne: 'f g'", "test.yaml");
-  EXPECT_EQ(WordsOf(config),
+  EXPECT_EQ(KeysAndScalarsOf(config),
             (std::set<std::string>{"a", "model", "b", "list", "c", "d", "1.5", "e", "f g"}));
   EXPECT_THROW(config.root().RejectUnread(), Error);  // nothing counts as read
 }

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-std::optional<internal::Aligned> FromSums(const Matrix3Xd& points, const Matrix3Xd& onto) {
+std::optional<internal::SimilarityFit> FromSums(const Matrix3Xd& points, const Matrix3Xd& onto) {
   internal::TrajectoryAlignment alignment;
   for (Eigen::Index k = 0; k < points.cols(); ++k) alignment.Add(points.col(k), onto.col(k));
   return alignment.Result();

@@ -139,7 +139,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
               [&] { incremental("relinearise_above", "0"); });
   ExpectError(
       ExitCode::kPlugin,
-      {"estimators.batch.type", "no estimator 'ceres_bach'", "ekf", "ceres_batch", "searched"},
+      {"estimators.batch.type", "no estimator type 'ceres_bach'", "ekf", "ceres_batch", "searched"},
       [&] { run("estimators.batch.type", "ceres_bach"); });
 }
 

@@ -143,8 +143,8 @@ TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
                     "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}, overrides: "
                     "{state: {car: {input: {stream: gps}}}}}}"),
             "--set estimators.same.use.accepted_by: stream 'gps' is the control input of 'car' and "
-            "goes to sensor 'gps' of 'ekf': what that does not accept would be missing as an "
-            "input; expected a filter without a sensor on that stream");
+            "the stream of sensor 'gps' of 'ekf', so rejected measurements would be missing as "
+            "inputs; expected a filter without a sensor on that stream");
 }
 
 // Not even where it follows a filter that does not have the sensor, but follows one that has.
@@ -160,7 +160,7 @@ TEST_F(DrivenTest, NorIsAStreamThatAnyLenderOnTheWayMeasures) {
   std::string text;
   EXPECT_EQ(testing::CodeOf([&] { BuildExperiment(config, host_); }, &text), 78);
   EXPECT_NE(text.find("estimators.c.use.accepted_by: stream 'gps' is the control input of 'car' "
-                      "and goes to sensor 'gps' of 'a'"),
+                      "and the stream of sensor 'gps' of 'a'"),
             std::string::npos)
       << text;
 }
@@ -236,7 +236,7 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
   EXPECT_EQ(Refusal("state.car.inputs", "{odom: odometry}"),
             "--set state.car.inputs: unknown key; did you mean 'input'?");
   EXPECT_EQ(Refusal("state.other", "{model: constant, input: {stream: odometry}, initial: {}}"),
-            "--set state.other.input: model 'constant' takes no control input; expected the key "
+            "--set state.other.input: model 'constant' has no control input; expected the key "
             "left out");
   EXPECT_EQ(Refusal("estimators.ekf.overrides", "{state: {car: {input: {stream: gsp}}}}"),
             "--set estimators.ekf.overrides.state.car.input.stream: the source has no stream "

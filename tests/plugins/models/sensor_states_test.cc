@@ -299,10 +299,11 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   };
   const auto keys = [](const std::string& more) { return Filled("", "", ", " + more); };
   expect(keys("initial: {clock: {mean: 0, sigma: 1}}"), "sensors.gnss.initial.clock: unknown key");
-  expect(keys("initial: {clock_bias: {from_measurement: gnss}}"), "starts from no measurement");
+  expect(keys("initial: {clock_bias: {from_measurement: gnss}}"),
+         "cannot start from a measurement");
   expect(keys("dynamics: {clock_bias: {random_walk: -1}}"), "negative");
   expect(keys("dynamics: {clock_bias: {walk: 1}}"), "dynamics.clock_bias.walk: unknown key");
-  expect(keys("dynamics: {clock_bias: {}}"), "not one kind of dynamics");
+  expect(keys("dynamics: {clock_bias: {}}"), "needs exactly one kind of dynamics");
   expect(keys("dynamics: {clock_bias: {gauss_markov: {sigma: 1, time_constant_s: 0}}}"),
          "time_constant_s");
   expect(keys("consider: [position]"), "no block 'position' in this entry");
@@ -310,7 +311,7 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   expect(Filled("  gnss: {model: constant, blocks: {value: clock_bias}, initial: {clock_bias: "
                 "{mean: 0, sigma: 1}}}\n",
                 "", ""),
-         "it brings the state 'gnss.clock_bias', and a state entry has its name");
+         "the sensor owns the state 'gnss.clock_bias', but a state entry has its name");
   expect(keys("dynamics: {clock_bias: brownian}"), "expected constant, {random_walk: SIGMA}");
   expect(keys("constant: [clock_bias], initial: {clock_bias: {mean: 1}}, dynamics: {clock_bias: "
               "{random_walk: 1}}"),

@@ -349,7 +349,7 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
   }
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent) + SourceKeys(source);
-  if (const std::string guide = experiment.source->guided_by(); !guide.empty()) {
+  if (const std::string guide = experiment.source->guide_name(); !guide.empty()) {
     text += "  guide: filter '" + guide + "' predicts the search regions of the measurements\n";
   }
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +

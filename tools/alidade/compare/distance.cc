@@ -136,8 +136,8 @@ Distance DistanceBetween(const Series& series, const Series& reference) {
   return distance;
 }
 
-std::optional<Aligned> AlignTrajectories(const Series& series, const Series& reference,
-                                         const std::string& block) {
+std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
+                                               const std::string& block) {
   for (const Shared& one : SharedBlocks(series, reference)) {
     if (one.block->name != block || one.block->geometry != Geometry::Vector(3)) continue;
     TrajectoryAlignment alignment;

@@ -25,7 +25,7 @@ struct Distance {
 Distance DistanceBetween(const Series& series, const Series& reference);
 
 /// Of the trajectories that two series have of a vector block of three elements.
-std::optional<Aligned> AlignTrajectories(const Series& series, const Series& reference,
-                                         const std::string& block);
+std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
+                                               const std::string& block);
 
 }  // namespace alidade::internal

@@ -49,7 +49,7 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
   const bool online = spec.kind == EstimatorKind::kFilter ||
                       (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
   if (!online || tracked_.empty()) return;
-  series_.no_bound = CramerRaoBound::WhyNone(spec.problem, truths);
+  series_.no_bound = CramerRaoBound::WhyUnavailable(spec.problem, truths);
   if (!series_.no_bound.empty()) return;
   const Source* source = experiment.source.get();
   bound_.emplace(spec.problem, experiment.source->streams(), truths,

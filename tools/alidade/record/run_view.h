@@ -72,7 +72,7 @@ struct RunView {
   std::int64_t number = 0;
   Timestamp timestamp = 0;
   std::string title, estimator;
-  SeenImage image;
+  MeasuredImage image;
   Mark outline = Mark::kLost;  ///< of the target in the image, if it has one
   std::vector<ViewFeature> features;
   std::array<int, kMarks> counts{};  ///< measurements by what became of them

@@ -71,7 +71,7 @@ struct RunViewer::Impl {
 
 RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
     : impl_(std::make_unique<Impl>()) {
-  if (!experiment.source->sees() && experiment.source->views() == 0) {
+  if (!experiment.source->measures_images() && experiment.source->views() == 0) {
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({}, "source", "it has no images, so there is nothing to show",
                           "a source that measures in images, or draws them from `surfaces`"));
@@ -118,8 +118,8 @@ void RunViewer::AddWindow() {
 
 void RunViewer::OnFrame(const SourceFrame& frame) {
   if (impl_->pending) impl_->Show(*impl_->pending, nullptr, nullptr);
-  impl_->view.image =
-      impl_->source->sees() ? impl_->source->Seen() : SeenImage{impl_->source->Draw(0)};
+  impl_->view.image = impl_->source->measures_images() ? impl_->source->LastImage()
+                                                       : MeasuredImage{impl_->source->Draw(0)};
   impl_->pending = frame;
 }
 

@@ -89,7 +89,7 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       const Block& block = problem.layout[state->block()];
       const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
       RecordedImplied recorded{binding.name, block.name, UnitOf(problem, state->block()),
-                               state->rest_at_truth(), cell};
+                               state->uses_true_roles(), cell};
       inverses_.push_back({s, *std::move(state), std::move(recorded)});
     }
   }

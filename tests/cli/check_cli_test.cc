@@ -60,7 +60,7 @@ TEST_F(CheckProgram, TakesANoiseThatIsGivenAsACovariance) {
   EXPECT_EQ(motion.code, 0) << motion.out << motion.err;
   const Outcome both = Call(With(kStereo, {"--set", "covariance=[[4]]"}));
   EXPECT_EQ(both.code, 78) << both.out;
-  EXPECT_TRUE(Contains(both.err, "sigma_px: the entry gives the noise as `covariance` too"))
+  EXPECT_TRUE(Contains(both.err, "sigma_px: the entry also defines the noise by `covariance`"))
       << both.err;
 }
 

@@ -169,7 +169,7 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
   EXPECT_TRUE(Contains(where.out, "refused " + plugin.string() + ": not trusted")) << where.out;
   EXPECT_TRUE(Contains(where.out, "(next to the program): ")) << where.out;
   const Outcome nowhere = Call({"plugins", "where", "--plugin-path", "none.so"});
-  EXPECT_TRUE(Contains(nowhere.out, "/none.so (given): not there\n")) << nowhere.out;
+  EXPECT_TRUE(Contains(nowhere.out, "/none.so (given): does not exist\n")) << nowhere.out;
   const Outcome doctor = Call({"doctor", "--plugin-path", "alidade_constant.so"});
   EXPECT_TRUE(Contains(doctor.out, "warn  refused " + plugin.string())) << doctor.out;
 }

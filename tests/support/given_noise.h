@@ -18,7 +18,7 @@ SharedSensor SensorOfNoise(Model model, std::vector<double> root) {
   instance.struct_size = sizeof(instance);
   detail::PublishSensor(std::make_unique<detail::Holder<Model>>(std::move(model)), &instance);
   const auto made = std::make_shared<ModelInstance>(instance, "of given noise", "in process");
-  made->GiveNoise(std::move(root));
+  made->SetNoise(std::move(root));
   return std::make_shared<PluginSensor>(made);
 }
 
@@ -29,7 +29,7 @@ SharedMotion MotionOfNoise(Model model, std::vector<double> root) {
   instance.struct_size = sizeof(instance);
   detail::PublishMotion(std::make_unique<detail::Holder<Model>>(std::move(model)), &instance);
   const auto made = std::make_shared<ModelInstance>(instance, "of given noise", "in process");
-  made->GiveNoise(std::move(root));
+  made->SetNoise(std::move(root));
   return std::make_shared<PluginMotion>(made);
 }
 

@@ -102,7 +102,7 @@ const PluginEntry& FindPluginEstimator(const std::string& type, const PluginHost
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == kEstimatorKind && entry.name == type) return entry;
   }
-  if (!host.complete()) FailUnknownType(type, host.Complete(), node);
+  if (!host.has_all_plugins()) FailUnknownType(type, host.WithAllPlugins(), node);
   FailUnknownType(type, host, node);
 }
 

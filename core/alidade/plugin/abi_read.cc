@@ -13,21 +13,21 @@ std::string TextDefect(const char* text) {
   if (size > ALIDADE_MAX_TEXT) {
     return "is longer than " + std::to_string(ALIDADE_MAX_TEXT) + " bytes";
   }
-  for (std::string_view rest(text, size); !rest.empty();) {
-    const std::size_t length = Utf8Length(rest);
+  for (std::string_view remaining(text, size); !remaining.empty();) {
+    const std::size_t length = Utf8Length(remaining);
     if (length == 0) return "is not UTF-8";
-    if (IsControl(rest)) return "has a control character";
-    rest.remove_prefix(length);
+    if (IsControl(remaining)) return "has a control character";
+    remaining.remove_prefix(length);
   }
   return {};
 }
 
-std::string ShownText(const char* text) {
+std::string PrintableText(const char* text) {
   if (text == nullptr) return {};
   return PrintableUtf8({text, strnlen(text, ALIDADE_MAX_TEXT)}, "");
 }
 
-bool GoodName(const char* name) {
+bool IsValidName(const char* name) {
   if (name == nullptr) return false;
   const std::size_t length = strnlen(name, ALIDADE_MAX_NAME + 1);
   return length > 0 && length <= ALIDADE_MAX_NAME &&

@@ -12,78 +12,79 @@
 #include "alidade/base/error.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Calls plugins and reads the structs of plugin_abi.h by its rules.
+/// Helpers that call plugins and read the structs of plugin_abi.h by its rules.
 namespace alidade::internal {
 
-[[noreturn]] inline void Refuse(const std::filesystem::path& plugin, const std::string& why) {
-  throw Error(ExitCode::kPlugin, ErrorLine({plugin.string()}, {}, why));
+[[noreturn]] inline void Refuse(const std::filesystem::path& plugin, const std::string& reason) {
+  throw Error(ExitCode::kPlugin, ErrorLine({plugin.string()}, {}, reason));
 }
 
-/// A text that may be null.
+/// Returns a text, which may be null, as a string.
 inline std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
-/// What breaks the rules of texts, as in `is not UTF-8`, or "".
+/// Returns the rule of texts that `text` breaks, as in `is not UTF-8`, or "".
 std::string TextDefect(const char* text);
 
-/// A text of a plugin as it goes into a message, whatever is in it: UTF-8 without control
-/// characters, in place of which is `?`, of at most ALIDADE_MAX_TEXT bytes.
-std::string ShownText(const char* text);
+/// Returns a text of a plugin for a message: UTF-8 of at most ALIDADE_MAX_TEXT bytes. Control
+/// characters and invalid bytes are replaced by `?`.
+std::string PrintableText(const char* text);
 
-/// Printable ASCII without blanks, of 1 to ALIDADE_MAX_NAME bytes.
-bool GoodName(const char* name);
+/// Returns true for 1 to ALIDADE_MAX_NAME bytes of printable ASCII without blanks.
+bool IsValidName(const char* name);
 
-/// Whether reserved members are as they have to be.
+/// Returns true if all reserved members are zero, as required.
 template <class T, std::size_t N>
 bool AllZero(const T (&reserved)[N]) {
-  return std::all_of(reserved, reserved + N, [](const T& one) { return one == T{}; });
+  return std::all_of(reserved, reserved + N, [](const T& member) { return member == T{}; });
 }
 
-/// The bits of `flags` that have to be understood and are not among `known`, as in `0x20000`; "".
+/// Returns the bits of `flags` in ALIDADE_MUST_UNDERSTAND that are not in `known`, as in `0x20000`,
+/// or "".
 std::string UnknownBits(std::uint32_t flags, std::uint32_t known);
 
-/// A copy of a struct of plugin_abi.h, as far as its own size says, but no part of a pointer; zero
-/// beyond. `limit`: bytes that it may claim at most.
+/// Returns a copy of a struct of plugin_abi.h up to the size that it states, excluding an
+/// incomplete pointer. Members beyond that size are zero. `limit` bounds the stated size, in bytes.
 template <class T>
-T ReadPrefix(const T* from, std::size_t limit = sizeof(T)) {
+T ReadPrefix(const T* source, std::size_t limit = sizeof(T)) {
   T copy{};
-  const std::size_t size = std::min({std::size_t{from->struct_size}, limit, sizeof(T)});
-  std::memcpy(&copy, from, size - size % alignof(T));
+  const std::size_t size = std::min({std::size_t{source->struct_size}, limit, sizeof(T)});
+  std::memcpy(&copy, source, size - size % alignof(T));
   return copy;
 }
 
-/// The i-th struct of a table that states its own stride.
+/// Returns the i-th struct of a table with the given stride.
 template <class T>
 T ReadEntry(const T* first, std::uint32_t stride, std::size_t i) {
-  const char* at = reinterpret_cast<const char*>(first) + i * stride;
-  return ReadPrefix(reinterpret_cast<const T*>(at), stride);
+  const char* entry = reinterpret_cast<const char*>(first) + i * stride;
+  return ReadPrefix(reinterpret_cast<const T*>(entry), stride);
 }
 
-/// Strides of a table must hold its structs aligned.
+/// Returns true if the structs of a table with this stride are aligned and not too large.
 template <class T>
-bool GoodStride(std::uint32_t stride) {
+bool IsValidStride(std::uint32_t stride) {
   constexpr std::uint32_t kMax = 1 << 16;
   return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
 }
 
-/// A measurement as a plugin is shown it: its values, null if a prediction alone is asked for, and
-/// the numbers that are known with it.
-inline AlidadeObservation Shown(const double* z, const double* known) {
-  AlidadeObservation shown{};
-  shown.struct_size = sizeof(shown);
-  shown.z = z;
-  shown.known = known;
-  return shown;
+/// Returns a measurement for a plugin: its values z, null if only a prediction is requested, and
+/// the known numbers that come with it.
+inline AlidadeObservation MakeObservation(const double* z, const double* known) {
+  AlidadeObservation observation{};
+  observation.struct_size = sizeof(observation);
+  observation.z = z;
+  observation.known = known;
+  return observation;
 }
 
-/// The text of the exception that `call` throws; "" if it returns. No call of the plugin ABI may
-/// throw, but the code behind it may be C++.
+/// Runs `call` and returns the text of the exception that it throws, or "". Calls of the plugin ABI
+/// must not throw, but their code may be C++.
 template <class Call>
-std::string ThrownBy(const Call& call) {
+std::string CatchExceptionText(const Call& call) {
   try {
     call();
     return {};
   } catch (const std::exception& e) {
-    const std::string text = ShownText(e.what());
+    const std::string text = PrintableText(e.what());
     return text.empty() ? "an exception without a text" : text;
   } catch (...) {
     return "an exception of unknown type";

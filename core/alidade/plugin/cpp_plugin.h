@@ -6,31 +6,32 @@
 
 #include "alidade/model/build_tag.h"
 
-/// The table of a C++ plugin, which is built against alidade::core. The header of an interface has
-/// the macro that exports implementations of it.
+/// Table of a C++ plugin, which is built against alidade::core. The header of an interface defines
+/// the macro that exports its implementations.
 namespace alidade {
 
-/// The ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if
-/// its number is that of the library. Whoever changes the layout or the meaning of an installed
-/// class or function raises it. The classes of a debug standard library have another layout.
+/// ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if its
+/// number equals that of the library. Increase it with each change of the layout or meaning of an
+/// installed class or function. The classes of a debug standard library have another layout.
 #if defined(_GLIBCXX_DEBUG)
 #define ALIDADE_CPP_ABI "3 with _GLIBCXX_DEBUG"
 #else
 #define ALIDADE_CPP_ABI "3"
 #endif
 
-/// One implementation of an interface that a plugin offers. The loader does not know the type of
-/// the factory: whoever asks for the kind casts it.
+/// Implementation of an interface by a plugin. The loader does not know the type of the factory;
+/// the code that requests the kind casts it.
 struct CppEntry {
-  const char* kind;  ///< the interface, in messages too: `source`
+  const char* kind;  ///< name of the interface, also in messages: `source`
   const char* name;
   const char* doc;
   const char* citation;
-  /// Keys that are not read through Params, one a line: `key  meaning`.
+  /// Keys that are not read through Params, one for each line: `key  meaning`.
   const char* keys;
-  const void* factory;  ///< of the type that the header of the interface states
+  const void* factory;  ///< of the type that the header of the interface defines
 };
 
+/// Table that a C++ plugin exports.
 struct CppPluginTable {
   std::uint32_t struct_size = sizeof(CppPluginTable);
   const CppEntry* entries = nullptr;
@@ -43,7 +44,7 @@ template <std::size_t N>
 struct CppEntries {
   CppEntry entries[N];
 };
-/// The entry of each of the factories, by EntryOf of their type.
+/// Returns the entries of the factories, by the function EntryOf for their type.
 template <class Factory, std::size_t N>
 constexpr CppEntries<N> EntriesOf(const Factory (&factories)[N]) {
   CppEntries<N> result{};

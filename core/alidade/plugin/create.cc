@@ -10,7 +10,7 @@
 
 #include "alidade/base/text.h"
 #include "alidade/plugin/abi_read.h"
-#include "alidade/plugin/given_noise.h"
+#include "alidade/plugin/config_noise.h"
 #include "alidade/plugin/param_reader.h"
 
 namespace alidade {
@@ -19,8 +19,8 @@ namespace {
 using internal::ParamReader;
 using internal::ParamRecorder;
 
-/// The lock of all creation; recursive, for a source may create models. Most creations take some
-/// microseconds: to try again takes less than to sleep.
+/// Locks all creation. The mutex is recursive, because a source may create models. Most creations
+/// last microseconds, so that retrying is cheaper than sleeping.
 std::unique_lock<std::recursive_mutex> LockCreation() {
   static std::recursive_mutex mutex;
   constexpr int kTries = 100;
@@ -33,7 +33,7 @@ std::unique_lock<std::recursive_mutex> LockCreation() {
   return lock;
 }
 
-/// An instance that `create` fills, destroyed unless it is released.
+/// Instance that `create` fills. It is destroyed unless it is released.
 class NewInstance {
  public:
   explicit NewInstance(const PluginEntry& entry) : name_(entry.name), plugin_(entry.plugin) {
@@ -47,34 +47,36 @@ class NewInstance {
   NewInstance(const NewInstance&) = delete;
   NewInstance& operator=(const NewInstance&) = delete;
 
-  /// The code of `create`, that of an error where it threw.
+  /// Returns the code of `create`, or ALIDADE_ERROR if it threw.
   std::int32_t Create(const AlidadeEntry& entry, const AlidadeHost& host) {
     std::int32_t code = ALIDADE_ERROR;
-    thrown_ = internal::ThrownBy([&] { code = entry.create(&host, &c_); });
+    exception_text_ = internal::CatchExceptionText([&] { code = entry.create(&host, &c_); });
     return code;
   }
-  /// What `create` threw, or "".
-  const std::string& thrown() const { return thrown_; }
+  /// Returns the text of the exception of `create`, or "".
+  const std::string& exception_text() const { return exception_text_; }
   std::uint32_t kind() const { return c_.kind; }
   AlidadeInstance Release() { return std::exchange(c_, AlidadeInstance{}); }
 
  private:
-  std::string name_, plugin_, thrown_;
+  std::string name_, plugin_, exception_text_;
   AlidadeInstance c_{};
 };
 
-std::string Named(const PluginEntry& entry) {
+std::string QuotedName(const PluginEntry& entry) {
   return (entry.is_model() ? "model" : entry.kind) + " '" + entry.name + "'";
 }
 
-[[noreturn]] void FailCreation(const PluginEntry& entry, const Node& node, const std::string& why) {
-  throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
-                                           Named(entry) + " of plugin " + entry.plugin.string() +
-                                               " failed while being created: " + why));
+[[noreturn]] void FailCreation(const PluginEntry& entry, const Node& node,
+                               const std::string& reason) {
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        QuotedName(entry) + " of plugin " + entry.plugin.string() +
+                            " failed while being created: " + reason));
 }
 
-std::string Line(const std::string& what, const Space& space) {
-  std::string line = what + ' ' + space.name + ": " + ToString(space.geometry);
+std::string SpaceLine(const std::string& kind, const Space& space) {
+  std::string line = kind + ' ' + space.name + ": " + ToString(space.geometry);
   if (!space.parts.empty()) line += " of " + internal::Join(space.parts);
   if (!space.unit.empty()) line += ", " + space.unit;
   if (!space.doc.empty()) line += "; " + space.doc;
@@ -84,31 +86,31 @@ std::string Line(const std::string& what, const Space& space) {
   return line;
 }
 
-/// What the model says of itself besides its blocks.
+/// Returns a line for each capability of the model.
 std::vector<std::string> Capabilities(const ModelInstance& model) {
-  const auto can = [&](unsigned what) { return (model.capabilities() & what) != 0; };
+  const auto has = [&](unsigned capability) { return (model.capabilities() & capability) != 0; };
   std::vector<std::string> lines = {
       std::string("Jacobians: ") +
-      (can(ALIDADE_ANALYTIC_JACOBIAN) ? "analytic" : "automatic differentiation")};
+      (has(ALIDADE_ANALYTIC_JACOBIAN) ? "analytic" : "automatic differentiation")};
   if (model.c().kind == ALIDADE_KIND_MOTION && model.c().description->noise_count > 0) {
-    lines.emplace_back(can(ALIDADE_DISCRETE_NOISE)
-                           ? "noise: discrete, held from one update to the next"
-                           : "noise: continuous, adds up over steps");
+    lines.emplace_back(has(ALIDADE_DISCRETE_NOISE)
+                           ? "noise: discrete, constant from one update to the next"
+                           : "noise: continuous, independent in each step");
   }
-  if (can(ALIDADE_HAS_VALIDITY)) lines.emplace_back("refuses measurements of no use by itself");
-  if (can(ALIDADE_CAN_INITIALISE)) {
+  if (has(ALIDADE_HAS_VALIDITY)) lines.emplace_back("rejects invalid measurements");
+  if (has(ALIDADE_CAN_INITIALISE)) {
     const AlidadeDescription& description = *model.c().description;
     const auto role = static_cast<std::size_t>(description.initialise_role);
-    const bool landmark = model.spaces()[role].landmark();
-    lines.push_back("can initialise " + (landmark ? "a landmark" : model.spaces()[role].name));
+    const bool is_landmark = model.spaces()[role].landmark();
+    lines.push_back("can initialise " + (is_landmark ? "a landmark" : model.spaces()[role].name));
     if (description.prior_count > 0) {
-      lines.back() += ", given a prior of " + std::to_string(description.prior_count);
+      lines.back() += ", with a prior of size " + std::to_string(description.prior_count);
     }
   }
   return lines;
 }
 
-/// The `keys` of a factory: `key  meaning` on each line.
+/// Parses the `keys` of a factory: `key  meaning` on each line.
 std::vector<ParamInfo> ListedKeys(const std::string& keys) {
   std::vector<ParamInfo> result;
   std::istringstream lines(keys);
@@ -127,8 +129,8 @@ std::vector<ParamInfo> ListedKeys(const std::string& keys) {
 std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const Node& node,
                                                  const std::string& representation) {
   ALIDADE_EXPECTS(entry.is_model());
-  const std::optional<Node> covariance = internal::GivenCovariance(node, entry.model.kind);
-  ParamReader reader(node, Named(entry), representation, covariance.has_value());
+  const std::optional<Node> covariance = internal::FindNoiseCovariance(node, entry.model.kind);
+  ParamReader reader(node, QuotedName(entry), representation, covariance.has_value());
   NewInstance instance(entry);
   std::int32_t code;
   {
@@ -136,27 +138,29 @@ std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const
     code = instance.Create(entry.model, reader.host());
   }
   reader.Check();
-  if (!instance.thrown().empty()) FailCreation(entry, node, "it threw: " + instance.thrown());
+  if (!instance.exception_text().empty())
+    FailCreation(entry, node, "it threw: " + instance.exception_text());
   if (code != ALIDADE_OK) {
-    FailCreation(entry, node, reader.failure().empty() ? "it does not say why" : reader.failure());
+    FailCreation(entry, node,
+                 reader.failure().empty() ? "it did not report a reason" : reader.failure());
   }
   if (!reader.failure().empty()) node.Fail(reader.failure());
   if (instance.kind() != entry.model.kind)
-    FailCreation(entry, node, "it is not what its table says");
+    FailCreation(entry, node, "its kind differs from the kind in the plugin's table");
   auto model =
       std::make_shared<ModelInstance>(instance.Release(), entry.name, entry.plugin.string());
-  if (covariance) model->GiveNoise(internal::RootForModel(*covariance, *model));
+  if (covariance) model->SetNoise(internal::ReadNoiseRoot(*covariance, *model));
   return model;
 }
 
 void CallFactory(const PluginEntry& entry, const Node& node,
                  const std::function<bool(Params&)>& call) {
-  ParamReader reader(node, Named(entry));
+  ParamReader reader(node, QuotedName(entry));
   Params params(&reader.host());
-  bool made = false;
+  bool is_created = false;
   try {
     const auto lock = LockCreation();
-    made = call(params);
+    is_created = call(params);
   } catch (const Error&) {
     reader.Check();
     throw;
@@ -171,7 +175,7 @@ void CallFactory(const PluginEntry& entry, const Node& node,
   }
   reader.Check();
   if (!reader.failure().empty()) node.Fail(reader.failure());
-  if (!made) FailCreation(entry, node, "it gives nothing");
+  if (!is_created) FailCreation(entry, node, "it did not create an object");
 }
 
 std::vector<ParamInfo> ModelSchema(const PluginEntry& entry) {
@@ -194,7 +198,7 @@ std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
     try {
       call(params);
     } catch (...) {
-      // It wants a file, say, that stand-ins do not give; what it read before counts.
+      // The factory may need a file that does not exist. The parameters read before are valid.
     }
   });
   std::vector<ParamInfo> result = ListedKeys(entry.keys);
@@ -209,14 +213,15 @@ std::vector<std::string> DescribeModel(const PluginEntry& entry) {
   const auto lock = LockCreation();
   if (instance.Create(entry.model, recorder.host()) != ALIDADE_OK) return {};
   const ModelInstance model(instance.Release(), entry.name, entry.plugin.string());
-  const bool sensor = entry.kind == kSensorKind;
+  const bool is_sensor = entry.kind == kSensorKind;
   std::vector<std::string> lines;
-  for (const Space& space : model.spaces()) lines.push_back(Line(sensor ? "role" : "block", space));
+  for (const Space& space : model.spaces())
+    lines.push_back(SpaceLine(is_sensor ? "role" : "block", space));
   if (!model.space().name.empty()) {
-    lines.push_back(Line(sensor ? "measurement" : "input", model.space()));
+    lines.push_back(SpaceLine(is_sensor ? "measurement" : "input", model.space()));
   }
   if (!model.known().name.empty()) {
-    lines.push_back(Line("known with each measurement", model.known()));
+    lines.push_back(SpaceLine("known with each measurement", model.known()));
   }
   std::ranges::copy(Capabilities(model), std::back_inserter(lines));
   return lines;

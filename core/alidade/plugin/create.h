@@ -10,27 +10,28 @@
 #include "alidade/plugin/model_instance.h"
 #include "alidade/plugin/plugin_host.h"
 
-/// Creation of what plugins offer, by the entries of a PluginHost. Safe from several threads: the
-/// code of plugins is called by one at a time.
+/// Creation of models and other objects by the entries of a PluginHost. Thread-safe: only one
+/// thread at a time calls plugin code.
 namespace alidade {
 
-/// A model from its config entry `node`: reads its parameters there, leaving unread keys to
-/// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
-/// sensor that has this choice; "": as it is written. Errors: kPlugin, kBadConfig.
+/// Creates a model from its config entry `node`, whose unread keys are left to Node::RejectUnread.
+/// `representation` replaces the parameter `landmarks.representation` of a sensor that has this
+/// choice, unless it is "". Errors: kPlugin, kBadConfig.
 std::shared_ptr<const ModelInstance> CreateModel(const PluginEntry& entry, const Node& node,
                                                  const std::string& representation = {});
-/// The parameters of a model, found by creating it with stand-in values, each choice in turn.
+/// Returns the parameters of a model, found by creating it with stand-in values, each choice in
+/// turn.
 std::vector<ParamInfo> ModelSchema(const PluginEntry& entry);
-/// Roles, measurement or blocks of a model with stand-in parameters, and its capabilities, a line
-/// each; of a factory none.
+/// Returns a line for each role, measurement or block of a model with stand-in parameters, and for
+/// each of its capabilities. Returns an empty list for a factory.
 std::vector<std::string> DescribeModel(const PluginEntry& entry);
 
-/// Runs `call`, which calls the factory of `entry` with the parameters in `node` and returns
-/// whether it made something. Errors: those of the parameters before those of the factory, kPlugin
-/// for anything else that it throws.
+/// Runs `call`, which calls the factory of `entry` with the parameters in `node` and returns true
+/// if the factory created an object. Errors: those of the parameters before those of the factory;
+/// kPlugin for any other exception.
 void CallFactory(const PluginEntry& entry, const Node& node,
                  const std::function<bool(Params&)>& call);
-/// The keys of a factory, and the parameters that `call` reads with stand-in values.
+/// Returns the keys of a factory, and the parameters that `call` reads with stand-in values.
 std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
                                      const std::function<void(Params&)>& call);
 

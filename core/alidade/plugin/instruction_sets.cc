@@ -15,21 +15,21 @@ namespace alidade::internal {
 namespace {
 
 enum Register { kEax, kEbx, kEcx, kEdx };
-/// Registers that the operating system has to save, by the bits of XCR0.
+/// Registers that the operating system must save, as bits of XCR0.
 enum : std::uint32_t { kNothing = 0, kYmm = 0x6, kZmm = 0xe6 };
 
-/// Where cpuid tells of one: leaf and subleaf, register, bit.
+/// Position of an instruction set in the output of cpuid: leaf and subleaf, register, bit.
 struct InstructionSet {
   std::uint32_t isa;
   const char* name;
   std::uint32_t leaf, subleaf;
-  Register in;
+  Register output;
   int bit;
   std::uint32_t saved = kNothing;
 };
 
 constexpr std::uint32_t kExtended = 0x80000001u;
-/// Those of one leaf on end.
+/// Sorted by leaf.
 constexpr InstructionSet kKnown[] = {
     {ALIDADE_ISA_SSE3, "SSE3", 1, 0, kEcx, 0},
     {ALIDADE_ISA_SSSE3, "SSSE3", 1, 0, kEcx, 9},
@@ -62,30 +62,31 @@ constexpr InstructionSet kKnown[] = {
 };
 
 #if defined(__x86_64__)
-/// XCR0; 0 where the operating system does not tell.
+/// Returns XCR0, or 0 if the operating system does not provide it.
 std::uint32_t SavedRegisters() {
   std::uint32_t a = 0, b = 0, c = 0, d = 0;
-  constexpr std::uint32_t kTells = 1u << 27;
-  if (__get_cpuid(1, &a, &b, &c, &d) == 0 || (c & kTells) == 0) return 0;
+  constexpr std::uint32_t kOsxsave = 1u << 27;
+  if (__get_cpuid(1, &a, &b, &c, &d) == 0 || (c & kOsxsave) == 0) return 0;
   std::uint32_t low = 0, high = 0;
   __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
   return low;
 }
 
-/// Each leaf is asked for once: a virtual machine asks its host each time.
-std::uint32_t AskProcessor() {
+/// Reads the instruction sets from the processor. It reads each leaf once, because cpuid is slow in
+/// a virtual machine.
+std::uint32_t ReadInstructionSets() {
   const std::uint32_t saved = SavedRegisters();
   std::uint32_t isa = 0, registers[4] = {};
   const InstructionSet* last = nullptr;
   for (const InstructionSet& set : kKnown) {
     if (last == nullptr || last->leaf != set.leaf || last->subleaf != set.subleaf) {
-      std::ranges::fill(registers, 0u);  // what a processor without the leaf leaves
+      std::ranges::fill(registers, 0u);  // remains zero if the processor lacks the leaf
       __get_cpuid_count(set.leaf, set.subleaf, &registers[kEax], &registers[kEbx], &registers[kEcx],
                         &registers[kEdx]);
     }
     last = &set;
-    const bool has = (registers[set.in] >> set.bit & 1u) != 0;
-    if (has && (saved & set.saved) == set.saved) isa |= set.isa;
+    const bool is_supported = (registers[set.output] >> set.bit & 1u) != 0;
+    if (is_supported && (saved & set.saved) == set.saved) isa |= set.isa;
   }
   return isa;
 }
@@ -95,8 +96,8 @@ std::uint32_t AskProcessor() {
 
 std::uint32_t InstructionSetsOfProcessor() {
 #if defined(__x86_64__)
-  static const std::uint32_t all = AskProcessor();
-  return all;
+  static const std::uint32_t isa = ReadInstructionSets();
+  return isa;
 #else
   return 0;
 #endif

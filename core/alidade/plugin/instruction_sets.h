@@ -4,13 +4,14 @@
 #include <cstdint>
 #include <string>
 
-/// What this processor can run, in the bits ALIDADE_ISA_* of plugin_abi.h.
+/// Instruction sets of this processor, as the bits ALIDADE_ISA_* of plugin_abi.h.
 namespace alidade::internal {
 
-/// Those that it has and the operating system saves the registers of.
+/// Returns the instruction sets that the processor has and whose registers the operating system
+/// saves.
 std::uint32_t InstructionSetsOfProcessor();
 
-/// `AVX2, FMA`; of a bit that this version does not know its number.
+/// Returns the names of instruction sets, `AVX2, FMA`. An unknown bit is named by its number.
 std::string InstructionSetNames(std::uint32_t isa);
 
 }  // namespace alidade::internal

@@ -9,21 +9,21 @@
 
 namespace alidade::internal {
 
-/// A plugin that is open for the rest of the process.
-struct OpenedPlugin {
+/// Plugin that stays loaded for the rest of the process.
+struct LoadedPlugin {
   std::filesystem::path file;       ///< canonical
   const AlidadeTable* table;        ///< of a C-ABI plugin, else null
   const CppPluginTable* cpp_table;  ///< of a C++ plugin, else null
 };
 
-/// Checks trust and build tag, opens the plugin and checks its table. `canonical` is `file` with
+/// Checks trust and build tag, loads the plugin and checks its table. `canonical` is `file` with
 /// its symbolic links resolved. Errors: kPlugin, kNotTrusted.
-OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
+LoadedPlugin LoadPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
-/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` next to this library,
-/// and returns the factory of its first entry, of the kind `kind`. Errors: kPlugin if there is no
-/// plugin, made of `missing` and where it was searched, or more than one, or one of another kind;
-/// those of OpenPlugin.
+/// Loads the only plugin in `folder`, or in `lib/alidade/NAME` next to this library if `folder` is
+/// "". Returns the factory of its first entry, which is of the kind `kind`. Errors: those of
+/// LoadPlugin; kPlugin if the folder contains no plugin (`missing` with the searched folder), more
+/// than one plugin, or one of another kind.
 const void* FactoryOnDemand(const std::string& kind, const std::string& name,
                             const std::filesystem::path& folder, const std::string& missing);
 

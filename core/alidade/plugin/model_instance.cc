@@ -14,8 +14,8 @@
 namespace alidade {
 namespace {
 
+using internal::PrintableText;
 using internal::ReadPrefix;
-using internal::ShownText;
 using internal::Text;
 
 constexpr int kMaxSize = ALIDADE_MAX_SIZE;
@@ -41,70 +41,70 @@ Geometry GeometryOf(const AlidadeSpace& space) {
   return Geometry::Product(std::move(parts));
 }
 
-/// Whether the sizes are those of a geometry that this version knows.
-bool KnownGeometry(const AlidadeSpace& space) {
-  const auto is = [&](const Geometry& g) {
+/// Returns true if geometry and sizes are known to this version.
+bool IsKnownGeometry(const AlidadeSpace& space) {
+  const auto has_sizes_of = [&](const Geometry& g) {
     return space.ambient == g.ambient && space.tangent == g.tangent;
   };
   switch (space.geometry) {
     case ALIDADE_VECTOR:
       return space.ambient >= 1 && space.ambient <= kMaxSize && space.tangent == space.ambient;
     case ALIDADE_ANGLE:
-      return is(Geometry::Angle());
+      return has_sizes_of(Geometry::Angle());
     case ALIDADE_UNIT_QUATERNION:
-      return is(Geometry::UnitQuaternion());
+      return has_sizes_of(Geometry::UnitQuaternion());
     case ALIDADE_UNIT_VECTOR:
-      return is(Geometry::UnitVector());
+      return has_sizes_of(Geometry::UnitVector());
     case ALIDADE_PRODUCT:
-      return space.ambient <= kMaxSize && is(GeometryOf(space));
+      return space.ambient <= kMaxSize && has_sizes_of(GeometryOf(space));
     default:
       return false;
   }
 }
 
-/// What is wrong with `space`, or "".
-std::string Defect(const AlidadeSpace& space);
+/// Returns the rule that `space` breaks, or "".
+std::string SpaceDefect(const AlidadeSpace& space);
 
-/// The same of the parts of one.
-std::string DefectOfParts(const AlidadeSpace& space) {
+/// Returns the rule that the parts of `space` break, or "".
+std::string PartsDefect(const AlidadeSpace& space) {
   const bool is_product = space.geometry == ALIDADE_PRODUCT;
   if (!is_product && (space.parts != nullptr || space.part_count != 0)) {
-    return "has parts, but is no product";
+    return "has parts, but is not a product";
   }
   if (!is_product) return {};
   if (space.parts == nullptr || space.part_count < 1 || space.part_count > ALIDADE_MAX_ROLES ||
-      !internal::GoodStride<AlidadeSpace>(space.part_stride)) {
+      !internal::IsValidStride<AlidadeSpace>(space.part_stride)) {
     return "does not describe the parts of its product";
   }
-  if (!Text(space.elements).empty()) return "names its elements, which are those of its parts";
+  if (!Text(space.elements).empty()) return "names its elements, although its parts name them";
   for (std::size_t i = 0; i < space.part_count; ++i) {
     const AlidadeSpace part = PartOf(space, i);
-    const std::string which = "has a part '" + ShownText(part.name) + "' that ";
-    if (part.geometry == ALIDADE_PRODUCT) return which + "is a product";
-    if (part.flags != 0) return which + "has flags";
-    const std::string defect = Defect(part);
-    if (!defect.empty()) return which + defect;
+    const std::string prefix = "has a part '" + PrintableText(part.name) + "' that ";
+    if (part.geometry == ALIDADE_PRODUCT) return prefix + "is a product";
+    if (part.flags != 0) return prefix + "has flags";
+    const std::string defect = SpaceDefect(part);
+    if (!defect.empty()) return prefix + defect;
     for (std::size_t j = 0; j < i; ++j) {
-      if (Text(PartOf(space, j).name) == Text(part.name)) return "has two parts of one name";
+      if (Text(PartOf(space, j).name) == Text(part.name)) return "has two parts of the same name";
     }
   }
   return {};
 }
 
-std::string Defect(const AlidadeSpace& space) {
+std::string SpaceDefect(const AlidadeSpace& space) {
   if (Text(space.name).empty()) return "has no name";
-  if (!internal::GoodName(space.name)) return "has a name that is none";
+  if (!internal::IsValidName(space.name)) return "has an invalid name";
   const std::pair<const char*, const char*> texts[] = {
       {"unit", space.unit}, {"elements", space.elements}, {"doc", space.doc}};
-  for (const auto& [what, text] : texts) {
+  for (const auto& [member, text] : texts) {
     const std::string defect = internal::TextDefect(text);
-    if (!defect.empty()) return std::string("has a text '") + what + "' that " + defect;
+    if (!defect.empty()) return std::string("has a text '") + member + "' that " + defect;
   }
   const std::string unknown = internal::UnknownBits(space.flags, kKnownRoleFlags);
   if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
   if (space.reserved0 != 0 || !internal::AllZero(space.reserved)) return kReserved;
-  if (std::string defect = DefectOfParts(space); !defect.empty()) return defect;
-  if (!KnownGeometry(space)) {
+  if (std::string defect = PartsDefect(space); !defect.empty()) return defect;
+  if (!IsKnownGeometry(space)) {
     return "has geometry " + std::to_string(space.geometry) + " with sizes " +
            std::to_string(space.ambient) + " and " + std::to_string(space.tangent) +
            ", which this version does not know";
@@ -114,31 +114,31 @@ std::string Defect(const AlidadeSpace& space) {
     return "names its elements '" + elements + "', but has " + std::to_string(space.ambient);
   }
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
-    return "is shared, but not a landmark's";
+    return "is shared, but is not a landmark role";
   }
   if ((space.flags & ALIDADE_ROLE_CLONE) != 0) {
-    return std::string("is of an earlier timestamp") + kUnsupported;
+    return std::string("is the value at an earlier timestamp") + kUnsupported;
   }
   if (space.owned != nullptr && (space.flags & ALIDADE_ROLE_OWNED) == 0) {
-    return "has a prior and dynamics, but is no state of its model";
+    return "has a prior and dynamics, but is not a state of its model";
   }
   return {};
 }
 
-Space ToSpace(const AlidadeSpace& from) {
+Space ToSpace(const AlidadeSpace& source) {
   Space space;
-  space.name = Text(from.name);
-  space.unit = Text(from.unit);
-  space.doc = Text(from.doc);
-  const std::string elements = Text(from.elements);
-  space.geometry = GeometryOf(from);
-  space.flags = from.flags;
-  if (from.geometry != ALIDADE_PRODUCT) {
+  space.name = Text(source.name);
+  space.unit = Text(source.unit);
+  space.doc = Text(source.doc);
+  const std::string elements = Text(source.elements);
+  space.geometry = GeometryOf(source);
+  space.flags = source.flags;
+  if (source.geometry != ALIDADE_PRODUCT) {
     space.elements = internal::ElementsOf(elements, space.geometry);
     return space;
   }
-  for (std::size_t i = 0; i < from.part_count; ++i) {
-    const Space part = ToSpace(PartOf(from, i));
+  for (std::size_t i = 0; i < source.part_count; ++i) {
+    const Space part = ToSpace(PartOf(source, i));
     space.parts.push_back(part.name);
     for (const std::string& name : ColumnNames(part.name, part)) space.elements.push_back(name);
   }
@@ -149,16 +149,16 @@ Space ToSpace(const AlidadeSpace& from) {
 
 void internal::DestroyInstance(const AlidadeInstance& instance, const std::string& name,
                                const std::string& plugin) noexcept {
-  const std::string thrown = ThrownBy([&] { instance.destroy(instance.self); });
-  if (thrown.empty()) return;
+  const std::string exception_text = CatchExceptionText([&] { instance.destroy(instance.self); });
+  if (exception_text.empty()) return;
   Log(LogLevel::kWarning,
-      "Destroy of model '" + name + "' of plugin " + plugin + " threw: " + thrown);
+      "Destroy of model '" + name + "' of plugin " + plugin + " threw: " + exception_text);
 }
 
 ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin)
     : instance_(ReadPrefix(&instance)), name_(std::move(name)), plugin_(std::move(plugin)) {
   if (instance_.self == nullptr || instance_.destroy == nullptr) {
-    Refuse("was created without an object or without a way to destroy it");
+    Refuse("was created without an object or a function that destroys it");
   }
   try {
     if (!internal::AllZero(instance_.reserved)) Refuse(kReserved);
@@ -172,8 +172,8 @@ ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, 
 
 ModelInstance::~ModelInstance() { internal::DestroyInstance(instance_, name_, plugin_); }
 
-void ModelInstance::Refuse(const std::string& why) const {
-  throw Error(ExitCode::kPlugin, ErrorLine({plugin_}, {}, "model '" + name_ + "' " + why));
+void ModelInstance::Refuse(const std::string& reason) const {
+  throw Error(ExitCode::kPlugin, ErrorLine({plugin_}, {}, "model '" + name_ + "' " + reason));
 }
 
 void ModelInstance::ReadCalls() {
@@ -205,9 +205,9 @@ void ModelInstance::ReadDescription() {
     if (description_.output == nullptr) Refuse("does not describe its measurement");
     space_ = ReadSpace(ReadPrefix(description_.output), "the measurement");
     if (description_.known != nullptr) {
-      known_ = ReadSpace(ReadPrefix(description_.known), "what comes with a measurement");
+      known_ = ReadSpace(ReadPrefix(description_.known), "the known quantity");
       if (known_.geometry.kind != GeometryKind::kVector) {
-        Refuse(": what comes with a measurement is no vector");
+        Refuse(": the known quantity is not a vector");
       }
     }
   } else if (has_input()) {
@@ -217,7 +217,7 @@ void ModelInstance::ReadDescription() {
   const int y = description_.initialise_role;
   if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
       (y < 0 || y >= std::ssize(spaces_) || sensor_.initialise == nullptr)) {
-    Refuse("says that it can initialise, but not what or how");
+    Refuse("claims to initialise a role, but does not define the role or the function");
   }
   if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
     Refuse("states a prior of size " + std::to_string(description_.prior_count));
@@ -227,17 +227,17 @@ void ModelInstance::ReadDescription() {
   }
 }
 
-/// Refuses what has to be understood and is not, and what is understood but not done.
+/// Refuses capabilities that this version does not know or does not support.
 void ModelInstance::CheckSupported() const {
   const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
   const std::string unknown = internal::UnknownBits(capabilities_, kKnownCapabilities);
   if (!unknown.empty()) Refuse("has capabilities that this version does not know: " + unknown);
   if (description_.reserved0 != 0 || !internal::AllZero(description_.reserved)) Refuse(kReserved);
   if ((capabilities_ & ALIDADE_RESIDUAL_ONLY) != 0 || description_.residual != nullptr) {
-    Refuse(std::string("gives a residual alone") + kUnsupported);
+    Refuse(std::string("only provides a residual") + kUnsupported);
   }
   if ((capabilities_ & ALIDADE_NEEDS_PAYLOAD) != 0) {
-    Refuse(std::string("needs what comes beside a measurement") + kUnsupported);
+    Refuse(std::string("needs the payload of a measurement") + kUnsupported);
   }
   if (is_sensor) {
     if (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr) {
@@ -247,7 +247,7 @@ void ModelInstance::CheckSupported() const {
     Refuse("has " + std::to_string(description_.input_count) + " control inputs" + kUnsupported);
   } else if (description_.input_count == 1 &&
              (description_.inputs == nullptr ||
-              !internal::GoodStride<AlidadeSpace>(description_.input_stride))) {
+              !internal::IsValidStride<AlidadeSpace>(description_.input_stride))) {
     Refuse("does not describe its control input");
   }
 }
@@ -257,17 +257,17 @@ void ModelInstance::ReadRoles() {
   if (count < 1 || count > kMaxRoles || description_.roles == nullptr) {
     Refuse("has " + std::to_string(count) + " roles; 1 to 64 are allowed");
   }
-  if (!internal::GoodStride<AlidadeSpace>(description_.role_stride)) {
+  if (!internal::IsValidStride<AlidadeSpace>(description_.role_stride)) {
     Refuse("states a role stride of " + std::to_string(description_.role_stride) + " bytes");
   }
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
-    spaces_.push_back(ReadSpace(role, "role '" + ShownText(role.name) + "'"));
+    spaces_.push_back(ReadSpace(role, "role '" + PrintableText(role.name) + "'"));
     if (role.owned != nullptr) {
       ReadOwned(ReadPrefix(role.owned), spaces_.back(), static_cast<std::size_t>(i));
     }
     if (role.geometry == ALIDADE_PRODUCT) {
-      Refuse(": role '" + spaces_.back().name + "' is a product: each part is a role of its own");
+      Refuse(": role '" + spaces_.back().name + "' is a product; expected a role for each part");
     }
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
     if (std::count_if(spaces_.begin(), spaces_.end(), same) > 1) {
@@ -277,43 +277,43 @@ void ModelInstance::ReadRoles() {
 }
 
 void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std::size_t index) {
-  const std::string what = ": the prior or dynamics of role '" + role.name + "' ";
-  if (instance_.kind != ALIDADE_KIND_SENSOR) Refuse(what + "are a motion model's own affair");
-  if (role.landmark()) Refuse(what + "are those of a landmark");
+  const std::string subject = ": the prior or dynamics of role '" + role.name + "' ";
+  if (instance_.kind != ALIDADE_KIND_SENSOR) Refuse(subject + "belong to a motion model");
+  if (role.landmark()) Refuse(subject + "belong to a landmark");
   if (!internal::AllZero(owned.reserved)) Refuse(kReserved);
   if (owned.dynamics > ALIDADE_GAUSS_MARKOV) {
-    Refuse(what + "are of kind " + std::to_string(owned.dynamics));
+    Refuse(subject + "are of kind " + std::to_string(owned.dynamics));
   }
   const auto n = static_cast<std::size_t>(role.geometry.tangent);
-  const auto read = [](const double* from, std::size_t size) {
-    return from == nullptr ? std::vector<double>() : std::vector<double>(from, from + size);
+  const auto read = [](const double* values, std::size_t size) {
+    return values == nullptr ? std::vector<double>() : std::vector<double>(values, values + size);
   };
-  OwnedRole own{read(owned.mean, static_cast<std::size_t>(role.geometry.ambient)),
-                read(owned.sqrt_prior, n * n), static_cast<OwnedDynamics>(owned.dynamics),
-                read(owned.sqrt_density, n * n), owned.time_constant_s};
-  const std::string defect = internal::CheckOwned(role.geometry, own);
-  if (!defect.empty()) Refuse(what + defect);
-  owned_[index] = std::move(own);
+  OwnedRole prior{read(owned.mean, static_cast<std::size_t>(role.geometry.ambient)),
+                  read(owned.sqrt_prior, n * n), static_cast<OwnedDynamics>(owned.dynamics),
+                  read(owned.sqrt_density, n * n), owned.time_constant_s};
+  const std::string defect = internal::CheckOwned(role.geometry, prior);
+  if (!defect.empty()) Refuse(subject + defect);
+  owned_[index] = std::move(prior);
 }
 
-void ModelInstance::GiveNoise(std::vector<double> root) {
-  const bool sensor = instance_.kind == ALIDADE_KIND_SENSOR;
-  const int n = sensor ? space_.geometry.tangent : description_.noise_count;
+void ModelInstance::SetNoise(std::vector<double> root) {
+  const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
+  const int n = is_sensor ? space_.geometry.tangent : description_.noise_count;
   ALIDADE_EXPECTS(std::ssize(root) == std::ptrdiff_t{n} * n);
-  given_noise_ = std::move(root);
+  noise_root_ = std::move(root);
 }
 
-Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& what) const {
-  const std::string defect = Defect(space);
-  if (!defect.empty()) Refuse(": " + what + ' ' + defect);
+Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& subject) const {
+  const std::string defect = SpaceDefect(space);
+  if (!defect.empty()) Refuse(": " + subject + ' ' + defect);
   return ToSpace(space);
 }
 
 std::string ModelInstance::error_text() const {
   if (instance_.error_text == nullptr) return "";
   std::string text;
-  const std::string failure =
-      internal::ThrownBy([&] { text = ShownText(instance_.error_text(instance_.self)); });
+  const std::string failure = internal::CatchExceptionText(
+      [&] { text = PrintableText(instance_.error_text(instance_.self)); });
   return failure.empty()
              ? text
              : "error_text of model '" + name_ + "' of plugin " + plugin_ + " threw: " + failure;

@@ -19,18 +19,19 @@ namespace alidade::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kExact = 9007199254740992.0;  // up to here a double has all integers
+/// A double represents all integers up to this magnitude.
+constexpr double kMaxExactInteger = 9007199254740992.0;
 
 std::string RangeText(const AlidadeParam& param) {
-  const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
-  const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
-  const bool bounded_below = param.low > -kInfinity, bounded_above = param.high < kInfinity;
-  if (bounded_below && bounded_above) {
-    return (low_open ? "(" : "[") + NumberText(param.low) + ", " + NumberText(param.high) +
-           (high_open ? ")" : "]");
+  const bool is_low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
+  const bool is_high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
+  const bool has_lower_bound = param.low > -kInfinity, has_upper_bound = param.high < kInfinity;
+  if (has_lower_bound && has_upper_bound) {
+    return (is_low_open ? "(" : "[") + NumberText(param.low) + ", " + NumberText(param.high) +
+           (is_high_open ? ")" : "]");
   }
-  if (bounded_below) return (low_open ? "> " : ">= ") + NumberText(param.low);
-  if (bounded_above) return (high_open ? "< " : "<= ") + NumberText(param.high);
+  if (has_lower_bound) return (is_low_open ? "> " : ">= ") + NumberText(param.low);
+  if (has_upper_bound) return (is_high_open ? "< " : "<= ") + NumberText(param.high);
   return {};
 }
 
@@ -45,8 +46,8 @@ std::string ValueText(const AlidadeParam& param, double value) {
   if (param.kind == ALIDADE_PARAM_FLAG) return value != 0.0 ? "true" : "false";
   if ((param.flags & ALIDADE_PARAM_OR_NONE) != 0 && value == kInfinity) return "none";
   if (param.kind != ALIDADE_PARAM_CHOICE) return NumberText(value);
-  const bool known = value >= 0.0 && value < param.choice_count;
-  return known ? Text(param.choices[static_cast<int>(value)]) : "";
+  const bool is_known = value >= 0.0 && value < param.choice_count;
+  return is_known ? Text(param.choices[static_cast<int>(value)]) : "";
 }
 
 std::vector<double> Fallback(const AlidadeParam& param) {
@@ -58,21 +59,21 @@ bool HasFallback(const AlidadeParam& param) {
   return (param.flags & ALIDADE_PARAM_HAS_DEFAULT) != 0;
 }
 
-/// Whether it is a standard deviation of the noise, by its name.
+/// Returns true if the name is that of a standard deviation of the noise.
 bool IsNoise(const AlidadeParam& param) {
   const std::string_view key = param.key;
   return param.kind == ALIDADE_PARAM_NUMBER &&
          (key.starts_with("sigma_") || key.starts_with("noise."));
 }
 
-/// Its default, or else values within its range.
+/// Returns the default of the parameter, or else values within its range.
 std::vector<double> StandIn(const AlidadeParam& param) {
   if (HasFallback(param) && param.count > 0) return Fallback(param);
-  const bool bounded_below = param.low > -kInfinity, bounded_above = param.high < kInfinity;
+  const bool has_lower_bound = param.low > -kInfinity, has_upper_bound = param.high < kInfinity;
   double value = 0.0;
-  if (bounded_below) value = param.low + 1.0;
-  if (bounded_above) value = param.high - 1.0;
-  if (bounded_below && bounded_above) value = 0.5 * (param.low + param.high);
+  if (has_lower_bound) value = param.low + 1.0;
+  if (has_upper_bound) value = param.high - 1.0;
+  if (has_lower_bound && has_upper_bound) value = 0.5 * (param.low + param.high);
   return std::vector<double>(static_cast<std::size_t>(std::max(param.count, 1)), value);
 }
 
@@ -101,42 +102,42 @@ ParamInfo Describe(const AlidadeParam& param) {
   info.unit = Text(param.unit);
   info.doc = Text(param.doc);
   info.type = TypeText(param);
-  const bool number = param.kind == ALIDADE_PARAM_NUMBER || param.kind == ALIDADE_PARAM_INTEGER;
-  if (number) info.range = RangeText(param);
+  const bool is_number = param.kind == ALIDADE_PARAM_NUMBER || param.kind == ALIDADE_PARAM_INTEGER;
+  if (is_number) info.range = RangeText(param);
   if ((param.flags & ALIDADE_PARAM_OR_NONE) != 0) info.range += " or none";
   info.fallback = FallbackText(param);
   info.choices = Choices(param);
   return info;
 }
 
-/// Whether the defaults are there that it says it has; that of a choice is one of its names, that
-/// of a number lies in its range.
-bool GoodFallback(const AlidadeParam& param) {
+/// Returns true if the default exists as declared and is valid: one of the names of a choice, or a
+/// number within the range.
+bool IsValidFallback(const AlidadeParam& param) {
   if (!HasFallback(param) || param.count < 0) return true;
   if (IsText(param)) return TextDefect(param.fallback_text).empty();
   if (param.fallback == nullptr) return false;
   return std::all_of(param.fallback, param.fallback + param.count, [&](double value) {
     if (param.kind == ALIDADE_PARAM_CHOICE) return value >= 0.0 && value < param.choice_count;
-    const bool whole = value == std::trunc(value) && std::abs(value) <= kExact;
-    if (param.kind == ALIDADE_PARAM_INTEGER && !whole) return false;
-    const bool none = value == kInfinity && (param.flags & ALIDADE_PARAM_OR_NONE) != 0;
-    return none || (value >= param.low && value <= param.high);
+    const bool is_integer = value == std::trunc(value) && std::abs(value) <= kMaxExactInteger;
+    if (param.kind == ALIDADE_PARAM_INTEGER && !is_integer) return false;
+    const bool is_none = value == kInfinity && (param.flags & ALIDADE_PARAM_OR_NONE) != 0;
+    return is_none || (value >= param.low && value <= param.high);
   });
 }
 
-/// A name, or several with a dot between them.
-bool GoodKey(const char* key) {
-  if (!GoodName(key)) return false;
+/// Returns true for a name, or several names separated by dots.
+bool IsValidKey(const char* key) {
+  if (!IsValidName(key)) return false;
   const std::string_view text = key;
   return text.front() != '.' && text.back() != '.' && text.find("..") == text.npos;
 }
 
-/// What breaks the rules of plugin_abi.h in a parameter, or "".
+/// Returns the rule of plugin_abi.h that a parameter breaks, or "".
 std::string ParamDefect(const AlidadeParam& param) {
   constexpr std::uint32_t kFlags = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
                                    ALIDADE_PARAM_HIGH_OPEN | ALIDADE_PARAM_OR_NONE;
-  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
-  if (!GoodKey(param.key)) return "its key is no name";
+  const bool is_choice = param.kind == ALIDADE_PARAM_CHOICE;
+  if (!IsValidKey(param.key)) return "its key is not a valid name";
   if (param.kind == ALIDADE_PARAM_FILE) return "it is a file";
   if (param.kind < ALIDADE_PARAM_NUMBER || param.kind > ALIDADE_PARAM_TEXT) {
     return "its kind is " + std::to_string(param.kind);
@@ -149,7 +150,7 @@ std::string ParamDefect(const AlidadeParam& param) {
     if (!defect.empty()) return "its unit or doc " + defect;
   }
   const bool has_choices = param.choices != nullptr && param.choice_count > 0;
-  if (choice != has_choices || (!choice && param.choice_count != 0) ||
+  if (is_choice != has_choices || (!is_choice && param.choice_count != 0) ||
       param.choice_count > ALIDADE_MAX_CHOICES) {
     return "it has " + std::to_string(param.choice_count) + " choices";
   }
@@ -157,47 +158,47 @@ std::string ParamDefect(const AlidadeParam& param) {
     const std::string defect = TextDefect(param.choices[i]);
     if (!defect.empty()) return "a choice " + defect;
   }
-  if (param.count == 0 || param.count < -1 || ((choice || IsText(param)) && param.count != 1)) {
+  if (param.count == 0 || param.count < -1 || ((is_choice || IsText(param)) && param.count != 1)) {
     return "its count is " + std::to_string(param.count);
   }
   if (!(param.low <= param.high)) return "its range is empty";
-  return GoodFallback(param) ? "" : "its default is none";
+  return IsValidFallback(param) ? "" : "its default is invalid";
 }
 
-/// The parameter, where it follows the rules of plugin_abi.h and there is room for it; else an
-/// exception.
-AlidadeParam Checked(const AlidadeParam* from, bool text, bool room) {
-  if (from == nullptr) throw Error(ExitCode::kPlugin, "asks for no parameter at all");
-  const AlidadeParam param = ReadPrefix(from);
+/// Returns a copy of a requested parameter. Throws if it breaks the rules of plugin_abi.h, or does
+/// not fit the function or the capacity of the request.
+AlidadeParam CheckParam(const AlidadeParam* source, bool reads_text, bool has_capacity) {
+  if (source == nullptr) throw Error(ExitCode::kPlugin, "requests a null parameter");
+  const AlidadeParam param = ReadPrefix(source);
   std::string defect = ParamDefect(param);
-  if (defect.empty() && (text != IsText(param) || !room))
-    defect = "it is asked for as another kind";
+  if (defect.empty() && (reads_text != IsText(param) || !has_capacity))
+    defect = "it is requested as another kind";
   if (!defect.empty()) {
-    throw Error(ExitCode::kPlugin,
-                "asks for parameter '" + (GoodName(param.key) ? std::string(param.key) : "") +
-                    "' in a way that this version does not understand: " + defect);
+    throw Error(ExitCode::kPlugin, "requests parameter '" +
+                                       (IsValidName(param.key) ? std::string(param.key) : "") +
+                                       "' in a way that this version does not support: " + defect);
   }
   return param;
 }
 
-/// The same of one that is read into `values`.
-AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_t capacity) {
-  const bool room = values != nullptr && from != nullptr && from->count <= capacity;
-  return Checked(from, false, room);
+/// Checks a parameter that is read into `values`.
+AlidadeParam CheckParam(const AlidadeParam* source, const double* values, std::int32_t capacity) {
+  const bool has_capacity = values != nullptr && source != nullptr && source->count <= capacity;
+  return CheckParam(source, false, has_capacity);
 }
 
-/// The same of one that is read into `text`.
-AlidadeParam Checked(const AlidadeParam* from, const char* text, std::int32_t capacity) {
-  return Checked(from, true, text != nullptr && capacity > ALIDADE_MAX_TEXT);
+/// Checks a parameter that is read into `text`.
+AlidadeParam CheckParam(const AlidadeParam* source, const char* text, std::int32_t capacity) {
+  return CheckParam(source, true, text != nullptr && capacity > ALIDADE_MAX_TEXT);
 }
 
-/// Copies `from`, of at most ALIDADE_MAX_TEXT bytes; its length.
-std::int32_t Put(const std::string& from, char* to) {
-  std::memcpy(to, from.c_str(), from.size() + 1);
-  return static_cast<std::int32_t>(from.size());
+/// Copies `source`, of at most ALIDADE_MAX_TEXT bytes, and returns its length.
+std::int32_t CopyText(const std::string& source, char* destination) {
+  std::memcpy(destination, source.c_str(), source.size() + 1);
+  return static_cast<std::int32_t>(source.size());
 }
 
-/// `(px, > 0: rectified focal length)`
+/// Returns the meaning of a parameter, as in `(px, > 0: rectified focal length)`.
 std::string Meaning(const AlidadeParam& param) {
   const ParamInfo info = Describe(param);
   std::vector<std::string> parts;
@@ -209,36 +210,37 @@ std::string Meaning(const AlidadeParam& param) {
   return '(' + text + info.doc + ')';
 }
 
-double NumberOrNone(const AlidadeParam& param, const Node& node, bool low_open, bool high_open) {
+double NumberOrNone(const AlidadeParam& param, const Node& node, bool is_low_open,
+                    bool is_high_open) {
   if (node.kind() == Node::Kind::kScalar && node.Text() == "none") return kInfinity;
   try {
-    return node.Number(param.low, param.high, low_open, high_open);
+    return node.Number(param.low, param.high, is_low_open, is_high_open);
   } catch (const Error& e) {
     throw Error(e.code(), std::string(e.what()) + ", or none");
   }
 }
 
-double One(const AlidadeParam& param, const Node& node) {
-  const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
-  const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
+double ReadValue(const AlidadeParam& param, const Node& node) {
+  const bool is_low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
+  const bool is_high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
   switch (param.kind) {
     case ALIDADE_PARAM_INTEGER:
-      return static_cast<double>(
-          node.Integer(static_cast<std::int64_t>(std::clamp(param.low, -kExact, kExact)),
-                       static_cast<std::int64_t>(std::clamp(param.high, -kExact, kExact))));
+      return static_cast<double>(node.Integer(
+          static_cast<std::int64_t>(std::clamp(param.low, -kMaxExactInteger, kMaxExactInteger)),
+          static_cast<std::int64_t>(std::clamp(param.high, -kMaxExactInteger, kMaxExactInteger))));
     case ALIDADE_PARAM_FLAG:
       return node.Flag() ? 1.0 : 0.0;
     case ALIDADE_PARAM_CHOICE:
       return node.Choice(Choices(param));
     default:
       return (param.flags & ALIDADE_PARAM_OR_NONE) != 0
-                 ? NumberOrNone(param, node, low_open, high_open)
-                 : node.Number(param.low, param.high, low_open, high_open);
+                 ? NumberOrNone(param, node, is_low_open, is_high_open)
+                 : node.Number(param.low, param.high, is_low_open, is_high_open);
   }
 }
 
-std::vector<double> All(const AlidadeParam& param, const Node& node) {
-  if (param.count == 1) return {One(param, node)};
+std::vector<double> ReadValues(const AlidadeParam& param, const Node& node) {
+  if (param.count == 1) return {ReadValue(param, node)};
   const std::vector<Node> items = node.ItemsOrOne();
   if (param.kind == ALIDADE_PARAM_NUMBER) {
     static_cast<void>(node.Numbers(param.count));
@@ -246,12 +248,12 @@ std::vector<double> All(const AlidadeParam& param, const Node& node) {
     node.Fail(std::to_string(items.size()) + " values", std::to_string(param.count));
   }
   std::vector<double> values;
-  for (const Node& item : items) values.push_back(One(param, item));
+  for (const Node& item : items) values.push_back(ReadValue(param, item));
   return values;
 }
 
-/// What a dotted key names below `map`, or nothing: then `map` is the last map on the way, and
-/// `key` what is missing there.
+/// Finds the node of a dotted key below `map`. If it does not exist, `map` becomes the last map on
+/// the way, and `key` the missing part of the key.
 std::optional<Node> FindBelow(Node& map, std::string& key) {
   for (std::size_t dot; (dot = key.find('.')) != std::string::npos; key.erase(0, dot + 1)) {
     const std::optional<Node> child = map.Find(key.substr(0, dot));
@@ -273,11 +275,11 @@ AlidadeHost MakeHost(void* context) {
 }
 
 ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation,
-                         bool noise_given)
+                         bool has_covariance)
     : entry_(entry),
       owner_(std::move(owner)),
       representation_(std::move(representation)),
-      noise_given_(noise_given),
+      has_covariance_(has_covariance),
       host_(MakeHost(this)) {
   host_.read = &ParamReader::Read;
   host_.read_text = &ParamReader::ReadText;
@@ -285,7 +287,7 @@ ParamReader::ParamReader(const Node& entry, std::string owner, std::string repre
 }
 
 void ParamReader::Check() const {
-  if (thrown_) std::rethrow_exception(thrown_);
+  if (exception_) std::rethrow_exception(exception_);
   if (errors_.empty()) return;
   std::vector<std::string> lines(errors_.begin(), errors_.end());
   const auto by_place = [](const std::string& a, const std::string& b) {
@@ -301,7 +303,7 @@ std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double*
   auto* reader = static_cast<ParamReader*>(context);
   try {
     const std::vector<double> read =
-        reader->Values(reader->Expect([&] { return Checked(param, values, capacity); }));
+        reader->Values(reader->Expect([&] { return CheckParam(param, values, capacity); }));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
   } catch (const Error& e) {
@@ -309,7 +311,7 @@ std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double*
   }
   return -1;
 } catch (...) {
-  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->exception_ = std::current_exception();
   return -1;
 }
 
@@ -317,48 +319,48 @@ std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, cha
                                    std::int32_t capacity) noexcept try {
   auto* reader = static_cast<ParamReader*>(context);
   try {
-    const AlidadeParam expected = reader->Expect([&] { return Checked(param, text, capacity); });
-    return Put(reader->TextOf(expected), text);
+    const AlidadeParam expected = reader->Expect([&] { return CheckParam(param, text, capacity); });
+    return CopyText(reader->TextOf(expected), text);
   } catch (const Error& e) {
     reader->errors_.emplace_back(e.what());
   }
   return -1;
 } catch (...) {
-  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->exception_ = std::current_exception();
   return -1;
 }
 
 void ParamReader::Fail(void* context, const char* key, const char* text) noexcept try {
   auto* reader = static_cast<ParamReader*>(context);
-  if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // on the other side
+  if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // the plugin caught it
   if (Text(key).empty()) {
-    reader->failure_ = Text(text).empty() ? "it does not say why" : ShownText(text);
+    reader->failure_ = Text(text).empty() ? "it did not report a reason" : PrintableText(text);
     return;
   }
   const Node base = reader->BaseOf(Text(key));
   Place place = base.place();
-  std::optional<Node> at = base;
-  std::string rest = key;
-  for (std::size_t dot = 0; at && at->is_map() && dot != std::string::npos;) {
-    dot = rest.find('.');
-    at = at->Find(rest.substr(0, dot));
-    if (at) place = at->place();
-    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  std::optional<Node> node = base;
+  std::string remaining = key;
+  for (std::size_t dot = 0; node && node->is_map() && dot != std::string::npos;) {
+    dot = remaining.find('.');
+    node = node->Find(remaining.substr(0, dot));
+    if (node) place = node->place();
+    remaining.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
   reader->errors_.push_back(
-      ErrorLine(place, PathBelow(base.path(), ShownText(key)), ShownText(text)));
+      ErrorLine(place, PathBelow(base.path(), PrintableText(key)), PrintableText(text)));
 } catch (...) {
-  static_cast<ParamReader*>(context)->thrown_ = std::current_exception();
+  static_cast<ParamReader*>(context)->exception_ = std::current_exception();
 }
 
-/// The parameter; one that breaks the rules is an error of the plugin, at the entry.
-AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& checked) {
+/// Returns the parameter of `check`. Reports a broken rule as an error of the plugin, at the entry.
+AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& check) {
   try {
-    const AlidadeParam param = checked();
+    const AlidadeParam param = check();
     keys_.insert(param.key);
     if (keys_.size() > ALIDADE_MAX_PARAMS) {
-      throw Error(ExitCode::kPlugin, "asks for more than " + std::to_string(ALIDADE_MAX_PARAMS) +
-                                         " parameters, which is the most");
+      throw Error(ExitCode::kPlugin,
+                  "requests more than " + std::to_string(ALIDADE_MAX_PARAMS) + " parameters");
     }
     return param;
   } catch (const Error& e) {
@@ -367,46 +369,46 @@ AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& checked) {
   }
 }
 
-/// The map below which `key` is read: the entry, or the root.
+/// Returns the map that contains `key`: the entry or the root.
 Node ParamReader::BaseOf(const std::string& key) const {
   const std::string first = key.substr(0, key.find('.'));
   if (first == key || (first != "camera" && first != "landmarks")) return entry_;
-  std::optional<Node> at = entry_;
-  std::string rest = key;
-  for (std::size_t dot = 0; at && dot != std::string::npos;) {
-    dot = rest.find('.');
-    at = at->Find(rest.substr(0, dot));
-    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  std::optional<Node> node = entry_;
+  std::string remaining = key;
+  for (std::size_t dot = 0; node && dot != std::string::npos;) {
+    dot = remaining.find('.');
+    node = node->Find(remaining.substr(0, dot));
+    remaining.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
-  return at ? entry_ : entry_.Root();
+  return node ? entry_ : entry_.Root();
 }
 
 std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
-  std::string rest = param.key;
+  std::string key = param.key;
   const std::vector<std::string> choices = Choices(param);
   const auto representation = std::ranges::find(choices, representation_);
-  if (rest == "landmarks.representation" && representation != choices.end()) {
+  if (key == "landmarks.representation" && representation != choices.end()) {
     return {static_cast<double>(representation - choices.begin())};
   }
-  Node map = BaseOf(rest);
-  const std::optional<Node> node = FindBelow(map, rest);
-  if (noise_given_ && IsNoise(param)) {
-    if (node) node->Fail("the entry gives the noise as `covariance` too", "one of the two");
+  Node map = BaseOf(key);
+  const std::optional<Node> node = FindBelow(map, key);
+  if (has_covariance_ && IsNoise(param)) {
+    if (node) node->Fail("the entry also defines the noise by `covariance`", "one of the two");
     return StandIn(param);
   }
-  if (!node) return Absent(param, map, rest);
-  const std::vector<double> values = All(param, *node);
+  if (!node) return Absent(param, map, key);
+  const std::vector<double> values = ReadValues(param, *node);
   ExpectCalibrated(param, *node, values);
   return values;
 }
 
-/// A text, which no calibration has.
+/// Returns the text of a parameter. A calibration does not contain texts.
 std::string ParamReader::TextOf(const AlidadeParam& param) const {
-  std::string rest = param.key;
-  Node map = BaseOf(rest);
-  const std::optional<Node> node = FindBelow(map, rest);
+  std::string key = param.key;
+  Node map = BaseOf(key);
+  const std::optional<Node> node = FindBelow(map, key);
   if (!node && HasFallback(param)) return Text(param.fallback_text);
-  if (!node) FailMissing(param, map, rest);
+  if (!node) FailMissing(param, map, key);
   const std::string text = node->Text();
   const std::string defect = TextDefect(text.c_str());
   if (!defect.empty()) node->Fail("a text that " + defect);
@@ -414,37 +416,37 @@ std::string ParamReader::TextOf(const AlidadeParam& param) const {
 }
 
 std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
-  std::optional<Node> at = entry_.Root().Find("calibration");
-  std::string rest = key;
-  for (std::size_t dot = 0; at && dot != std::string::npos;) {
-    dot = rest.find('.');
-    at = at->is_map() ? at->Find(rest.substr(0, dot)) : std::nullopt;
-    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  std::optional<Node> node = entry_.Root().Find("calibration");
+  std::string remaining = key;
+  for (std::size_t dot = 0; node && dot != std::string::npos;) {
+    dot = remaining.find('.');
+    node = node->is_map() ? node->Find(remaining.substr(0, dot)) : std::nullopt;
+    remaining.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
-  return at;
+  return node;
 }
 
-/// Refuses the `values` of the config at `node` where the data tell others.
+/// Refuses `values` of the config at `node` that differ from the calibration of the data.
 void ParamReader::ExpectCalibrated(const AlidadeParam& param, const Node& node,
                                    const std::vector<double>& values) const {
   const std::optional<Node> data = InCalibration(param.key);
   if (!data) return;
-  const auto same = [](double a, double b) {
-    constexpr double kSame = 1e-6;  // of the value: digits that one of the two texts leaves out
-    return std::abs(a - b) <= kSame * std::max(std::abs(a), std::abs(b));
+  const auto is_same = [](double a, double b) {
+    constexpr double kTolerance = 1e-6;  // relative: one of the two texts may have fewer digits
+    return std::abs(a - b) <= kTolerance * std::max(std::abs(a), std::abs(b));
   };
-  const std::vector<double> told = All(param, *data);
-  if (std::ranges::equal(values, told, same)) return;
+  const std::vector<double> calibrated = ReadValues(param, *data);
+  if (std::ranges::equal(values, calibrated, is_same)) return;
   node.Fail(ValuesText(param, values) + " differs from the calibration of the data, " +
-                ValuesText(param, told) + " in " + data->place().file,
+                ValuesText(param, calibrated) + " in " + data->place().file,
             "the same value, no such key (the data determine it), or 'source.calibration: ignore'");
 }
 
 std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,
                                         const std::string& key_in_map) const {
-  const bool dotted = std::string_view(param.key).find('.') != std::string_view::npos;
+  const bool is_dotted = std::string_view(param.key).find('.') != std::string_view::npos;
   const std::optional<Node> data = InCalibration(param.key);
-  if (data && (dotted || !HasFallback(param))) return All(param, *data);
+  if (data && (is_dotted || !HasFallback(param))) return ReadValues(param, *data);
   if (HasFallback(param)) return Fallback(param);
   FailMissing(param, map, key_in_map);
 }
@@ -455,18 +457,18 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
   try {
     static_cast<void>(map.At(first));
   } catch (const Error& e) {
-    // The config also tells of a key that looks like the missing one, or has another unit.
+    // The error of the config also suggests a similar key, or one with another unit.
     constexpr std::string_view kPhrase = ": missing key";
     std::string text = e.what();
-    const std::size_t at = text.find(kPhrase);
-    if (at != std::string::npos) {
+    const std::size_t position = text.find(kPhrase);
+    if (position != std::string::npos) {
       text.replace(
-          at, kPhrase.size(),
+          position, kPhrase.size(),
           key_in_map.substr(first.size()) + ": missing; " + owner_ + " needs it " + Meaning(param));
     }
     throw Error(ExitCode::kBadConfig, text);
   }
-  throw ContractViolation("a key that is there is missing: " + key_in_map);
+  throw ContractViolation("an existing key was reported as missing: " + key_in_map);
 }
 
 ParamRecorder::ParamRecorder() : host_(MakeHost(this)), trials_(1) {
@@ -475,62 +477,63 @@ ParamRecorder::ParamRecorder() : host_(MakeHost(this)), trials_(1) {
   host_.fail = [](void*, const char*, const char*) {};
 }
 
-std::int32_t ParamRecorder::Read(void* context, const AlidadeParam* from, double* values,
+std::int32_t ParamRecorder::Read(void* context, const AlidadeParam* source, double* values,
                                  std::int32_t capacity) noexcept {
   auto* recorder = static_cast<ParamRecorder*>(context);
   Trial& trial = recorder->trials_.back();
   try {
-    const AlidadeParam param = Checked(from, values, capacity);
-    const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
-    if (choice) values[0] = HasFallback(param) ? Fallback(param)[0] : 0.0;
-    if (choice && trial.choice == param.key) values[0] = trial.value;
-    recorder->Note(param, choice ? static_cast<int>(values[0]) : 0);
+    const AlidadeParam param = CheckParam(source, values, capacity);
+    const bool is_choice = param.kind == ALIDADE_PARAM_CHOICE;
+    if (is_choice) values[0] = HasFallback(param) ? Fallback(param)[0] : 0.0;
+    if (is_choice && trial.choice == param.key) values[0] = trial.value;
+    recorder->Record(param, is_choice ? static_cast<int>(values[0]) : 0);
     return std::max(param.count, 0);
   } catch (const std::bad_alloc&) {
     recorder->out_of_memory_ = true;
   } catch (const std::exception&) {
-    // The plugin asks wrongly; it is told so when the model is made.
+    // An invalid request is reported when the model is created.
   }
   return -1;
 }
 
-std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* from, char* text,
+std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* source, char* text,
                                      std::int32_t capacity) noexcept {
   auto* recorder = static_cast<ParamRecorder*>(context);
   try {
-    const AlidadeParam param = Checked(from, text, capacity);
-    recorder->Note(param, 0);
-    return Put(Text(param.fallback_text), text);
+    const AlidadeParam param = CheckParam(source, text, capacity);
+    recorder->Record(param, 0);
+    return CopyText(Text(param.fallback_text), text);
   } catch (const std::bad_alloc&) {
     recorder->out_of_memory_ = true;
   } catch (const std::exception&) {
-    // As above.
+    // See Read.
   }
   return -1;
 }
 
-void ParamRecorder::Note(const AlidadeParam& param, int value) {
-  std::vector<Asked>& asked = trials_.back().asked;
-  const auto same = [&](const Asked& other) { return other.info.key == param.key; };
-  if (asked.size() >= ALIDADE_MAX_PARAMS) return;  // it is told so when the model is made
-  if (std::none_of(asked.begin(), asked.end(), same)) asked.push_back({Describe(param), value});
+void ParamRecorder::Record(const AlidadeParam& param, int value) {
+  std::vector<Request>& requests = trials_.back().requests;
+  const auto is_same = [&](const Request& request) { return request.info.key == param.key; };
+  if (requests.size() >= ALIDADE_MAX_PARAMS) return;  // reported when the model is created
+  if (std::none_of(requests.begin(), requests.end(), is_same))
+    requests.push_back({Describe(param), value});
 }
 
-std::string ParamRecorder::When(const std::string& key) const {
-  const auto asks = [&](const Trial& trial) {
-    return std::any_of(trial.asked.begin(), trial.asked.end(),
-                       [&](const Asked& asked) { return asked.info.key == key; });
+std::string ParamRecorder::ConditionOf(const std::string& key) const {
+  const auto requests_key = [&](const Trial& trial) {
+    return std::any_of(trial.requests.begin(), trial.requests.end(),
+                       [&](const Request& request) { return request.info.key == key; });
   };
   std::vector<std::string> conditions;
-  for (const Asked& choice : trials_[0].asked) {
+  for (const Request& choice : trials_[0].requests) {
     std::vector<std::string> values;
     for (int i = 0; i < std::ssize(choice.info.choices); ++i) {
-      const auto with_value = [&](const Trial& trial) {
+      const auto has_value = [&](const Trial& trial) {
         return trial.choice.empty() ? i == choice.value
                                     : trial.choice == choice.info.key && trial.value == i;
       };
-      const auto trial = std::find_if(trials_.begin(), trials_.end(), with_value);
-      if (trial != trials_.end() && asks(*trial)) values.push_back(choice.info.choices[i]);
+      const auto trial = std::find_if(trials_.begin(), trials_.end(), has_value);
+      if (trial != trials_.end() && requests_key(*trial)) values.push_back(choice.info.choices[i]);
     }
     if (values.empty() || values.size() == choice.info.choices.size()) continue;
     conditions.push_back(choice.info.key + " = " + Join(values, " or "));
@@ -542,20 +545,20 @@ std::vector<ParamInfo> ParamRecorder::Result() const {
   if (out_of_memory_) throw std::bad_alloc();
   std::vector<ParamInfo> result;
   for (const Trial& trial : trials_) {
-    for (const Asked& asked : trial.asked) {
-      const auto same = [&](const ParamInfo& other) { return other.key == asked.info.key; };
-      const auto known = std::find_if(result.begin(), result.end(), same);
+    for (const Request& request : trial.requests) {
+      const auto is_same = [&](const ParamInfo& info) { return info.key == request.info.key; };
+      const auto known = std::find_if(result.begin(), result.end(), is_same);
       if (known == result.end()) {
-        result.push_back(asked.info);
-        result.back().when = When(asked.info.key);
-      } else if (known->unit != asked.info.unit &&
-                 !known->unit.ends_with(" or " + asked.info.unit)) {
-        known->unit += " or " + asked.info.unit;
+        result.push_back(request.info);
+        result.back().condition = ConditionOf(request.info.key);
+      } else if (known->unit != request.info.unit &&
+                 !known->unit.ends_with(" or " + request.info.unit)) {
+        known->unit += " or " + request.info.unit;
       }
     }
   }
   const auto rank = [](const ParamInfo& info) {
-    return std::tuple(!info.when.empty(), !info.fallback.empty());
+    return std::tuple(!info.condition.empty(), !info.fallback.empty());
   };
   std::stable_sort(result.begin(), result.end(),
                    [&](const ParamInfo& a, const ParamInfo& b) { return rank(a) < rank(b); });

@@ -14,33 +14,38 @@
 
 namespace alidade::internal {
 
-/// A host for one creation: its functions, which the caller sets, get `context`.
+/// Returns a host for one creation. The caller sets its functions, which receive `context`.
 AlidadeHost MakeHost(void* context);
 
-/// Lends a model the parameters of its config entry. A dotted key walks nested maps. What begins
-/// with `camera.` or `landmarks.` and is not in the entry is read from the map of that name at the
-/// root of the config, which sensors and source share. What is in neither is read from the
-/// calibration of the data, `calibration` at the root (WithCalibration); there a key without a dot
-/// stands only for a parameter that has no default. What is in the config and in the calibration
-/// must be the same to 1e-6 of its value. Everything wrong is collected, so that one
-/// run tells all; kPlugin where the model itself asks against the rules of plugin_abi.h.
+/// Reader of a model's parameters. It looks for a parameter in these maps, in this order:
+///
+///   1. the config entry of the model; a dotted key addresses nested maps
+///   2. the root of the config, for keys that begin with `camera.` or `landmarks.`, which sensors
+///      and source share
+///   3. the calibration of the data, `calibration` at the root (WithCalibration); a key without a
+///      dot is read there only if the parameter has no default
+///
+/// A value in both the config and the calibration must agree to 1e-6 of its value. All errors are
+/// collected, so that one run reports all of them. A request that breaks the rules of plugin_abi.h
+/// is an error kPlugin.
 class ParamReader {
  public:
-  /// `owner` names the model in messages, as in `model 'scale_2d'`.
-  /// `representation` is the value of `landmarks.representation` where it is one of the choices;
-  /// "": what is written. `noise_given`: the entry has a covariance in place of the model's noise,
-  /// whose parameters, `sigma_*` and `noise.*`, are stand-ins; one that is written is refused.
+  /// `owner` names the model in messages, as in `model 'scale_2d'`. `representation` replaces the
+  /// value of `landmarks.representation`, if it is one of the choices. `has_covariance`: the entry
+  /// has a covariance instead of the model's noise. The parameters `sigma_*` and `noise.*` are then
+  /// stand-ins, and refused in the entry.
   ParamReader(const Node& entry, std::string owner, std::string representation = {},
-              bool noise_given = false);
+              bool has_covariance = false);
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Why the model says that it cannot be made, where that belongs to no key; else "".
+  /// Returns the reason for which the model cannot be created, if it does not belong to a key; else
+  /// "".
   const std::string& failure() const { return failure_; }
-  /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
-  /// on the compiler), or what else went wrong in a call, as memory that ran out; returns where
-  /// there is nothing.
+  /// Throws all errors as one, kBadConfig, in the order of their positions (the order of the reads
+  /// depends on the compiler). If a call failed otherwise, as when memory runs out, throws that
+  /// exception. Returns if there was no error.
   void Check() const;
 
  private:
@@ -49,7 +54,7 @@ class ParamReader {
   static std::int32_t ReadText(void* context, const AlidadeParam* param, char* text,
                                std::int32_t capacity) noexcept;
   static void Fail(void* context, const char* key, const char* text) noexcept;
-  AlidadeParam Expect(const std::function<AlidadeParam()>& checked);
+  AlidadeParam Expect(const std::function<AlidadeParam()>& check);
   Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
   std::string TextOf(const AlidadeParam& param) const;
@@ -63,16 +68,16 @@ class ParamReader {
 
   Node entry_;
   std::string owner_, representation_;
-  bool noise_given_;
+  bool has_covariance_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   AlidadeHost host_{};
-  std::unordered_set<std::string> keys_;  ///< that were asked for
+  std::unordered_set<std::string> keys_;  ///< all requested keys
   std::vector<std::string> errors_;
   std::string failure_;
-  std::exception_ptr thrown_;  ///< by a call from the plugin, which must not see it
+  std::exception_ptr exception_;  ///< of a call, stored because it must not reach the plugin
 };
 
-/// Notes what a model asks for while it is created with stand-in values.
+/// Recorder of the parameters that a model requests while it is created with stand-in values.
 class ParamRecorder {
  public:
   ParamRecorder();
@@ -80,13 +85,13 @@ class ParamRecorder {
   ParamRecorder& operator=(const ParamRecorder&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Runs `create` once, then again for each other value of each choice, one at a time.
+  /// Runs `create` once, and again for each other value of each choice.
   template <class Create>
   void Run(const Create& create) {
     trials_.assign(1, Trial{});
     create();
-    const std::vector<Asked> first = trials_[0].asked;
-    for (const Asked& choice : first) {
+    const std::vector<Request> first = trials_[0].requests;
+    for (const Request& choice : first) {
       for (int i = 0; i < static_cast<int>(choice.info.choices.size()); ++i) {
         if (i == choice.value) continue;
         trials_.push_back({choice.info.key, i, {}});
@@ -94,26 +99,26 @@ class ParamRecorder {
       }
     }
   }
-  /// All keys that were asked for: the required ones, those with a default, and those that a choice
-  /// asks for.
+  /// Returns all requested parameters: the required ones, those with a default, and those that
+  /// depend on a choice.
   std::vector<ParamInfo> Result() const;
 
  private:
-  struct Asked {
+  struct Request {
     ParamInfo info;
-    int value = 0;  ///< of a choice: the one given
+    int value = 0;  ///< of a choice: the index that was returned
   };
   struct Trial {
-    std::string choice;  ///< "" in the first
+    std::string choice;  ///< key of the choice that differs; "" in the first trial
     int value = 0;
-    std::vector<Asked> asked;
+    std::vector<Request> requests;
   };
   static std::int32_t Read(void* context, const AlidadeParam* param, double* values,
                            std::int32_t capacity) noexcept;
   static std::int32_t ReadText(void* context, const AlidadeParam* param, char* text,
                                std::int32_t capacity) noexcept;
-  void Note(const AlidadeParam& param, int value);
-  std::string When(const std::string& key) const;
+  void Record(const AlidadeParam& param, int value);
+  std::string ConditionOf(const std::string& key) const;
 
   AlidadeHost host_{};
   std::vector<Trial> trials_;

@@ -14,11 +14,11 @@ namespace fs = std::filesystem;
 
 std::vector<fs::path> PluginFoldersOfEnvironment() {
   std::vector<fs::path> folders;
-  std::string rest = Text(secure_getenv("ALIDADE_PLUGIN_PATH"));
-  while (!rest.empty()) {
-    const std::size_t colon = std::min(rest.find(':'), rest.size());
-    if (colon > 0) folders.emplace_back(rest.substr(0, colon));
-    rest.erase(0, colon + 1);
+  std::string remaining = Text(secure_getenv("ALIDADE_PLUGIN_PATH"));
+  while (!remaining.empty()) {
+    const std::size_t colon = std::min(remaining.find(':'), remaining.size());
+    if (colon > 0) folders.emplace_back(remaining.substr(0, colon));
+    remaining.erase(0, colon + 1);
   }
   return folders;
 }
@@ -33,8 +33,8 @@ std::optional<fs::path> PluginFolderOfUser() {
 
 fs::path FolderOfLibrary() {
   Dl_info info{};
-  const auto* here = reinterpret_cast<const void*>(&FolderOfLibrary);
-  if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return {};
+  const auto* function = reinterpret_cast<const void*>(&FolderOfLibrary);
+  if (dladdr(function, &info) == 0 || info.dli_fname == nullptr) return {};
   std::error_code error;
   const fs::path library = fs::canonical(info.dli_fname, error);
   return error ? fs::path() : library.parent_path() / "alidade";

@@ -25,15 +25,15 @@ using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
 
-/// The origin of places that are given.
+/// Origin of places in the config or on the command line.
 constexpr const char* kGiven = "given";
 
 const char* ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? kSensorKind : kMotionKind;
 }
 
-/// Appends the entries of the plugin, and those of an unknown kind to the refusals.
-void AddEntries(const internal::OpenedPlugin& plugin, std::vector<PluginEntry>& entries,
+/// Appends the entries of the plugin. Appends entries of unknown kind to the refusals.
+void AddEntries(const internal::LoadedPlugin& plugin, std::vector<PluginEntry>& entries,
                 std::vector<Refusal>& refusals) {
   if (plugin.cpp_table != nullptr) {
     for (int i = 0; i < plugin.cpp_table->entry_count; ++i) {
@@ -50,7 +50,7 @@ void AddEntries(const internal::OpenedPlugin& plugin, std::vector<PluginEntry>& 
       refusals.push_back({plugin.file,
                           std::string("its entry '") + entry.name + "' is of kind " +
                               std::to_string(entry.kind) +
-                              ", which this version does not know; the others are used",
+                              ", which this version does not know; the other entries are used",
                           ExitCode::kPlugin});
       continue;
     }
@@ -62,64 +62,68 @@ void AddEntries(const internal::OpenedPlugin& plugin, std::vector<PluginEntry>& 
 }  // namespace
 
 PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal,
-                       const std::optional<std::set<std::string>>& only)
-    : given_(files_and_folders), only_(only) {
-  const bool required = on_refusal == OnRefusal::kThrow;
-  for (const fs::path& place : files_and_folders) LoadPlace(place, kGiven, required);
+                       const std::optional<std::set<std::string>>& requested_names)
+    : configured_places_(files_and_folders), requested_names_(requested_names) {
+  const bool is_required = on_refusal == OnRefusal::kThrow;
+  for (const fs::path& place : files_and_folders) LoadPlace(place, kGiven, is_required);
   for (const fs::path& folder : internal::PluginFoldersOfEnvironment()) {
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }
   if (const auto folder = internal::PluginFolderOfUser())
     LoadPlace(*folder, "user data folder", false);
-  const fs::path own = internal::FolderOfLibrary();
-  if (!own.empty()) LoadPlace(own / "plugins", "next to the program", false);
+  const fs::path library_folder = internal::FolderOfLibrary();
+  if (!library_folder.empty()) LoadPlace(library_folder / "plugins", "next to the program", false);
 }
 
-PluginHost PluginHost::Complete() const { return PluginHost(given_, OnRefusal::kList); }
+PluginHost PluginHost::WithAllPlugins() const {
+  return PluginHost(configured_places_, OnRefusal::kList);
+}
 
-void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, bool required) {
+void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, bool is_required) {
   const std::size_t entries = entries_.size(), refusals = refusals_.size();
   std::error_code error;
-  const bool there = fs::exists(place, error);
-  if (!there && required) {
+  const bool exists = fs::exists(place, error);
+  if (!exists && is_required) {
     if (!place.is_absolute()) CheckTrusted(place);
     Refuse(place, "no such file or folder");
   }
   if (fs::is_directory(place, error)) {
-    LoadFolder(place, required, origin == kGiven);
-  } else if (there) {
-    LoadFile(place, required);
+    LoadFolder(place, is_required, origin == kGiven);
+  } else if (exists) {
+    LoadFile(place, is_required);
   }
-  std::string found = "not there";
-  if (there) {
-    found = std::to_string(entries_.size() - entries) + " found";
+  std::string result = "does not exist";
+  if (exists) {
+    result = std::to_string(entries_.size() - entries) + " found";
     if (refusals_.size() > refusals) {
-      found += ", " + std::to_string(refusals_.size() - refusals) + " refused";
+      result += ", " + std::to_string(refusals_.size() - refusals) + " refused";
     }
   }
-  searched_.push_back(place.string() + " (" + origin + "): " + found);
+  searched_.push_back(place.string() + " (" + origin + "): " + result);
 }
 
-/// `whole`: whatever its plugins offer.
-void PluginHost::LoadFolder(const fs::path& folder, bool required, bool whole) {
+/// `loads_all`: also loads plugins that offer none of the requested names.
+void PluginHost::LoadFolder(const fs::path& folder, bool is_required, bool loads_all) {
   std::set<fs::path> files;
   std::error_code error;
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    if (at->path().extension() != ".so") continue;
-    if (whole || !only_ || internal::MayOffer(at->path(), *only_)) files.insert(at->path());
+  for (fs::directory_iterator iterator(folder, error), end; !error && iterator != end;
+       iterator.increment(error)) {
+    if (iterator->path().extension() != ".so") continue;
+    if (loads_all || !requested_names_ || internal::MayOffer(iterator->path(), *requested_names_))
+      files.insert(iterator->path());
   }
   if (error) {
-    if (required) Refuse(folder, error.message());
+    if (is_required) Refuse(folder, error.message());
     refusals_.push_back({folder, error.message(), ExitCode::kPlugin});
   }
-  for (const fs::path& file : files) LoadFile(file, required);
+  for (const fs::path& file : files) LoadFile(file, is_required);
 }
 
-void PluginHost::LoadFile(const fs::path& file, bool required) {
+void PluginHost::LoadFile(const fs::path& file, bool is_required) {
   try {
     Load(file);
   } catch (const Error& e) {
-    if (required) throw;
+    if (is_required) throw;
     const std::string prefix = file.string() + ": ";
     std::string reason = e.what();
     if (reason.starts_with(prefix)) reason.erase(0, prefix.size());
@@ -135,18 +139,18 @@ void PluginHost::Load(const fs::path& file) {
   std::error_code error;
   const fs::path canonical = fs::canonical(file, error);
   if (error) Refuse(file, error.message());
-  const auto same = [&](const fs::path& other) {
-    return other == canonical || fs::equivalent(other, canonical, error);
+  const auto is_same = [&](const fs::path& loaded) {
+    return loaded == canonical || fs::equivalent(loaded, canonical, error);
   };
-  if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  const internal::OpenedPlugin plugin = internal::OpenPlugin(file, canonical);
+  if (std::any_of(loaded_.begin(), loaded_.end(), is_same)) return;
+  const internal::LoadedPlugin plugin = internal::LoadPlugin(file, canonical);
   loaded_.push_back(canonical);
-  const std::size_t before = entries_.size();
+  const std::size_t first = entries_.size();
   AddEntries(plugin, entries_, refusals_);
   if (!IsLogged(LogLevel::kDebug)) return;
   std::string names;
-  for (std::size_t i = before; i < entries_.size(); ++i) {
-    names += (i > before ? ", " : "") + entries_[i].name;
+  for (std::size_t i = first; i < entries_.size(); ++i) {
+    names += (i > first ? ", " : "") + entries_[i].name;
   }
   Log(LogLevel::kDebug, "plugin loaded: " + canonical.string() + ": " + names);
 }
@@ -154,47 +158,50 @@ void PluginHost::Load(const fs::path& file) {
 const PluginEntry& PluginHost::Find(const std::string& kind, const std::string& name,
                                     const Node& node) const {
   const auto matches = [&](const PluginEntry& e) { return e.kind == kind && e.name == name; };
-  const auto found = std::find_if(entries_.begin(), entries_.end(), matches);
-  if (found == entries_.end()) FailMissing(kind, name, node);
-  const auto other = std::find_if(found + 1, entries_.end(), matches);
-  if (other != entries_.end()) {
-    throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
-                                             "two plugins offer the " + kind + " '" + name +
-                                                 "': " + found->plugin.string() + " and " +
-                                                 other->plugin.string() + "; remove one of them"));
+  const auto entry = std::find_if(entries_.begin(), entries_.end(), matches);
+  if (entry == entries_.end()) FailMissing(kind, name, node);
+  const auto second_entry = std::find_if(entry + 1, entries_.end(), matches);
+  if (second_entry != entries_.end()) {
+    throw Error(
+        ExitCode::kPlugin,
+        ErrorLine(node.place(), node.path(),
+                  "two plugins offer the " + kind + " '" + name + "': " + entry->plugin.string() +
+                      " and " + second_entry->plugin.string() + "; remove one of them"));
   }
-  return *found;
+  return *entry;
 }
 
 void PluginHost::FailMissing(const std::string& kind, const std::string& name,
                              const Node& node) const {
-  if (!complete()) Complete().FailMissing(kind, name, node);
+  if (!has_all_plugins()) WithAllPlugins().FailMissing(kind, name, node);
   const char* const key = kind == kSensorKind || kind == kMotionKind ? "model" : "type";
-  const Node at = node.is_map() ? node.Find(key).value_or(node) : node;
-  std::string what = "no plugin offers the " + kind + " '" + name + "'";
+  const Node location = node.is_map() ? node.Find(key).value_or(node) : node;
+  std::string problem = "no plugin offers the " + kind + " '" + name + "'";
   std::vector<std::string> names;
-  for (const PluginEntry& other : entries_) {
-    if (other.kind == kind && other.name == name) {
+  for (const PluginEntry& entry : entries_) {
+    if (entry.kind == kind && entry.name == name) {
       throw Error(ExitCode::kPlugin,
-                  ErrorLine(at.place(), at.path(),
-                            "the " + kind + " '" + name + "' of " + other.plugin.string() +
-                                " is asked for, but not named in the config, so that the plugin "
-                                "was not opened",
+                  ErrorLine(location.place(), location.path(),
+                            "the " + kind + " '" + name + "' of " + entry.plugin.string() +
+                                " was requested, but the config does not contain its name, so "
+                                "that the plugin was not loaded",
                             "its name in the config, or the plugin in `plugins:`"));
     }
-    if (other.kind == kind) names.push_back(other.name);
-    if (other.name == name) what += "; there is " + WithArticle(other.kind) + " of that name";
+    if (entry.kind == kind) names.push_back(entry.name);
+    if (entry.name == name) problem += "; there is " + WithArticle(entry.kind) + " of that name";
   }
   ExitCode code = ExitCode::kPlugin;
   for (const Refusal& refusal : refusals_) {
     if (refusal.code == ExitCode::kNotTrusted && code != ExitCode::kNotTrusted) {
       code = ExitCode::kNotTrusted;
-      what += "; '" + refusal.file.string() + "' was refused because it is not trusted";
+      problem += "; '" + refusal.file.string() + "' was refused because it is not trusted";
     }
   }
   std::string places = PluginPlaces(*this);
   if (!places.empty()) places.insert(0, "\n").pop_back();
-  throw Error(code, ErrorLine(at.place(), at.path(), what, {}, Nearest(name, names)) + places);
+  throw Error(
+      code,
+      ErrorLine(location.place(), location.path(), problem, {}, Nearest(name, names)) + places);
 }
 
 SharedSensor PluginHost::CreateSensor(const std::string& name, const Node& entry,

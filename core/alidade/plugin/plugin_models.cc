@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-/// The status of `call`, of the function `name` of the instance of `model`; a code that the ABI
-/// does not have is an error.
+/// Returns the status of `call`, which calls the function `name` of the instance. A code that the
+/// ABI does not define is an error of `model`.
 template <class Call>
 Status StatusOf(const void* model, const ModelInstance& instance, const char* name,
                 const Call& call) {
@@ -19,10 +19,10 @@ Status StatusOf(const void* model, const ModelInstance& instance, const char* na
     if (code >= ALIDADE_OK && code < ALIDADE_ERROR) return static_cast<Status>(code);
     return internal::NoteModelError(model, instance.error_text());
   } catch (...) {
-    const std::string thrown = internal::ThrownBy([] { throw; });
+    const std::string exception_text = internal::CatchExceptionText([] { throw; });
     return internal::NoteModelError(model, std::string(name) + " of model '" + instance.name() +
                                                "' of plugin " + instance.plugin() +
-                                               " threw: " + thrown);
+                                               " threw: " + exception_text);
   }
 }
 
@@ -36,7 +36,7 @@ SensorModel::Description DescriptionOf(const ModelInstance& instance) {
   description.known = instance.known();
   description.owned = instance.owned();
   description.has_validity = instance.c().sensor->valid != nullptr;
-  description.sqrt_noise = instance.given_noise();
+  description.sqrt_noise = instance.noise_root();
   if ((instance.capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
     const AlidadeDescription& c = *instance.c().description;
     const auto is_landmark = [&](int i) {
@@ -62,7 +62,7 @@ MotionModel::Description MotionDescriptionOf(const ModelInstance& instance) {
   description.noise_size = instance.c().description->noise_count;
   description.stationary = (instance.capabilities() & ALIDADE_STATIONARY) != 0;
   description.discrete_noise = (instance.capabilities() & ALIDADE_DISCRETE_NOISE) != 0;
-  description.sqrt_noise = instance.given_noise();
+  description.sqrt_noise = instance.noise_root();
   return description;
 }
 
@@ -73,41 +73,43 @@ PluginSensor::PluginSensor(std::shared_ptr<const ModelInstance> instance)
       instance_(std::move(instance)),
       calls_(instance_->c().sensor),
       self_(instance_->c().self),
-      unseen_(internal::Shown(nullptr, nullptr)) {}
+      empty_observation_(internal::MakeObservation(nullptr, nullptr)) {}
 
-inline AlidadeObservation PluginSensor::Show(const Observation& seen) const {
-  AlidadeObservation shown = unseen_;
-  shown.z = seen.z;
-  shown.known = seen.known;
-  return shown;
+inline AlidadeObservation PluginSensor::ToAbi(const Observation& observation) const {
+  AlidadeObservation abi_observation = empty_observation_;
+  abi_observation.z = observation.z;
+  abi_observation.known = observation.known;
+  return abi_observation;
 }
 
-Status PluginSensor::DoEvaluate(const Observation& seen, const double* const* roles,
+Status PluginSensor::DoEvaluate(const Observation& observation, const double* const* roles,
                                 const Output& out) const {
-  const AlidadeObservation shown = Show(seen);
+  const AlidadeObservation abi_observation = ToAbi(observation);
   Status status = Status::kOk;
   if (out.h != nullptr) {
     status = StatusOf(this, *instance_, "Predict", [&] {
-      return calls_->eval(self_, &shown, roles, out.h, out.jacobians, out.strides);
+      return calls_->eval(self_, &abi_observation, roles, out.h, out.jacobians, out.strides);
     });
   }
   if (status != Status::kOk || out.sqrt_noise == nullptr) return status;
   return StatusOf(this, *instance_, "SqrtNoise", [&] {
-    return calls_->sqrt_noise(self_, &shown, roles, out.sqrt_noise, measurement().geometry.tangent);
+    return calls_->sqrt_noise(self_, &abi_observation, roles, out.sqrt_noise,
+                              measurement().geometry.tangent);
   });
 }
 
-Status PluginSensor::DoValid(const Observation& seen) const {
-  const AlidadeObservation shown = Show(seen);
-  return StatusOf(this, *instance_, "Valid", [&] { return calls_->valid(self_, &shown); });
+Status PluginSensor::DoValid(const Observation& observation) const {
+  const AlidadeObservation abi_observation = ToAbi(observation);
+  return StatusOf(this, *instance_, "Valid",
+                  [&] { return calls_->valid(self_, &abi_observation); });
 }
 
-Status PluginSensor::DoInitialise(const double* const* roles, const Observation& seen,
+Status PluginSensor::DoInitialise(const double* const* roles, const Observation& observation,
                                   const double* prior, const InverseOutput& out) const {
-  const AlidadeObservation shown = Show(seen);
+  const AlidadeObservation abi_observation = ToAbi(observation);
   return StatusOf(this, *instance_, "Initialise", [&] {
-    return calls_->initialise(self_, &shown, roles, prior, out.y, out.jx, out.strides, out.jz,
-                              measurement().geometry.tangent, out.jp, inverse().prior_size);
+    return calls_->initialise(self_, &abi_observation, roles, prior, out.y, out.jx, out.strides,
+                              out.jz, measurement().geometry.tangent, out.jp, inverse().prior_size);
   });
 }
 

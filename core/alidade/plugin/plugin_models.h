@@ -6,34 +6,36 @@
 #include "alidade/estimation/models.h"
 #include "alidade/plugin/model_instance.h"
 
-/// Models behind the plugin ABI, as estimators see models.
+/// Adapters of the plugin ABI to the interfaces that estimators use for models.
 namespace alidade {
 
-/// A sensor by the calls of plugin_abi.h. An exception of a call is an error of the model.
+/// Sensor that calls the functions of plugin_abi.h. An exception in a call is an error of the
+/// model.
 class PluginSensor final : public SensorModel {
  public:
-  /// ContractViolation if the instance is no sensor.
+  /// ContractViolation if the instance is not a sensor.
   explicit PluginSensor(std::shared_ptr<const ModelInstance> instance);
   const ModelInstance& instance() const { return *instance_; }
 
  private:
-  Status DoEvaluate(const Observation& seen, const double* const* roles,
+  Status DoEvaluate(const Observation& observation, const double* const* roles,
                     const Output& out) const override;
-  Status DoValid(const Observation& seen) const override;
-  Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
-                      const InverseOutput& out) const override;
-  AlidadeObservation Show(const Observation& seen) const;
+  Status DoValid(const Observation& observation) const override;
+  Status DoInitialise(const double* const* roles, const Observation& observation,
+                      const double* prior, const InverseOutput& out) const override;
+  AlidadeObservation ToAbi(const Observation& observation) const;
 
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* calls_;
   const void* self_;
-  AlidadeObservation unseen_;  ///< to be copied, which is faster than filling one with zeros
+  AlidadeObservation empty_observation_;  ///< copying it is faster than zeroing a new one
 };
 
-/// A motion model by the calls of plugin_abi.h. An exception of a call is an error of the model.
+/// Motion model that calls the functions of plugin_abi.h. An exception in a call is an error of the
+/// model.
 class PluginMotion final : public MotionModel {
  public:
-  /// ContractViolation if the instance is no motion model.
+  /// ContractViolation if the instance is not a motion model.
   explicit PluginMotion(std::shared_ptr<const ModelInstance> instance);
   const ModelInstance& instance() const { return *instance_; }
 

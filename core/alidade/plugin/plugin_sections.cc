@@ -22,9 +22,9 @@ constexpr Elf64_Half kMachine = EM_AARCH64;
 #else
 constexpr Elf64_Half kMachine = EM_X86_64;
 #endif
-constexpr std::uint64_t kMaxBytes = 1 << 20;  // of each of the pieces below
+constexpr std::uint64_t kMaxBytes = 1 << 20;  // of one read
 
-/// Reads `count` values of T at `offset`; none if the file ends before.
+/// Reads `count` values of T at `offset`. Returns an empty vector if the file is shorter.
 template <class T>
 std::vector<T> ReadAt(std::istream& file, std::uint64_t offset, std::uint64_t count) {
   std::vector<T> values(count <= kMaxBytes / sizeof(T) ? count : 0);
@@ -34,11 +34,11 @@ std::vector<T> ReadAt(std::istream& file, std::uint64_t offset, std::uint64_t co
   return values;
 }
 
-/// The bytes of a section of an ELF file for this kind of processor, read without opening it as a
-/// library; empty if there is no such file or section.
+/// Reads a section of an ELF file for this kind of processor, without loading it as a library.
+/// Returns an empty vector if the file or section does not exist.
 std::vector<char> ReadSection(const fs::path& path, const std::string& name) {
   std::error_code error;
-  if (!fs::is_regular_file(path, error)) return {};  // a pipe would be waited for
+  if (!fs::is_regular_file(path, error)) return {};  // a pipe would block
   std::ifstream file(path, std::ios::binary);
   const auto header = ReadAt<Elf64_Ehdr>(file, 0, 1);
   if (header.empty() || std::memcmp(header[0].e_ident, ELFMAG, SELFMAG) != 0 ||
@@ -81,7 +81,7 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   }
   if (tag.abi_major != ALIDADE_ABI_MAJOR) {
     Refuse(path, "built for plugin ABI " + Version(tag.abi_major, tag.abi_minor) +
-                     ", this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
+                     ", but this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
                      "; rebuild the plugin against this version");
   }
   constexpr std::size_t kNeeded = offsetof(AlidadeBuildTag, reserved);
@@ -91,7 +91,7 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   }
   if (tag.needs_minor > ALIDADE_ABI_MINOR) {
     Refuse(path, "needs plugin ABI " + Version(tag.abi_major, tag.needs_minor) +
-                     ", this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
+                     ", but this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
                      "; use a later version of alidade");
   }
   const std::string unknown =

@@ -7,17 +7,17 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// What a plugin says of itself in sections of its file, which are read before it is opened.
+/// Sections of a plugin's file that describe it. They are read before the plugin is loaded.
 namespace alidade {
 
-/// The build tag in the `.alidade` section of a plugin, read from its bytes. Errors: kPlugin (no
-/// build tag, a malformed one, another plugin ABI).
+/// Reads the build tag from the `.alidade` section of a plugin's file. Errors: kPlugin (no build
+/// tag, a malformed one, another plugin ABI).
 AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 namespace internal {
 
-/// False if the plugin lists the names of its entries and none of `names` is among them. Such a
-/// plugin may stay closed.
+/// Returns false if the plugin lists the names of its entries and the list contains none of
+/// `names`. Such a plugin need not be loaded.
 bool MayOffer(const std::filesystem::path& file, const std::set<std::string>& names);
 
 }  // namespace internal

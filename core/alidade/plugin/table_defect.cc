@@ -18,14 +18,14 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   if (entry.struct_size < offsetof(AlidadeEntry, reserved) || entry.struct_size > stride) {
     return "states a size of " + Number(entry.struct_size) + " bytes";
   }
-  if (!GoodName(entry.name)) return "has no name";
+  if (!IsValidName(entry.name)) return "has no name";
   const std::pair<const char*, const char*> texts[] = {{"family", entry.family},
                                                        {"doc", entry.doc},
                                                        {"citation", entry.citation},
                                                        {"version", entry.version}};
-  for (const auto& [what, text] : texts) {
+  for (const auto& [member, text] : texts) {
     const std::string defect = TextDefect(text);
-    if (!defect.empty()) return std::string("has a ") + what + " that " + defect;
+    if (!defect.empty()) return std::string("has a ") + member + " that " + defect;
   }
   if (!IsKnown(entry)) return {};
   const std::string unknown = UnknownBits(entry.flags | entry.thread_flags, 0);
@@ -37,7 +37,7 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
 
 std::string EntryDefect(const CppEntry& entry) {
   if (Text(entry.kind).empty()) return "an entry of its table has no kind";
-  if (!GoodName(entry.name)) return WithArticle(entry.kind) + " has no name";
+  if (!IsValidName(entry.name)) return WithArticle(entry.kind) + " has no name";
   if (entry.factory == nullptr) return std::string(entry.name) + " cannot be created";
   return {};
 }
@@ -48,9 +48,9 @@ bool IsKnown(const AlidadeEntry& entry) {
   return entry.kind == ALIDADE_KIND_SENSOR || entry.kind == ALIDADE_KIND_MOTION;
 }
 
-std::string Defect(const AlidadeTable* from) {
-  if (from == nullptr) return "its table is null";
-  const AlidadeTable table = ReadPrefix(from);
+std::string TableDefect(const AlidadeTable* source) {
+  if (source == nullptr) return "its table is null";
+  const AlidadeTable table = ReadPrefix(source);
   if (table.magic != ALIDADE_MAGIC) return "its table has the wrong magic number";
   if (table.struct_size < offsetof(AlidadeTable, reserved)) {
     return "its table states a size of " + Number(table.struct_size) + " bytes";
@@ -61,7 +61,7 @@ std::string Defect(const AlidadeTable* from) {
   const std::string unknown = UnknownBits(table.flags, 0);
   if (!unknown.empty()) return "its table has flags that this version does not know: " + unknown;
   if (!AllZero(table.reserved)) return "its table uses reserved members";
-  if (!GoodStride<AlidadeEntry>(table.entry_stride)) {
+  if (!IsValidStride<AlidadeEntry>(table.entry_stride)) {
     return "its table states an entry stride of " + Number(table.entry_stride) + " bytes";
   }
   if (table.entry_count == 0 || table.entry_count > std::uint32_t{ALIDADE_MAX_ENTRIES} ||
@@ -80,7 +80,7 @@ std::string Defect(const AlidadeTable* from) {
   return {};
 }
 
-std::string Defect(const CppPluginTable* table) {
+std::string TableDefect(const CppPluginTable* table) {
   if (table == nullptr) return "its table is null";
   if (table->struct_size != sizeof(CppPluginTable)) {
     return "its table states a size of " + Number(table->struct_size) + " bytes";

@@ -8,11 +8,11 @@
 
 namespace alidade::internal {
 
-/// Whether the entry is of a kind that this version knows; another is left out.
+/// Returns true if this version knows the kind of the entry. Other entries are ignored.
 bool IsKnown(const AlidadeEntry& entry);
 
-/// What breaks the rules of plugin_abi.h or cpp_plugin.h in a table, or "".
-std::string Defect(const AlidadeTable* table);
-std::string Defect(const CppPluginTable* table);
+/// Returns the rule of plugin_abi.h or cpp_plugin.h that a table breaks, or "".
+std::string TableDefect(const AlidadeTable* table);
+std::string TableDefect(const CppPluginTable* table);
 
 }  // namespace alidade::internal

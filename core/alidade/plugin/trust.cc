@@ -25,26 +25,26 @@ class TrustCheck {
     if (stat("/proc/self/exe", &program) == 0) owners_.push_back(program.st_uid);
   }
 
-  /// Walks from / to the file, checking each folder, link and at last the file itself.
+  /// Follows the path from / and checks each folder and link, and finally the file itself.
   void Run() {
-    const auto visit = [&](const fs::path& folder, const fs::path& entry, bool last) {
+    const auto visit = [&](const fs::path& folder, const fs::path& entry, bool is_last) {
       const struct stat status = Status(folder);
       CheckOwner(folder, status);
-      CheckMode(folder, status, !last);
+      CheckMode(folder, status, !is_last);
       CheckOwner(entry, Status(entry));
     };
-    const fs::path end = internal::FollowLinks(file_, visit);
-    if (end.empty()) {
-      Fail(file_, "behind a symbolic link that cannot be read, or more than 40 of them");
+    const fs::path target = internal::FollowLinks(file_, visit);
+    if (target.empty()) {
+      Fail(file_, "behind a symbolic link that cannot be read, or behind more than 40 links");
     }
-    CheckMode(end, Status(end), false);
+    CheckMode(target, Status(target), false);
   }
 
  private:
-  [[noreturn]] void Fail(const fs::path& path, const std::string& why) const {
+  [[noreturn]] void Fail(const fs::path& path, const std::string& reason) const {
     const std::string subject = path == file_ ? "it is " : "'" + path.string() + "' is ";
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine({file_.string()}, {}, "not trusted: " + subject + why));
+                ErrorLine({file_.string()}, {}, "not trusted: " + subject + reason));
   }
   struct stat Status(const fs::path& path) const {
     struct stat status;
@@ -62,28 +62,29 @@ class TrustCheck {
                                      : "user " + std::to_string(status.st_uid)) +
                    ", not by root, you or the owner of this program");
   }
-  /// Whether it is the private group of the user: the primary group, of the user's name and
-  /// without another member. The group of root is not, as any user may have it in a container.
+  /// Returns true for the private group of the user: a primary group with the user's name and
+  /// without other members. The group of root is not private, because any user may have it in a
+  /// container.
   static bool IsPrivateGroup(gid_t id) {
-    const uid_t own = geteuid();
-    const passwd* const user = getpwuid(own);
+    const uid_t user_id = geteuid();
+    const passwd* const user = getpwuid(user_id);
     if (id == 0 || user == nullptr || user->pw_gid != id) return false;
     const std::string name = user->pw_name;
-    const group* const found = getgrgid(id);
-    if (found == nullptr || name != found->gr_name) return false;
-    for (char** member = found->gr_mem; *member != nullptr; ++member) {
+    const group* const entry = getgrgid(id);
+    if (entry == nullptr || name != entry->gr_name) return false;
+    for (char** member = entry->gr_mem; *member != nullptr; ++member) {
       if (name != *member) return false;
     }
     bool is_shared = false;  // the primary group of another user
     setpwent();
     while (const passwd* const other = getpwent()) {
-      is_shared = is_shared || (other->pw_gid == id && other->pw_uid != own);
+      is_shared = is_shared || (other->pw_gid == id && other->pw_uid != user_id);
     }
     endpwent();
     return !is_shared;
   }
-  void CheckMode(const fs::path& path, const struct stat& status, bool sticky_allowed) const {
-    if (sticky_allowed && (status.st_mode & S_ISVTX) != 0) return;
+  void CheckMode(const fs::path& path, const struct stat& status, bool allows_sticky) const {
+    if (allows_sticky && (status.st_mode & S_ISVTX) != 0) return;
     const char* writer = nullptr;
     if ((status.st_mode & S_IWOTH) != 0) {
       writer = "everyone";
@@ -103,7 +104,7 @@ class TrustCheck {
 void CheckTrusted(const fs::path& file) {
   if (!file.is_absolute()) {
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine({file.string()}, {}, "not trusted: a relative path", "an absolute one"));
+                ErrorLine({file.string()}, {}, "not trusted: a relative path", "an absolute path"));
   }
   TrustCheck(file).Run();
 }

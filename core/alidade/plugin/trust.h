@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
-/// above it owned by another than root, the caller or the owner of the running program; writable
-/// for the world (sticky folders above excepted) or for a group other than the caller's private
-/// one, which has the caller's name and no other member. Follows symbolic links and checks each
-/// folder on the way. Errors: kNotTrusted.
+/// Refuses a file that someone else could have written, and a path that is not absolute. The file
+/// and its parent folders must be owned by root, the caller or the owner of the running program.
+/// Neither everyone nor a group may have write permission. Exceptions are sticky parent folders,
+/// and the caller's private group, which has the caller's name and no other member. Follows
+/// symbolic links and checks each folder on the way. Errors: kNotTrusted.
 void CheckTrusted(const std::filesystem::path& file);
 
 }  // namespace alidade

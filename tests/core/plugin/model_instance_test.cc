@@ -198,14 +198,14 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"has geometry 3 with sizes 1 and 1", [](HandWritten& h) { h.role.geometry = 3; }},
       {"the measurement has geometry 0", [](HandWritten& h) { h.output.geometry = 0; }},
       {"names its elements 'a,b', but has 1", [](HandWritten& h) { h.role.elements = "a,b"; }},
-      {"role 'x' is a product: each part",
+      {"role 'x' is a product; expected a role for each part",
        [](HandWritten& h) {
          h.role.geometry = ALIDADE_PRODUCT;
          h.Divide(h.role);
        }},
       {"the measurement does not describe the parts of its product",
        [](HandWritten& h) { h.output.geometry = ALIDADE_PRODUCT; }},
-      {"the measurement has parts, but is no product",
+      {"the measurement has parts, but is not a product",
        [](HandWritten& h) {
          h.Divide(h.output);
          h.output.geometry = ALIDADE_VECTOR;
@@ -235,17 +235,17 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.Divide(h.output);
          h.parts[1].geometry = ALIDADE_UNIT_QUATERNION;
        }},
-      {"has two parts of one name",
+      {"has two parts of the same name",
        [](HandWritten& h) {
          h.Divide(h.output);
          h.parts[1].name = "a";
        }},
-      {"names its elements, which are those of its parts",
+      {"names its elements, although its parts name them",
        [](HandWritten& h) {
          h.Divide(h.output);
          h.output.elements = "a,b";
        }},
-      {"role 'x' are those of a landmark",
+      {"role 'x' belong to a landmark",
        [](HandWritten& h) {
          h.Own();
          h.role.flags |= ALIDADE_ROLE_LANDMARK;
@@ -259,7 +259,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"role 'x' have a time constant of 0 s",
        [](HandWritten& h) { h.Own().dynamics = ALIDADE_GAUSS_MARKOV; }},
       {"uses reserved members", [](HandWritten& h) { h.Own().reserved[3] = &h; }},
-      {"role 'x' are a motion model's own affair",
+      {"role 'x' belong to a motion model",
        [](HandWritten& h) {
          static constexpr AlidadeMotion kMotion{
              sizeof(AlidadeMotion),
@@ -274,21 +274,21 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.instance.kind = ALIDADE_KIND_MOTION;
          h.instance.motion = &kMotion;
        }},
-      {"is shared, but not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
+      {"is shared, but is not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
       {"role 'x' has flags that this version does not know: 0x200000",
        [](HandWritten& h) { h.role.flags = 1u << 21; }},
       {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved[0] = &h; }},
       {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved0 = 1; }},
-      {"role 'x' is of an earlier timestamp, which this version",
+      {"role 'x' is the value at an earlier timestamp, which this version",
        [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_CLONE; }},
       {"role 'x' has a prior and dynamics, but is no state",
        [](HandWritten& h) {
          h.Own();
          h.role.flags = 0;
        }},
-      {"role 'a?error: b' has a name that is none",
+      {"role 'a?error: b' has an invalid name",
        [](HandWritten& h) { h.role.name = "a\nerror: b"; }},
-      {"role 'a b' has a name that is none", [](HandWritten& h) { h.role.name = "a b"; }},
+      {"role 'a b' has an invalid name", [](HandWritten& h) { h.role.name = "a b"; }},
       {"has a text 'doc' that is not UTF-8", [](HandWritten& h) { h.role.doc = "\xc0\xaf"; }},
       {"has a text 'unit' that has a control character",
        [](HandWritten& h) { h.output.unit = "m\n"; }},
@@ -302,9 +302,9 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"uses reserved members", [](HandWritten& h) { h.description.reserved[5] = &h; }},
       {"uses reserved members", [](HandWritten& h) { h.instance.reserved[7] = &h; }},
       {"uses reserved members", [](HandWritten& h) { h.sensor.reserved[5] = [] {}; }},
-      {"needs what comes beside a measurement",
+      {"needs the payload of a measurement",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_NEEDS_PAYLOAD; }},
-      {"what comes with a measurement is no vector",
+      {"the known quantity is not a vector",
        [](HandWritten& h) {
          static constexpr AlidadeSpace kAngle = [] {
            AlidadeSpace space{};
@@ -316,9 +316,9 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          }();
          h.description.known = &kAngle;
        }},
-      {"gives a residual alone",
+      {"only provides a residual",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
-      {"can initialise, but not what or how",
+      {"claims to initialise a role, but does not define",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_CAN_INITIALISE; }},
       {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.eval = nullptr; }},
       {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.struct_size = 8; }},

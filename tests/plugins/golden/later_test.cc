@@ -55,7 +55,7 @@ TEST_F(LaterPlugin, WhatHasToBeUnderstoodIsRefusedByName) {
       {"later_call", "uses reserved members"},
       {"later_instance_member", "uses reserved members"},
       {"later_parameter",
-       "parameter 'gain' in a way that this version does not understand: it has "
+       "parameter 'gain' in a way that this version does not support: it has "
        "the flags 0x10000000"},
       {"later_parameter_kind", "its kind is 7"},
       {"later_parameter_member", "it uses reserved members"}};

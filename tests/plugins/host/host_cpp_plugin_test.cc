@@ -43,7 +43,7 @@ TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {
   const PluginHost host({Built("estimators")});
   const Config config = Parse("{gain: 1}"), empty = Parse("{type: throwing_estimator}");
   for (const char* name : {"throwing_estimator", "no_estimator"}) {
-    const char* why = name[0] == 't' ? "no such thing" : "it gives nothing";
+    const char* why = name[0] == 't' ? "no such thing" : "it did not create an object";
     ExpectError(ExitCode::kPlugin,
                 {std::string("estimator '") + name + "'", Built("estimators").string(), why},
                 [&] { CreateEstimator(host, name, config.root()); });

@@ -77,7 +77,7 @@ TEST_F(HostTest, FindsPluginsOfTheEnvironmentAndTheUser) {
   EXPECT_NO_THROW(host.CreateSensor("probe", config.root()));
   EXPECT_NO_THROW(host.CreateSensor("range_rate", config.root()));
   ASSERT_GE(host.searched().size(), 4u);
-  EXPECT_EQ(host.searched()[0], "/nowhere (ALIDADE_PLUGIN_PATH): not there");
+  EXPECT_EQ(host.searched()[0], "/nowhere (ALIDADE_PLUGIN_PATH): does not exist");
   EXPECT_EQ(host.searched()[1], (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 found");
 }
 
@@ -95,8 +95,8 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
   EXPECT_TRUE(offers(host, "later_sensor"));  // its file lists no names
   EXPECT_FALSE(offers(host, "range_rate"));
   EXPECT_FALSE(offers(host, "constant"));
-  EXPECT_TRUE(offers(host.Complete(), "range_rate"));
-  EXPECT_TRUE(offers(host.Complete(), "constant"));
+  EXPECT_TRUE(offers(host.WithAllPlugins(), "range_rate"));
+  EXPECT_TRUE(offers(host.WithAllPlugins(), "constant"));
   // What is given is opened whole, and an error tells of all that there is.
   EXPECT_TRUE(offers(PluginHost({folder_ / "path"}, OnRefusal::kThrow, only), "range_rate"));
   const Config config = Parse("model: rate");
@@ -105,7 +105,7 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
   ExpectError(
       ExitCode::kPlugin,
       {"the sensor 'range_rate' of " + fs::canonical(folder_ / "path/range_rate.so").string(),
-       "is asked for, but not named in the config"},
+       "was requested, but the config does not contain its name"},
       [&] { host.CreateSensor("range_rate", config.root()); });
   Copy("good", "path/good_too.so");
   const PluginHost twice({}, OnRefusal::kThrow, only);
@@ -130,7 +130,7 @@ TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {
   ExpectError(ExitCode::kPlugin,
               {"test.yaml:2:14 sensors.s.model", "no plugin offers the sensor 'prob'",
                "did you mean 'probe'?", "searched " + Built("good").string() + " (given): 1 found",
-               "no_user_data/alidade/plugins (user data folder): not there"},
+               "no_user_data/alidade/plugins (user data folder): does not exist"},
               [&] { host.CreateSensor("prob", entry); });
   ExpectError(ExitCode::kPlugin, {"no plugin offers the motion model 'probe'", "there is a sensor"},
               [&] { host.CreateMotion("probe", entry); });
@@ -210,8 +210,9 @@ TEST_F(HostTest, ABuildTagThatAsksForMoreThanThisHostIsRefused) {
 }
 
 TEST_F(HostTest, ACppPluginOfAnotherAbiNumberIsRefusedWithBothNumbers) {
-  ExpectRefused(Built("other_cpp_abi"),
-                {"a C++ plugin for ABI number 'other', this program has '" ALIDADE_CPP_ABI "'"});
+  ExpectRefused(
+      Built("other_cpp_abi"),
+      {"a C++ plugin for ABI number 'other', but this program has '" ALIDADE_CPP_ABI "'"});
 }
 
 // FAULTS 55
@@ -288,7 +289,8 @@ TEST_F(HostTest, AnExceptionInCreateNamesModelAndPlugin) {
               [&] { host.CreateSensor("throws", entry); });
   ExpectError(ExitCode::kPlugin, {"model 'throws_int'", "an exception of unknown type"},
               [&] { host.CreateSensor("throws_int", entry); });
-  ExpectError(ExitCode::kPlugin, {"model 'wrong_kind'", "not what its table says"},
+  ExpectError(ExitCode::kPlugin,
+              {"model 'wrong_kind'", "its kind differs from the kind in the plugin's table"},
               [&] { host.CreateSensor("wrong_kind", entry); });
 }
 
@@ -307,7 +309,7 @@ TEST_F(HostTest, MoreParametersThanThereMayBeAreRefused) {
   const Config one = Parse("{model: asks_much, distinct: false}");
   EXPECT_NO_THROW(host.CreateSensor("asks_much", one.root()));
   const Config much = Parse("{model: asks_much, distinct: true}");
-  ExpectError(ExitCode::kPlugin, {"model 'asks_much' asks for more than 4096 parameters"},
+  ExpectError(ExitCode::kPlugin, {"model 'asks_much' requests more than 4096 parameters"},
               [&] { host.CreateSensor("asks_much", much.root()); });
 }
 
@@ -345,9 +347,10 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
   const PluginHost host({Built("bad_create")});
   for (const char* name : {"no_key", "gap_in_key"}) {
     const Config config = Parse("{}");
-    ExpectError(ExitCode::kPlugin,
-                {std::string("model '") + name + "' asks for parameter '", "its key is no name"},
-                [&] { host.CreateSensor(name, config.root()); });
+    ExpectError(
+        ExitCode::kPlugin,
+        {std::string("model '") + name + "' requests parameter '", "its key is not a valid name"},
+        [&] { host.CreateSensor(name, config.root()); });
   }
   for (const char* name : {"no_default", "no_number", "two_choices", "any_choices",
                            "default_beyond", "later_flag", "reserved_member", "empty_range",
@@ -357,7 +360,7 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");
     for (const Config* one : {&config, &given}) {
       ExpectError(ExitCode::kPlugin,
-                  {"test.yaml:1", std::string("model '") + name + "' asks for parameter 'noise'"},
+                  {"test.yaml:1", std::string("model '") + name + "' requests parameter 'noise'"},
                   [&] { host.CreateSensor(name, one->root()); });
     }
     const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
@@ -415,15 +418,15 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
   EXPECT_EQ(Param(scale, "noise_model").choices,
             (std::vector<std::string>{"propagated", "constant"}));
   EXPECT_EQ(Param(scale, "noise_model").fallback, "propagated");
-  EXPECT_EQ(Param(scale, "noise_model").when, "");
-  EXPECT_EQ(Param(scale, "sigma_inverse_scale").when, "noise_model = constant");
-  EXPECT_EQ(Param(scale, "sigma_px").when, "noise_model = propagated");
+  EXPECT_EQ(Param(scale, "noise_model").condition, "");
+  EXPECT_EQ(Param(scale, "sigma_inverse_scale").condition, "noise_model = constant");
+  EXPECT_EQ(Param(scale, "sigma_px").condition, "noise_model = propagated");
   EXPECT_EQ(Param(scale, "sigma_px").range, "> 0");
   EXPECT_EQ(Param(scale, "sigma_px").unit, "px");
   const std::vector<ParamInfo> motion = schema("constant_velocity");
   EXPECT_EQ(Param(motion, "dimensions").range, "[1, 3]");
   EXPECT_EQ(Param(motion, "dimensions").fallback, "1");
-  EXPECT_EQ(Param(motion, "noise.acceleration").when, "");
+  EXPECT_EQ(Param(motion, "noise.acceleration").condition, "");
   EXPECT_EQ(Param(motion, "noise.acceleration").unit, "m/s^1.5 or m/s^2");
 }
 
@@ -446,8 +449,7 @@ TEST_F(HostTest, DescribesWhatAModelCanDo) {
   };
   using Lines = std::vector<std::string>;
   EXPECT_EQ(behind_the_blocks("stereo_disparity", 2),
-            (Lines{"Jacobians: analytic", "refuses measurements of no use by itself",
-                   "can initialise depth"}));
+            (Lines{"Jacobians: analytic", "rejects invalid measurements", "can initialise depth"}));
   EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: analytic"});
 }
 

@@ -65,7 +65,8 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
     const bool requested = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
-    const AlidadeObservation observation = Shown(nullptr, has_known ? in[count] : nullptr);
+    const AlidadeObservation observation =
+        MakeObservation(nullptr, has_known ? in[count] : nullptr);
     return sensor.eval(self, &observation, in, out[0], requested ? jacobians : nullptr,
                        requested ? strides : nullptr);
   };
@@ -77,11 +78,11 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
        {{m, m}},
        0,
        true,
-       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
-                                                   double* const* l, const std::int32_t* strides) {
+       [=, &given = model.instance->noise_root()](const double* const* in, double* const*,
+                                                  double* const* l, const std::int32_t* strides) {
          if (CopyConfigNoise(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          const AlidadeObservation observation =
-             Shown(in[count], has_known ? in[count + 1] : nullptr);
+             MakeObservation(in[count], has_known ? in[count + 1] : nullptr);
          return sensor.sqrt_noise(self, &observation, in, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
@@ -93,7 +94,8 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
          0,
          false,
          [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
-           const AlidadeObservation observation = Shown(in[0], has_known ? in[1] : nullptr);
+           const AlidadeObservation observation =
+               MakeObservation(in[0], has_known ? in[1] : nullptr);
            return sensor.valid(self, &observation);
          }});
   }
@@ -165,7 +167,7 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     const bool has_prior = prior > 0, has_several = outputs.size() > 1;
     std::vector<double> row = has_several ? Gather(outputs, out) : std::vector<double>();
     const AlidadeObservation observation =
-        Shown(in[k], has_known ? in[k + (has_prior ? 2 : 1)] : nullptr);
+        MakeObservation(in[k], has_known ? in[k + (has_prior ? 2 : 1)] : nullptr);
     const std::int32_t code = sensor.initialise(
         self, &observation, role_values.data(), has_prior ? in[k + 1] : nullptr,
         has_several ? row.data() : out[0], jx.data(), jx_strides.data(), j[k], strides[k],
@@ -207,8 +209,8 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
        {{n_w, n_w}},
        0,
        true,
-       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
-                                                   double* const* l, const std::int32_t* strides) {
+       [=, &given = model.instance->noise_root()](const double* const* in, double* const*,
+                                                  double* const* l, const std::int32_t* strides) {
          if (CopyConfigNoise(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
                               strides[0]);

@@ -91,7 +91,7 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
     const std::string fallback =
         !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
     const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");
-    rows.push_back({info.key, info.unit, info.type, range, fallback, info.when, info.doc});
+    rows.push_back({info.key, info.unit, info.type, range, fallback, info.condition, info.doc});
   }
   return rows.size() > 1 ? TextTable(rows, 2) : "  no parameters\n";
 }
@@ -108,7 +108,7 @@ Json JsonOf(const std::vector<ParamInfo>& schema) {
         {"key", info.key}, {"unit", info.unit}, {"type", info.type}, {"range", info.range}};
     if (!info.fallback.empty()) json["default"] = info.fallback;
     json["choices"] = info.choices;
-    json["when"] = info.when;
+    json["when"] = info.condition;
     json["doc"] = info.doc;
     parameters.push_back(std::move(json));
   }

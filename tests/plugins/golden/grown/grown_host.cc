@@ -45,7 +45,7 @@ TEST_P(GrownHost, MayLendWhatAPluginOf10DoesNotKnow) {
   const SharedSensor line = Sensor("golden_line", "{gain: 2, sigma_m: 1, height_m: 4}");
   const double x = 4.0, b = 0.25, k = 1.0;
   const double* roles[] = {&x, &b};
-  AlidadeObservation seen = internal::Shown(nullptr, &k);
+  AlidadeObservation seen = internal::MakeObservation(nullptr, &k);
   seen.taken = const_cast<int*>(&kSomething);
   double z = 0.0;
   const AlidadeInstance& c = dynamic_cast<const PluginSensor&>(*line).instance().c();

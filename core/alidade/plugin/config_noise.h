@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "alidade/config/config.h"
+#include "alidade/plugin/model_instance.h"
+
+namespace alidade::internal {
+
+/// Returns the covariance that replaces the model's noise in the config entry of a model of `kind`
+/// (ALIDADE_KIND_*): `covariance` of a sensor, `noise.covariance` of a motion model.
+std::optional<Node> FindNoiseCovariance(const Node& entry, std::uint32_t kind);
+
+/// Returns L of the covariance L L', n x n row-major and lower triangular. The covariance is R of a
+/// sensor, in the tangent of its measurement, or Qw of a motion model, in its noise inputs. R must
+/// be positive definite; Qw may be singular. The noise of a motion model must be discrete, because
+/// it must not depend on dt. Errors: kBadConfig.
+std::vector<double> ReadNoiseRoot(const Node& covariance, const ModelInstance& model);
+
+}  // namespace alidade::internal

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The filter of example 05, composed at compile time: the models that the program loads as plugins
-// are plain structs here. Neither plugins nor config, neither allocation nor exceptions.
+// are plain structs here. It uses no plugins, config, allocation or exceptions.
 #include <cmath>
 #include <cstdio>
 
@@ -16,7 +16,7 @@ namespace {
 
 using namespace alidade;  // NOLINT(google-build-using-namespace): a program, not a library
 
-// Blocks are numbered in the order of the motion models.
+// Indices of the blocks, in the order of the motion models.
 using DepthFilter = StaticEkf<ConstantVelocity<1, false>, Constant<1>>;
 constexpr int kDepth = 0, kRate = 1, kInverseDistance = 2;
 constexpr double kGate = 15.1367;  // chi-square with 1 degree of freedom: 99.99 % pass
@@ -36,11 +36,12 @@ int main() {
   std::printf("t_s    depth_m  sigma_m  truth_m\n");
   for (const static_depth::Row& row : static_depth::kRows) {
     if (count > 0 && filter.Predict(static_depth::kStep) != Status::kOk) return 1;
-    // Without a disparity the sensor says kInvalid, and nothing has changed.
-    const StaticOutcome seen = filter.Update<kDepth>(stereo, &row.disparity_px, kGate);
-    const StaticOutcome sized =
+    // Without a disparity the outcome is kInvalid, and the filter does not change.
+    const StaticOutcome stereo_outcome = filter.Update<kDepth>(stereo, &row.disparity_px, kGate);
+    const StaticOutcome scale_outcome =
         filter.Update<kDepth, kInverseDistance>(scale, &row.inverse_scale, kGate);
-    used += (seen == StaticOutcome::kAccepted) + (sized == StaticOutcome::kAccepted);
+    used +=
+        (stereo_outcome == StaticOutcome::kAccepted) + (scale_outcome == StaticOutcome::kAccepted);
 
     const double truth = 0.3 + 0.1 * std::sin(0.8 * 3.14159265358979323846 * t);
     const double depth = *filter.value<kDepth>(), sigma = std::sqrt(filter.covariance()(0, 0));

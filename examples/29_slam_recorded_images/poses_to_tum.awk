@@ -1,4 +1,4 @@
-# Poses of 7-Scenes, a file of 4 x 4 numbers each (world_from_cam), as a trajectory in the form of TUM:
+# Converts poses of 7-Scenes, files of 4 x 4 numbers (world_from_cam), to a trajectory in TUM format:
 #   awk -f poses_to_tum.awk frame-*.pose.txt > truth.tum
 function root(s) { return s > 0 ? sqrt(s) / 2 : 0 }
 function sign(s) { return s < 0 ? -1 : 1 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter over models of one's own, with landmarks: a robot drives by the odometry that it reads,
-// measures points around it, and maps them.
+// A filter with its own models and landmarks: a robot drives with odometry, measures points around
+// it, and maps them.
 #include <alidade/estimation.h>
 
 #include <array>
@@ -13,7 +13,7 @@ using alidade::Angle;
 using alidade::Quantity;
 using alidade::Vec;
 
-/// A robot in the plane that reads its speed v and turn rate r, both with noise w:
+/// Robot in the plane whose input is its measured speed v and turn rate r, both with noise w:
 ///
 ///   p' = p + (v + w_v) dt (cos a, sin a),   heading' = heading + (r + w_r) dt,
 ///   a = heading + (r + w_r) dt / 2
@@ -29,10 +29,10 @@ struct Robot : alidade::Motion<2, Vec<2>, Angle> {
             T* heading1) const {
     using std::cos;
     using std::sin;
-    const T turned = dt_s * (u[1] + w[1]), way = dt_s * (u[0] + w[0]);
-    p1[0] = p[0] + way * cos(heading[0] + 0.5 * turned);
-    p1[1] = p[1] + way * sin(heading[0] + 0.5 * turned);
-    heading1[0] = heading[0] + turned;
+    const T turn_rad = dt_s * (u[1] + w[1]), distance_m = dt_s * (u[0] + w[0]);
+    p1[0] = p[0] + distance_m * cos(heading[0] + 0.5 * turn_rad);
+    p1[1] = p[1] + distance_m * sin(heading[0] + 0.5 * turn_rad);
+    heading1[0] = heading[0] + turn_rad;
   }
   void SqrtQ(double, alidade::MatrixRef l) const {
     l(0, 0) = 0.1;   // m/s
@@ -40,7 +40,7 @@ struct Robot : alidade::Motion<2, Vec<2>, Angle> {
   }
 };
 
-/// A point of the world as the robot measures it: ahead, to the left and up.
+/// Point of the world in the robot's frame: ahead, to the left and up.
 struct PointInRobot : alidade::Sensor<Vec<3>, Vec<2>, Angle, Vec<3>> {
   static constexpr std::array kRoles{
       Quantity{"position", "m", "of the robot", "x,y"}, Quantity{"heading", "rad"},
@@ -93,11 +93,11 @@ int main() {
     std::vector<alidade::Reading> readings{
         {robot, {kSpeed + 0.1 * normal(random), kTurn + 0.05 * normal(random)}}};
     for (std::size_t i = 0; i < world.size(); ++i) {
-      const double* const at[] = {p, &heading, world[i].data()};
+      const double* const roles[] = {p, &heading, world[i].data()};
       double z[3];
-      PointInRobot().Predict(at[0], at[1], at[2], z);
+      PointInRobot().Predict(roles[0], roles[1], roles[2], z);
       if (std::hypot(z[0], z[1]) > 6.0) continue;
-      for (double& one : z) one += 0.1 * normal(random);
+      for (double& element : z) element += 0.1 * normal(random);
       readings.push_back({points, {z[0], z[1], z[2]}, static_cast<std::int64_t>(i)});
     }
     filter.Push(alidade::TimestampFromSeconds(kStep * k), readings);

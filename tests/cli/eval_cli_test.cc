@@ -86,7 +86,7 @@ TEST_F(EvalCli, FlagsOfEvoMeanWhatTheyMeanInEvo) {
   const Outcome alone = Call({"eval", "truth.tum"});
   EXPECT_EQ(alone.code, 2);
   EXPECT_EQ(alone.err,
-            "error: truth.tum: one file has nothing to be compared with; expected REF EST, or the "
+            "error: truth.tum: a single file cannot be evaluated; expected REF EST, or the "
             "folder of a run\nsee `alidade eval --help`\n");
 }
 
@@ -245,7 +245,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   json.emplace_back("--json");
   const Outcome table = Call(markdown);
   EXPECT_EQ(table.code, 65);
-  EXPECT_EQ(table.err, "error: two.tum: 2 poses to align by; expected 3 or more\n");
+  EXPECT_EQ(table.err, "error: two.tum: 2 poses to align; expected 3 or more\n");
   EXPECT_TRUE(Contains(table.out, "| two | failed | - | - | - | - | - | - | - |\n")) << table.out;
   EXPECT_TRUE(Contains(table.out, "| mono | se3 | 1.000000 | 31 of 31 |")) << table.out;
   EXPECT_TRUE(
@@ -258,7 +258,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   const Node evaluations = parsed.root().At("evaluations");
   EXPECT_EQ(evaluations.Items()[0].At("estimate").Text(), "two");
   EXPECT_EQ(evaluations.Items()[0].At("error").Text(),
-            "two.tum: 2 poses to align by; expected 3 or more");
+            "two.tum: 2 poses to align; expected 3 or more");
   EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
   EXPECT_FALSE(evaluations.Items()[1].Find("error"));
   // Of a single one there is nothing to print.

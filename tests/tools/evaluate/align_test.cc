@@ -105,7 +105,7 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ExitCode::kBadData);
         EXPECT_STREQ(error.what(),
-                     "curve.tum: no scale: its positions have nothing in common with those of "
+                     "curve.tum: no scale: its positions are not correlated with those of "
                      "curve.tum; expected poses of the same trajectory, or --align");
       }
     }

@@ -154,9 +154,10 @@ TEST(PairsOf, RefusesMorePairsThanAnyoneReads) {
     ADD_FAILURE() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
-    EXPECT_STREQ(error.what(),
-                 "curve.tum --delta: more than 10000000 pairs of poses are apart by it; expected a "
-                 "larger --delta, or a smaller --delta-tol");
+    EXPECT_STREQ(
+        error.what(),
+        "curve.tum --delta: more than 10000000 pairs of poses are this far apart; expected a "
+        "larger --delta, or a smaller --delta-tol");
   }
 }
 
@@ -253,7 +254,7 @@ TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
     EXPECT_FALSE(e.position_nees || e.orientation_nees);
     EXPECT_EQ(e.nees_withheld,
               std::string("the alignment by ") + ToString(alignment) +
-                  " removes part of the error that the covariance describes; leave it out");
+                  " removes part of the error that the covariance describes; omit the alignment");
   }
 }
 

@@ -101,8 +101,9 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
   EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
-  EXPECT_NE(Refusal(rows).find("; expected one for each pose, or poses_times.txt next to it"),
-            std::string::npos)
+  EXPECT_NE(
+      Refusal(rows).find("; expected one for each pose, or poses_times.txt in the same folder"),
+      std::string::npos)
       << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the one before"),
@@ -144,7 +145,7 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_EQ(Refusal(good + "1 1 nan 3 0 0 0 1\n"),
             "poses.txt:2:5 y: 'nan' is not finite; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 -1e300 3 0 0 0 1\n"),
-            "poses.txt:2: the position is more than 1e15 m away; expected metres");
+            "poses.txt:2: a coordinate is beyond 1e15 m; expected a position in metres");
   EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
             "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
@@ -152,7 +153,8 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
             "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number of 0 or more");
   const std::string no_rotation =
-      "poses.txt:1: columns 1-3, 5-7, 9-11 are no rotation; expected R R' = 1 to 1e-3, det R = 1";
+      "poses.txt:1: columns 1-3, 5-7, 9-11 are not a rotation; expected R R' = 1 to 1e-3, det R = "
+      "1";
   EXPECT_EQ(Refusal("1.1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
   EXPECT_EQ(Refusal("-1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
   EXPECT_EQ(Refusal("# nothing\n").substr(0, 23), "poses.txt:1: no poses; ");
@@ -173,9 +175,10 @@ TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) 
                         {"1311868163869.7", "1311868163903", "ms"}}) {
     SCOPED_TRACE(c.first + ' ' + c.unit);
     const std::string text = "# t\n" + c.first + pose + c.second + pose;
-    EXPECT_EQ(WarningsOf(text), "poses.txt:2 t: '" + c.first +
-                                    "' and what follows cannot be seconds; read as " + c.unit +
-                                    "; expected seconds, as TUM has them\n");
+    EXPECT_EQ(WarningsOf(text),
+              "poses.txt:2 t: '" + c.first +
+                  "' and the following timestamps are not plausible as seconds; read as " + c.unit +
+                  "; expected seconds, as in TUM\n");
     const Trajectory t = Read(text);
     EXPECT_NEAR(1e-9 * static_cast<double>(t.timestamps[1] - t.timestamps[0]), 0.0333, 1e-4);
   }
@@ -190,8 +193,7 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   const std::string pose = " 1 2 3 0 0 0 1\n";
   const std::string two = "1" + pose + "2" + pose;
   const auto beyond = [](const std::string& timestamp) {
-    return "poses.txt:3 t: '" + timestamp +
-           "' is beyond 292 years; expected seconds, as TUM has them";
+    return "poses.txt:3 t: '" + timestamp + "' is beyond 292 years; expected seconds, as in TUM";
   };
   for (const std::string timestamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
     EXPECT_EQ(Refusal(two + timestamp + pose), beyond(timestamp));
@@ -199,16 +201,15 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
             beyond("9200000001"));
   EXPECT_EQ(Refusal("9223372036854775807,1,2,3,1,0,0,0\n"),
-            "poses.txt:1:1 t: '9223372036854775807' is beyond 292 years; expected ns, as EuRoC has "
-            "them");
+            "poses.txt:1:1 t: '9223372036854775807' is beyond 292 years; expected ns, as in EuRoC");
   EXPECT_EQ(Refusal("1e20" + pose),
-            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
+            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as in TUM");
   EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);
   // No difference of two timestamps may be beyond either.
   EXPECT_EQ(
       Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose + "9000000000" +
               pose),
-      "poses.txt t: its timestamps are more than 292 years apart; expected those of one clock");
+      "poses.txt t: the timestamps span more than 292 years; expected timestamps of one clock");
 }
 
 TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
@@ -263,10 +264,10 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
 TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
   EXPECT_EQ(WarningsOf("0 0 0 0 1 0 0 0\n1 1 2 3 0.8 0.6 0 0\n"),
             "poses.txt:1 qx: the first pose is the identity if its quaternion is written w first; "
-            "expected qx qy qz qw, as TUM has it\n");
+            "expected qx qy qz qw, as in TUM\n");
   EXPECT_EQ(WarningsOf("0,0,0,0,0,0,0,1\n"),
             "poses.txt:1 qw: the first pose is the identity if its quaternion is written w last; "
-            "expected qw qx qy qz, as EuRoC has it\n");
+            "expected qw qx qy qz, as in EuRoC\n");
   EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
   EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");  // half a turn somewhere else
 }

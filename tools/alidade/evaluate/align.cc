@@ -12,28 +12,32 @@ namespace {
 using internal::SquaredExtent;
 using internal::Umeyama;
 
-[[noreturn]] void Fail(const std::string& name, const std::string& what,
+[[noreturn]] void Fail(const std::string& name, const std::string& problem,
                        const std::string& expected) {
-  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, what, expected));
+  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, problem, expected));
 }
 
-/// The rotation about z that maximises sum to' R from of centred points [Zhang2018].
-Similarity YawOnly(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-  const Eigen::Vector3d from_mean = from.rowwise().mean(), to_mean = to.rowwise().mean();
-  const Eigen::Matrix3d c = (to.colwise() - to_mean) * (from.colwise() - from_mean).transpose();
+/// Finds the rotation R about z that maximises sum p_ref' R p_est of centred points [Zhang2018].
+Similarity AlignYaw(const Eigen::Matrix3Xd& estimate_points,
+                    const Eigen::Matrix3Xd& reference_points) {
+  const Eigen::Vector3d estimate_mean = estimate_points.rowwise().mean(),
+                        reference_mean = reference_points.rowwise().mean();
+  const Eigen::Matrix3d c = (reference_points.colwise() - reference_mean) *
+                            (estimate_points.colwise() - estimate_mean).transpose();
   const double yaw = std::atan2(c(1, 0) - c(0, 1), c(0, 0) + c(1, 1));
-  Similarity found;
-  found.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  found.translation = to_mean - found.rotation * from_mean;
-  return found;
+  Similarity transformation;
+  transformation.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  transformation.translation = reference_mean - transformation.rotation * estimate_mean;
+  return transformation;
 }
 
-Similarity Origin(const Trajectory& reference, const Trajectory& estimate) {
-  Similarity found;
-  found.rotation =
+Similarity AlignOrigin(const Trajectory& reference, const Trajectory& estimate) {
+  Similarity transformation;
+  transformation.rotation =
       (reference.orientations[0] * estimate.orientations[0].conjugate()).toRotationMatrix();
-  found.translation = reference.positions.col(0) - found.rotation * estimate.positions.col(0);
-  return found;
+  transformation.translation =
+      reference.positions.col(0) - transformation.rotation * estimate.positions.col(0);
+  return transformation;
 }
 
 }  // namespace
@@ -45,45 +49,46 @@ const char* ToString(Alignment alignment) {
 
 Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate) {
   const auto& [scale, rotation, translation] = reference_from_estimate;
-  Trajectory moved = estimate;
-  moved.positions = ((scale * rotation) * estimate.positions).colwise() + translation;
-  const Eigen::Quaterniond turn(rotation);
-  for (Eigen::Quaterniond& q : moved.orientations) q = (turn * q).normalized();
-  moved.position_covariances.clear();
-  moved.orientation_covariances.clear();
-  return moved;
+  Trajectory aligned = estimate;
+  aligned.positions = ((scale * rotation) * estimate.positions).colwise() + translation;
+  const Eigen::Quaterniond rotation_q(rotation);
+  for (Eigen::Quaterniond& q : aligned.orientations) q = (rotation_q * q).normalized();
+  aligned.position_covariances.clear();
+  aligned.orientation_covariances.clear();
+  return aligned;
 }
 
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses) {
   ALIDADE_EXPECTS(reference.size() == estimate.size() && estimate.size() > 0 && poses >= 0);
   if (alignment == Alignment::kNone) return {};
-  if (alignment == Alignment::kOrigin) return Origin(reference, estimate);
+  if (alignment == Alignment::kOrigin) return AlignOrigin(reference, estimate);
   const int used = poses == 0 ? estimate.size() : std::min(poses, estimate.size());
-  const Eigen::Matrix3Xd from = estimate.positions.leftCols(used);
-  const Eigen::Matrix3Xd to = reference.positions.leftCols(used);
+  const Eigen::Matrix3Xd estimate_points = estimate.positions.leftCols(used);
+  const Eigen::Matrix3Xd reference_points = reference.positions.leftCols(used);
   if (used < 3) {
-    Fail(estimate.name, std::to_string(used) + " poses to align by", "3 or more");
+    Fail(estimate.name, std::to_string(used) + " poses to align", "3 or more");
   }
-  if (alignment == Alignment::kYaw) return YawOnly(from, to);
-  if (alignment == Alignment::kSe3) return Umeyama(from, to, false);
-  const std::optional<Similarity> similarity = internal::FindSimilarity(from, to);
+  if (alignment == Alignment::kYaw) return AlignYaw(estimate_points, reference_points);
+  if (alignment == Alignment::kSe3) return Umeyama(estimate_points, reference_points, false);
+  const std::optional<Similarity> similarity =
+      internal::FindSimilarity(estimate_points, reference_points);
   if (!similarity) {
-    const auto at_one_place = [](const auto& points) { return !(SquaredExtent(points) > 0.0); };
-    if (at_one_place(from) || at_one_place(to)) {
-      Fail((at_one_place(from) ? estimate : reference).name, "all poses are at one place",
-           "a trajectory, to take a scale from");
+    const auto at_one_point = [](const auto& points) { return !(SquaredExtent(points) > 0.0); };
+    if (at_one_point(estimate_points) || at_one_point(reference_points)) {
+      Fail((at_one_point(estimate_points) ? estimate : reference).name,
+           "all poses are at one point", "a trajectory that determines a scale");
     }
     Fail(estimate.name,
-         "no scale: its positions have nothing in common with those of " + reference.name,
+         "no scale: its positions are not correlated with those of " + reference.name,
          "poses of the same trajectory, or --align");
   }
-  Similarity found = *similarity;
+  Similarity transformation = *similarity;
   if (alignment == Alignment::kScale) {
-    found.rotation.setIdentity();
-    found.translation.setZero();
+    transformation.rotation.setIdentity();
+    transformation.translation.setZero();
   }
-  return found;
+  return transformation;
 }
 
 }  // namespace alidade

@@ -10,46 +10,50 @@
 namespace alidade {
 namespace {
 
-[[noreturn]] void FailMatching(const std::string& name, const std::string& what,
+[[noreturn]] void FailMatching(const std::string& name, const std::string& problem,
                                const std::string& expected) {
-  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, what, expected));
+  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, problem, expected));
 }
 
-/// The nearest double: what a reader of decimal seconds has.
+/// Returns the nearest double, which equals the result of reading decimal seconds.
 double DoubleSeconds(Timestamp timestamp) {
   return static_cast<double>(static_cast<long double>(timestamp) / 1e9L);
 }
 
-/// |a - b| of doubles: of a clock that counts from 1970 to 0.2 us. Where a timestamp lies in the
-/// middle of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
-double Apart(Timestamp a, Timestamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
+/// Returns |a - b| of doubles; the resolution is 0.2 us for a clock that counts from 1970. If a
+/// timestamp lies midway between two others, rounding decides, as in evo, to obtain the same
+/// results.
+double TimeDistance(Timestamp a, Timestamp b) {
+  return std::abs(DoubleSeconds(a) - DoubleSeconds(b));
+}
 
-/// Index of the nearest timestamp, of several as near the first.
-int NearestIndex(const std::vector<Timestamp>& timestamps, Timestamp to) {
-  auto nearest = std::lower_bound(timestamps.begin(), timestamps.end(), to);
-  const auto before = [&] {
+/// Returns the index of the nearest timestamp; the first of several equally near ones.
+int NearestIndex(const std::vector<Timestamp>& timestamps, Timestamp time) {
+  auto nearest = std::lower_bound(timestamps.begin(), timestamps.end(), time);
+  const auto previous_is_nearer = [&] {
     if (nearest == timestamps.begin()) return false;
-    return nearest == timestamps.end() || Apart(*(nearest - 1), to) <= Apart(*nearest, to);
+    return nearest == timestamps.end() ||
+           TimeDistance(*(nearest - 1), time) <= TimeDistance(*nearest, time);
   };
-  while (before()) --nearest;
+  while (previous_is_nearer()) --nearest;
   return static_cast<int>(nearest - timestamps.begin());
 }
 
-Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
+Matches MatchByRow(const Trajectory& reference, const Trajectory& estimate) {
   Matches matches;
   matches.by_row = true;
   matches.possible = reference.size();
   for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
   matches.estimate = matches.reference;
   if (reference.size() == estimate.size()) return matches;
-  const bool of_reference = estimate.has_timestamps();
-  const Trajectory& bare = of_reference ? reference : estimate;
-  const Trajectory& other = of_reference ? estimate : reference;
-  FailMatching(bare.name,
-               std::to_string(bare.size()) + " poses for " + std::to_string(other.size()) + " of " +
-                   other.name + ", and no timestamps",
+  const bool reference_is_untimed = estimate.has_timestamps();
+  const Trajectory& untimed = reference_is_untimed ? reference : estimate;
+  const Trajectory& counterpart = reference_is_untimed ? estimate : reference;
+  FailMatching(untimed.name,
+               std::to_string(untimed.size()) + " poses for " + std::to_string(counterpart.size()) +
+                   " of " + counterpart.name + ", and no timestamps",
                std::string("a row for each row of the ") +
-                   (of_reference ? "estimate" : "reference") +
+                   (reference_is_untimed ? "estimate" : "reference") +
                    ", or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
 }
 
@@ -62,21 +66,21 @@ std::string Span(const Trajectory& trajectory) {
 
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Timestamp max_diff,
                   Timestamp offset) {
-  const bool both = reference.has_timestamps() && estimate.has_timestamps();
-  const bool neither = !reference.has_timestamps() && !estimate.has_timestamps();
+  const bool both_timed = reference.has_timestamps() && estimate.has_timestamps();
+  const bool none_timed = !reference.has_timestamps() && !estimate.has_timestamps();
   const auto is_kitti = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
-  if (neither || (!both && is_kitti(reference) && is_kitti(estimate))) {
-    return ByRow(reference, estimate);
+  if (none_timed || (!both_timed && is_kitti(reference) && is_kitti(estimate))) {
+    return MatchByRow(reference, estimate);
   }
-  if (!both) {
+  if (!both_timed) {
     FailMatching((reference.has_timestamps() ? estimate : reference).name,
                  "poses without timestamps",
-                 "times.txt next to them, as the other trajectory has timestamps");
+                 "a times.txt in the same folder, because the other trajectory has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
   const std::vector<Timestamp>& shorter = (estimate_longer ? reference : estimate).timestamps;
   const std::vector<Timestamp>& longer = (estimate_longer ? estimate : reference).timestamps;
-  const Timestamp shift = estimate_longer ? -offset : offset;  // of the shorter
+  const Timestamp shift = estimate_longer ? -offset : offset;  // of the shorter trajectory
   for (const Timestamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
@@ -86,15 +90,15 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   }
   Matches matches;
   matches.possible = static_cast<int>(shorter.size());
-  std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;
-  std::vector<int>& of_longer = estimate_longer ? matches.estimate : matches.reference;
+  std::vector<int>& shorter_matches = estimate_longer ? matches.reference : matches.estimate;
+  std::vector<int>& longer_matches = estimate_longer ? matches.estimate : matches.reference;
   for (int i = 0; i < matches.possible; ++i) {
-    const Timestamp at = shorter[static_cast<std::size_t>(i)] + shift;
-    const int nearest = NearestIndex(longer, at);
-    if (!(Apart(longer[static_cast<std::size_t>(nearest)], at) <= DoubleSeconds(max_diff)))
+    const Timestamp time = shorter[static_cast<std::size_t>(i)] + shift;
+    const int nearest = NearestIndex(longer, time);
+    if (!(TimeDistance(longer[static_cast<std::size_t>(nearest)], time) <= DoubleSeconds(max_diff)))
       continue;
-    of_shorter.push_back(i);
-    of_longer.push_back(nearest);
+    shorter_matches.push_back(i);
+    longer_matches.push_back(nearest);
   }
   if (!matches.estimate.empty()) return matches;
   FailMatching(estimate.name,

@@ -22,7 +22,7 @@ const Eigen::Quaterniond& Orientation(const Trajectory& trajectory, int i) {
   return trajectory.orientations[static_cast<std::size_t>(i)];
 }
 
-/// The length of the translation and the angle of the rotation of an error pose.
+/// Error pose: length of its translation and angle of its rotation.
 struct ErrorPose {
   double translation, angle;
 };
@@ -44,29 +44,29 @@ double ErrorOf(PoseRelation relation, const ErrorPose& e) {
   return e.translation;
 }
 
-/// p_j in the frame of pose i.
+/// Returns p_j in the frame of pose i.
 Eigen::Vector3d RelativePosition(const Trajectory& t, int i, int j) {
   return Orientation(t, i).conjugate() * (t.positions.col(j) - t.positions.col(i));
 }
 
 ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate, int i, int j) {
-  const auto turn = [&](const Trajectory& t) {
+  const auto relative_rotation = [&](const Trajectory& t) {
     return Orientation(t, i).conjugate() * Orientation(t, j);
   };
   return {(RelativePosition(estimate, i, j) - RelativePosition(reference, i, j)).norm(),
-          AngleOf(turn(reference).conjugate() * turn(estimate))};
+          AngleOf(relative_rotation(reference).conjugate() * relative_rotation(estimate))};
 }
 
-/// Distance of each pose from the first: frames, metres of path, rad of turns for both units of
-/// angle, and ns for seconds, as these are exact.
+/// Computes the distance of each pose from the first: frames, metres along the trajectory, rad for
+/// both units of angle, and ns for seconds, because these are exact.
 std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
   std::vector<double> progress = {0.0};
   for (int i = 1; i < t.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
+    const auto index = static_cast<std::size_t>(i);
     double step = 1.0;
     if (unit == DeltaUnit::kMetres) step = t.Length(i - 1, i);
     if (unit == DeltaUnit::kSeconds)
-      step = static_cast<double>(t.timestamps[at] - t.timestamps[at - 1]);
+      step = static_cast<double>(t.timestamps[index] - t.timestamps[index - 1]);
     if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
       step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
     }
@@ -79,47 +79,49 @@ using Pairs = std::vector<std::pair<int, int>>;
 
 Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaUnit unit) {
   Pairs pairs;
-  int begin = unit == DeltaUnit::kMetres ? -1 : 0;  // -1: of a pair that does not count
-  double at = 0.0;
+  int begin = unit == DeltaUnit::kMetres ? -1 : 0;  // -1: the first pair is dropped
+  double begin_progress = 0.0;
   for (std::size_t j = 1; j < progress.size(); ++j) {
-    if (!(progress[j] - at >= delta)) continue;
+    if (!(progress[j] - begin_progress >= delta)) continue;
     if (begin >= 0) pairs.emplace_back(begin, static_cast<int>(j));
     begin = static_cast<int>(j);
-    at = progress[j];
+    begin_progress = progress[j];
   }
   return pairs;
 }
 
-/// From each pose to the one nearest to delta after it.
+/// Returns pairs of each pose and the pose nearest to delta after it.
 Pairs AllPairs(const std::vector<double>& progress, double delta, double tolerance) {
   Pairs pairs;
   for (std::size_t i = 0; i + 1 < progress.size(); ++i) {
     const auto first = progress.begin() + static_cast<std::ptrdiff_t>(i) + 1;
     auto nearest = std::lower_bound(first, progress.end(), progress[i] + delta);
-    const auto off = [&](auto at) { return std::abs(*at - progress[i] - delta); };
-    if (nearest == progress.end() || (nearest != first && off(nearest - 1) <= off(nearest))) {
+    const auto deviation = [&](auto iterator) { return std::abs(*iterator - progress[i] - delta); };
+    if (nearest == progress.end() ||
+        (nearest != first && deviation(nearest - 1) <= deviation(nearest))) {
       --nearest;
     }
-    if (nearest < first || off(nearest) > tolerance) continue;
+    if (nearest < first || deviation(nearest) > tolerance) continue;
     pairs.emplace_back(static_cast<int>(i), static_cast<int>(nearest - progress.begin()));
   }
   return pairs;
 }
 
-/// Every two poses that are turned against each other by delta. Error: kBadData if they are too
+/// Returns all pairs of poses whose relative rotation is delta. Error: kBadData if there are too
 /// many.
 Pairs AllAnglePairs(const Trajectory& t, double delta, double tolerance) {
-  constexpr std::size_t kMost = 10'000'000;  // there are n (n - 1) / 2 at rest
+  constexpr std::size_t kMaxPairs = 10'000'000;  // at rest there are n (n - 1) / 2 pairs
   Pairs pairs;
   for (int i = 0; i < t.size(); ++i) {
     for (int j = i + 1; j < t.size(); ++j) {
       const double angle = AngleOf(Orientation(t, i).conjugate() * Orientation(t, j));
       if (std::abs(angle - delta) <= tolerance) pairs.emplace_back(i, j);
     }
-    if (pairs.size() > kMost) {
-      throw Error(ExitCode::kBadData, ErrorLine({t.name}, "--delta",
-                                                "more than 10000000 pairs of poses are apart by it",
-                                                "a larger --delta, or a smaller --delta-tol"));
+    if (pairs.size() > kMaxPairs) {
+      throw Error(
+          ExitCode::kBadData,
+          ErrorLine({t.name}, "--delta", "more than 10000000 pairs of poses are this far apart",
+                    "a larger --delta, or a smaller --delta-tol"));
     }
   }
   return pairs;
@@ -164,11 +166,12 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
 
 Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   ALIDADE_EXPECTS(options.delta > 0.0 && options.tolerance >= 0.0);
-  const auto fail = [&](const std::string& what, const char* expected) {
-    throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--delta", what, expected));
+  const auto fail = [&](const std::string& problem, const char* expected) {
+    throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--delta", problem, expected));
   };
   if (options.unit == DeltaUnit::kSeconds && !estimate.has_timestamps()) {
-    fail("seconds of poses without timestamps", "--delta-unit f or m, or times.txt next to them");
+    fail("the unit is seconds, but the poses have no timestamps",
+         "--delta-unit f or m, or a times.txt in the same folder");
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;

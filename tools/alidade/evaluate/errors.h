@@ -8,10 +8,10 @@
 
 namespace alidade::internal {
 
-/// Of each pose; both trajectories have the same ones, in one world.
+/// Computes the error of each pose. Both trajectories have the same poses in the same world.
 PoseErrors AbsoluteErrors(PoseRelation relation, const Trajectory& reference,
                           const Trajectory& estimate);
-/// Of each pair.
+/// Computes the error of each pair.
 PoseErrors RelativeErrors(PoseRelation relation, const Trajectory& reference,
                           const Trajectory& estimate,
                           const std::vector<std::pair<int, int>>& pairs);

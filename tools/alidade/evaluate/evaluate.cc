@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// The axes whose variance is above 0 in one pose or more: of a planar pose not all three.
+/// Returns the axes with positive variance in at least one pose; a planar pose has fewer than 3.
 std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {
@@ -24,7 +24,7 @@ std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) 
   return axes;
 }
 
-/// Of the errors of all poses, columns of `errors`, with the covariances next to them.
+/// Computes NEES of the columns of `errors` with their covariances.
 Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
   const std::vector<int> axes = UncertainAxes(covariances);
   Nees nees;
@@ -45,7 +45,7 @@ Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& 
   return nees;
 }
 
-/// d = q_true (-) q of each pose, in the body, rad.
+/// Computes d = q_true (-) q of each pose, in the body, rad.
 Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory& estimate) {
   Eigen::Matrix3Xd errors(3, estimate.size());
   for (int i = 0; i < estimate.size(); ++i) {
@@ -62,13 +62,13 @@ Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory
 void AddNees(Evaluation& evaluation) {
   const Trajectory& estimate = evaluation.estimate;
   if (!estimate.has_covariances()) return;
-  const auto add = [&](const char* of, const Nees& nees, std::optional<Nees>& to) {
+  const auto add = [&](const char* quantity, const Nees& nees, std::optional<Nees>& result) {
     if (nees.poses > 0) {
-      to = nees;
+      result = nees;
       return;
     }
     std::string& withheld = evaluation.nees_withheld;
-    withheld += std::string(withheld.empty() ? "" : "; ") + "every covariance of the " + of +
+    withheld += std::string(withheld.empty() ? "" : "; ") + "every covariance of the " + quantity +
                 " is singular";
   };
   add("position",
@@ -84,12 +84,12 @@ std::optional<double> ScaleOf(const Trajectory& reference, const Trajectory& est
   return found ? std::optional(found->scale) : std::nullopt;
 }
 
-/// Scale of the second half over that of the first, - 1.
+/// Computes (scale of the second half) / (scale of the first half) - 1.
 std::optional<double> ScaleDrift(const Trajectory& reference, const Trajectory& estimate) {
-  constexpr int kFewest = 10;
+  constexpr int kMinPoses = 10;
   std::vector<int> halves[2];
   for (int i = 0; i < estimate.size(); ++i) halves[2 * i < estimate.size() ? 0 : 1].push_back(i);
-  if (std::ssize(halves[1]) < kFewest) return std::nullopt;
+  if (std::ssize(halves[1]) < kMinPoses) return std::nullopt;
   const auto scale = [&](const std::vector<int>& half) {
     return ScaleOf(reference.Select(half), estimate.Select(half));
   };
@@ -121,7 +121,7 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
     if (estimate.has_covariances()) {
       evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
                                  " removes part of the error that the covariance describes; "
-                                 "leave it out";
+                                 "omit the alignment";
     }
     evaluation.estimate = evaluation.alignment * evaluation.estimate;
   }
@@ -132,7 +132,7 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
   if (evaluation.estimate.size() < 2) return evaluation;
   try {
     evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
-  } catch (const Error& error) {  // the other figures stand
+  } catch (const Error& error) {  // the other results remain valid
     evaluation.warnings.emplace_back(error.what());
     return evaluation;
   }

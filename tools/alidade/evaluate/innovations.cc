@@ -15,11 +15,12 @@ namespace {
 struct SensorSums {
   std::int64_t measurements = 0, inside = 0, products = 0;
   double nis = 0.0;
-  double product = 0.0, before2 = 0.0, after2 = 0.0;  ///< of elements that follow one another
-  std::map<std::string, std::vector<double>> last;    ///< r / s, by landmark
+  /// Sums over elements r / s of consecutive measurements a, b: a b, a^2, b^2.
+  double product = 0.0, before2 = 0.0, after2 = 0.0;
+  std::map<std::string, std::vector<double>> last;  ///< last r / s, by landmark
 };
 
-/// The columns of `NAME/innovations.csv` that are read, by their places.
+/// Indices of the columns of `NAME/innovations.csv` that are read.
 struct Columns {
   std::size_t sensor, landmark, outcome, dof, nis, s0, r0;
 };
@@ -42,13 +43,14 @@ void AddProducts(const std::string& landmark, const std::vector<double>& r, Sens
   last = r;
 }
 
-void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, double>& limits,
+void AddRow(const NumberRows& rows, const Columns& columns, std::map<std::int64_t, double>& limits,
             SensorSums& sums) {
-  const std::int64_t dof = rows.Index(at.dof, "dof");
-  const double nis = rows.Number(at.nis, "nis");
-  if (dof < 1) rows.FailCell(at.dof, "dof", "is not a number of elements", "1 or more");
-  const std::size_t room = rows.size() - std::min(rows.size(), std::max(at.s0, at.r0));
-  if (static_cast<std::uint64_t>(dof) > room) rows.FailLine("too few columns", "as many as dof");
+  const std::int64_t dof = rows.Index(columns.dof, "dof");
+  const double nis = rows.Number(columns.nis, "nis");
+  if (dof < 1) rows.FailCell(columns.dof, "dof", "is not a positive number", "1 or more");
+  const std::size_t max_dof = rows.size() - std::min(rows.size(), std::max(columns.s0, columns.r0));
+  if (static_cast<std::uint64_t>(dof) > max_dof)
+    rows.FailLine("too few columns for dof", "dof columns of s and of r");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);
@@ -56,9 +58,9 @@ void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, do
   sums.inside += nis <= limit->second ? 1 : 0;
   std::vector<double> r;
   for (std::size_t k = 0; k < static_cast<std::size_t>(dof); ++k) {
-    r.push_back(rows.Number(at.r0 + k, "r") / rows.Number(at.s0 + k, "s"));
+    r.push_back(rows.Number(columns.r0 + k, "r") / rows.Number(columns.s0 + k, "s"));
   }
-  AddProducts(std::string(rows.text(at.landmark)), r, sums);
+  AddProducts(std::string(rows.text(columns.landmark)), r, sums);
 }
 
 InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
@@ -79,15 +81,15 @@ std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& f
   NumberRows rows(file, {}, {});
   if (!rows.Next()) rows.FailLine("no header line", "innovations.csv of a run folder");
   const std::size_t width = rows.size();
-  const Columns at{Find(rows, "sensor"), Find(rows, "landmark"), Find(rows, "outcome"),
-                   Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),
-                   Find(rows, "r0")};
+  const Columns columns{Find(rows, "sensor"), Find(rows, "landmark"), Find(rows, "outcome"),
+                        Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),
+                        Find(rows, "r0")};
   std::map<std::string, SensorSums> sensors;
   std::map<std::int64_t, double> limits;  // chi2(0.95, dof)
   while (rows.Next()) {
     rows.ExpectColumns(width, "as in the header");
-    if (rows.text(at.outcome) != "accepted" || rows.text(at.nis).empty()) continue;
-    AddRow(rows, at, limits, sensors[std::string(rows.text(at.sensor))]);
+    if (rows.text(columns.outcome) != "accepted" || rows.text(columns.nis).empty()) continue;
+    AddRow(rows, columns, limits, sensors[std::string(rows.text(columns.sensor))]);
   }
   std::vector<InnovationStatistics> statistics;
   for (const auto& [sensor, sums] : sensors) statistics.push_back(Finish(sensor, sums));

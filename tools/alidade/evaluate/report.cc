@@ -22,9 +22,9 @@ using internal::Json;
 using internal::NumberText;
 using internal::RoundedText;
 
-constexpr int kDecimals = 6;  // as evo has them
+constexpr int kDecimals = 6;  // as in evo
 
-/// The statistics with evo's names, in its order.
+/// Statistics with evo's names, in its order.
 constexpr std::pair<const char*, double ErrorStatistics::*> kStatistics[] = {
     {"rmse", &ErrorStatistics::rmse},     {"mean", &ErrorStatistics::mean},
     {"median", &ErrorStatistics::median}, {"std", &ErrorStatistics::std},
@@ -70,14 +70,14 @@ std::string NeesText(const char* name, const Nees& nees, int poses) {
          " poses\n";
 }
 
-/// All statistics of one evaluation, a row for each relation.
+/// Returns all statistics of one evaluation, in a row for each relation.
 std::string StatisticsTable(const Evaluation& evaluation) {
   std::vector<std::string> names;
   for (const auto& [name, member] : kStatistics) names.emplace_back(name);
   std::vector<internal::TableRow> rows;
-  const auto add = [&](const char* what, const std::vector<PoseErrors>& all) {
-    for (const PoseErrors& errors : all) {
-      const std::string label = std::string(what) + ' ' + ToString(errors.relation);
+  const auto add = [&](const char* kind, const std::vector<PoseErrors>& relations) {
+    for (const PoseErrors& errors : relations) {
+      const std::string label = std::string(kind) + ' ' + ToString(errors.relation);
       internal::TableRow& row =
           rows.emplace_back(internal::TableRow{WithUnit(label, UnitOf(errors.relation)), {}});
       for (const auto& [name, member] : kStatistics) {
@@ -99,19 +99,19 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   }
   if (!text.empty()) {
     text +=
-        "NEES is marginal here: of each quantity alone. nees.mean in the run.json of a run is "
-        "joint, over all states of a model.\n";
+        "This NEES is marginal: it is of each quantity alone. nees.mean in run.json is joint, over "
+        "all states of a model.\n";
   }
   if (!evaluation.nees_withheld.empty()) {
     text += "NEES withheld: " + evaluation.nees_withheld + '\n';
   }
-  for (const InnovationStatistics& one : evaluation.innovations) {
-    text += "NIS " + one.sensor + ' ' + RoundedText(one.nis_mean, 4) + " per dof, " +
-            RoundedText(100.0 * one.nis_within95, 3) + " % within 95 %, " +
-            std::to_string(one.measurements) + " measurements";
-    if (std::isfinite(one.autocorrelation)) {
-      text += "; autocorrelation " + RoundedText(one.autocorrelation, 3) + ", white within " +
-              RoundedText(one.white_within, 2);
+  for (const InnovationStatistics& statistics : evaluation.innovations) {
+    text += "NIS " + statistics.sensor + ' ' + RoundedText(statistics.nis_mean, 4) + " per dof, " +
+            RoundedText(100.0 * statistics.nis_within95, 3) + " % within 95 %, " +
+            std::to_string(statistics.measurements) + " measurements";
+    if (std::isfinite(statistics.autocorrelation)) {
+      text += "; autocorrelation " + RoundedText(statistics.autocorrelation, 3) +
+              ", white within " + RoundedText(statistics.white_within, 2);
     }
     text += '\n';
   }
@@ -127,7 +127,8 @@ std::string DetailText(const Evaluation& evaluation) {
   } else {
     text += "within " + ToleranceText(evaluation) + " s";
     if (evaluation.options.offset != 0) {
-      text += ", " + NumberText(Seconds(evaluation.options.offset)) + " s added to the estimate's";
+      text += ", " + NumberText(Seconds(evaluation.options.offset)) +
+              " s added to the estimate's timestamps";
     }
     text += '\n';
   }
@@ -147,12 +148,12 @@ std::string DetailText(const Evaluation& evaluation) {
   return consistency.empty() ? text : text + '\n' + consistency;
 }
 
-/// `NEES position (3 dof)`, with every number of dof there is.
+/// Returns `NEES position (3 dof)`, with all occurring numbers of dof.
 std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
                        const std::vector<Evaluation>& evaluations) {
   std::set<int> dofs;
-  for (const Evaluation& one : evaluations) {
-    if (one.*nees) dofs.insert((one.*nees)->dof);
+  for (const Evaluation& evaluation : evaluations) {
+    if (evaluation.*nees) dofs.insert((evaluation.*nees)->dof);
   }
   std::vector<std::string> texts;
   for (const int dof : dofs) texts.push_back(std::to_string(dof));
@@ -160,7 +161,7 @@ std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
   return texts.empty() ? header : header + " (" + internal::Join(texts, " or ") + " dof)";
 }
 
-/// A header, and a row for each evaluation.
+/// Returns a header, and a row for each evaluation.
 std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evaluations) {
   internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
   for (const char* what : {"ATE", "RPE"}) {
@@ -168,39 +169,43 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
       header.push_back(WithUnit(std::string(what) + ' ' + ToString(relation), UnitOf(relation)));
     }
   }
-  const bool nees = std::ranges::any_of(
-      evaluations, [](const Evaluation& one) { return one.position_nees || one.orientation_nees; });
+  const bool nees = std::ranges::any_of(evaluations, [](const Evaluation& evaluation) {
+    return evaluation.position_nees || evaluation.orientation_nees;
+  });
   if (nees) {
     header.push_back(NeesHeader("position", &Evaluation::position_nees, evaluations));
     header.push_back(NeesHeader("orientation", &Evaluation::orientation_nees, evaluations));
   }
   std::vector<internal::TextRow> rows = {header};
-  for (const Evaluation& one : evaluations) {
-    if (!one.error.empty()) {
-      rows.push_back({one.label, "failed"});
+  for (const Evaluation& evaluation : evaluations) {
+    if (!evaluation.error.empty()) {
+      rows.push_back({evaluation.label, "failed"});
       rows.back().resize(header.size(), "-");
       continue;
     }
-    internal::TextRow row = {one.label, AlignText(one), FixedText(one.alignment.scale, kDecimals),
-                             MatchedText(one), ToleranceText(one)};
-    for (const auto* all : {&one.absolute, &one.relative}) {
-      for (std::size_t r = 0; r < one.options.relations.size(); ++r) {
-        row.push_back(r < all->size() ? FixedText((*all)[r].statistics.rmse, kDecimals) : "-");
+    internal::TextRow row = {evaluation.label, AlignText(evaluation),
+                             FixedText(evaluation.alignment.scale, kDecimals),
+                             MatchedText(evaluation), ToleranceText(evaluation)};
+    for (const auto* errors : {&evaluation.absolute, &evaluation.relative}) {
+      for (std::size_t r = 0; r < evaluation.options.relations.size(); ++r) {
+        row.push_back(r < errors->size() ? FixedText((*errors)[r].statistics.rmse, kDecimals)
+                                         : "-");
       }
     }
-    for (const auto& one_nees : {one.position_nees, one.orientation_nees}) {
-      if (nees) row.push_back(one_nees ? RoundedText(one_nees->mean, 4) : "-");
+    for (const auto& quantity_nees : {evaluation.position_nees, evaluation.orientation_nees}) {
+      if (nees) row.push_back(quantity_nees ? RoundedText(quantity_nees->mean, 4) : "-");
     }
     rows.push_back(row);
   }
   return rows;
 }
 
-/// What all rows of a table share.
+/// Describes the options that all rows of a table share.
 std::string SharedText(const std::vector<Evaluation>& evaluations) {
   const Evaluation& first = evaluations.front();
   std::string text = "RMSE, compared with " + first.reference.name;
-  if (std::ranges::any_of(evaluations, [](const auto& one) { return !one.pairs.empty(); })) {
+  if (std::ranges::any_of(evaluations,
+                          [](const auto& evaluation) { return !evaluation.pairs.empty(); })) {
     text += "; RPE of " + std::string(first.options.pairs.all ? "all" : "consecutive") +
             " pairs, " + NumberText(first.options.pairs.delta) + ' ' +
             ToString(first.options.pairs.unit) + " apart";
@@ -212,7 +217,7 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
   return text + '.';
 }
 
-/// The summary with a column for each evaluation, as wide as a terminal.
+/// Returns the summary for a terminal, with a column for each evaluation.
 std::string SummaryText(const std::vector<Evaluation>& evaluations) {
   const std::vector<internal::TextRow> summary = SummaryRows(evaluations);
   std::vector<std::string> names;
@@ -221,16 +226,16 @@ std::string SummaryText(const std::vector<Evaluation>& evaluations) {
     rows.push_back({summary.front()[c], {}});
     for (std::size_t e = 1; e < summary.size(); ++e) rows.back().cells.push_back(summary[e][c]);
   }
-  for (const Evaluation& one : evaluations) names.push_back(one.label);
+  for (const Evaluation& evaluation : evaluations) names.push_back(evaluation.label);
   return internal::RightAlignedTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
 }
 
-Json JsonOf(const std::vector<PoseErrors>& all) {
+Json JsonOf(const std::vector<PoseErrors>& relations) {
   Json json = Json::object();
-  for (const PoseErrors& errors : all) {
-    Json& one = json[ToString(errors.relation)];
-    one["unit"] = UnitOf(errors.relation);
-    for (const auto& [name, member] : kStatistics) one[name] = errors.statistics.*member;
+  for (const PoseErrors& errors : relations) {
+    Json& entry = json[ToString(errors.relation)];
+    entry["unit"] = UnitOf(errors.relation);
+    for (const auto& [name, member] : kStatistics) entry[name] = errors.statistics.*member;
   }
   return json;
 }
@@ -242,46 +247,47 @@ Json JsonOf(const Nees& nees) {
 
 Json JsonOf(const std::vector<InnovationStatistics>& innovations) {
   Json json = Json::object();
-  for (const InnovationStatistics& one : innovations) {
-    json[one.sensor] = {{"mean", one.nis_mean},
-                        {"within95", one.nis_within95},
-                        {"measurements", one.measurements},
-                        {"autocorrelation", one.autocorrelation},
-                        {"white_within", one.white_within}};
+  for (const InnovationStatistics& statistics : innovations) {
+    json[statistics.sensor] = {{"mean", statistics.nis_mean},
+                               {"within95", statistics.nis_within95},
+                               {"measurements", statistics.measurements},
+                               {"autocorrelation", statistics.autocorrelation},
+                               {"white_within", statistics.white_within}};
   }
   return json;
 }
 
-Json JsonOf(const Evaluation& one) {
-  Json json = {
-      {"estimate", one.label}, {"file", one.estimate.name}, {"reference", one.reference.name}};
-  if (!one.error.empty()) {
-    json["error"] = one.error;
+Json JsonOf(const Evaluation& evaluation) {
+  Json json = {{"estimate", evaluation.label},
+               {"file", evaluation.estimate.name},
+               {"reference", evaluation.reference.name}};
+  if (!evaluation.error.empty()) {
+    json["error"] = evaluation.error;
     return json;
   }
-  json["align"] = ToString(one.options.alignment);
-  json["align_poses"] = one.options.align_poses;
-  json["scale"] = one.alignment.scale;
-  json["matched"] = one.estimate.size();
-  json["possible"] = one.possible;
-  json["by_row"] = one.by_row;
-  json["t_max_diff"] = Seconds(one.options.max_diff);
-  json["t_offset"] = Seconds(one.options.offset);
-  json["reference_length_m"] = one.reference.Length(0, one.reference.size() - 1);
-  json["estimate_length_m"] = one.estimate.Length(0, one.estimate.size() - 1);
-  if (one.sim3_scale) json["sim3_scale"] = *one.sim3_scale;
-  if (one.scale_drift) json["scale_drift"] = *one.scale_drift;
-  json["ate"] = JsonOf(one.absolute);
-  json["rpe"] = JsonOf(one.relative);
-  json["pairs"] = {{"count", one.pairs.size()},
-                   {"delta", one.options.pairs.delta},
-                   {"delta_unit", ToString(one.options.pairs.unit)},
-                   {"all_pairs", one.options.pairs.all}};
-  if (one.position_nees) json["nees_position"] = JsonOf(*one.position_nees);
-  if (one.orientation_nees) json["nees_orientation"] = JsonOf(*one.orientation_nees);
-  if (!one.nees_withheld.empty()) json["nees_withheld"] = one.nees_withheld;
-  if (!one.innovations.empty()) json["nis"] = JsonOf(one.innovations);
-  json["warnings"] = one.warnings;
+  json["align"] = ToString(evaluation.options.alignment);
+  json["align_poses"] = evaluation.options.align_poses;
+  json["scale"] = evaluation.alignment.scale;
+  json["matched"] = evaluation.estimate.size();
+  json["possible"] = evaluation.possible;
+  json["by_row"] = evaluation.by_row;
+  json["t_max_diff"] = Seconds(evaluation.options.max_diff);
+  json["t_offset"] = Seconds(evaluation.options.offset);
+  json["reference_length_m"] = evaluation.reference.Length(0, evaluation.reference.size() - 1);
+  json["estimate_length_m"] = evaluation.estimate.Length(0, evaluation.estimate.size() - 1);
+  if (evaluation.sim3_scale) json["sim3_scale"] = *evaluation.sim3_scale;
+  if (evaluation.scale_drift) json["scale_drift"] = *evaluation.scale_drift;
+  json["ate"] = JsonOf(evaluation.absolute);
+  json["rpe"] = JsonOf(evaluation.relative);
+  json["pairs"] = {{"count", evaluation.pairs.size()},
+                   {"delta", evaluation.options.pairs.delta},
+                   {"delta_unit", ToString(evaluation.options.pairs.unit)},
+                   {"all_pairs", evaluation.options.pairs.all}};
+  if (evaluation.position_nees) json["nees_position"] = JsonOf(*evaluation.position_nees);
+  if (evaluation.orientation_nees) json["nees_orientation"] = JsonOf(*evaluation.orientation_nees);
+  if (!evaluation.nees_withheld.empty()) json["nees_withheld"] = evaluation.nees_withheld;
+  if (!evaluation.innovations.empty()) json["nis"] = JsonOf(evaluation.innovations);
+  json["warnings"] = evaluation.warnings;
   return json;
 }
 
@@ -320,9 +326,9 @@ std::string EvaluationLatex(const std::vector<Evaluation>& evaluations) {
 }
 
 std::string EvaluationJson(const std::vector<Evaluation>& evaluations) {
-  Json all = Json::array();
-  for (const Evaluation& one : evaluations) all.push_back(JsonOf(one));
-  return internal::JsonText({{"evaluations", std::move(all)}});
+  Json array = Json::array();
+  for (const Evaluation& evaluation : evaluations) array.push_back(JsonOf(evaluation));
+  return internal::JsonText({{"evaluations", std::move(array)}});
 }
 
 }  // namespace alidade

@@ -6,21 +6,20 @@
 
 #include "alidade/evaluate/evaluate.h"
 
-/// Evaluations for people and programs. Every figure comes with what it means nothing without: the
-/// alignment and its scale, the poses matched of those possible, the tolerance of their times. One
-/// with an error has a row all the same, `failed`.
+/// Reports of evaluations. Each report includes the alignment and its scale, the number of matched
+/// and possible poses, and the time tolerance. An evaluation with an error has the row `failed`.
 namespace alidade {
 
-/// For a terminal: of one evaluation all statistics, of several a row each.
+/// Returns a text for a terminal: all statistics of one evaluation, or one column for each of many.
 std::string EvaluationText(const std::vector<Evaluation>& evaluations);
 
-/// A table of Markdown, a row for each evaluation.
+/// Returns a Markdown table with a row for each evaluation.
 std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations);
 
-/// The same as a `tabular` of LaTeX.
+/// Returns a LaTeX `tabular` with a row for each evaluation.
 std::string EvaluationLatex(const std::vector<Evaluation>& evaluations);
 
-/// All of it as JSON (docs/eval.md); what is not there is left out.
+/// Returns all results as JSON (docs/eval.md); missing results are omitted.
 std::string EvaluationJson(const std::vector<Evaluation>& evaluations);
 
 }  // namespace alidade

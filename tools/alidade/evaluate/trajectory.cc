@@ -19,29 +19,29 @@ namespace {
 using Format = TrajectoryFormat;
 
 constexpr const char* kTumColumns = "t x y z qx qy qz qw";
-constexpr const char* kForms =
+constexpr const char* kFormats =
     "8 columns (TUM), 20 (TUM with covariances), 12 (KITTI), or with commas 8 or 17 (EuRoC)";
 constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
                                             "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
 
-/// What a number of columns of a row is called.
+/// Determines the format of a row from its number of columns.
 Format Detect(const NumberRows& rows) {
   const std::size_t columns = rows.size();
   if (rows.has_commas() && (columns == 8 || columns == 17)) return Format::kEuroc;
   if (!rows.has_commas() && (columns == 8 || columns == 20)) return Format::kTum;
   if (!rows.has_commas() && columns == 12) return Format::kKitti;
-  rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kForms);
+  rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kFormats);
 }
 
-/// A unit of time that timestamps of TUM may be written in by mistake.
+/// Unit of time in which TUM timestamps may be written by mistake.
 struct TimeUnit {
   const char* name;
-  std::size_t digits;  ///< it is 10^digits ns
+  std::size_t digits;  ///< the unit is 10^digits ns
 
   double seconds() const { return std::pow(10.0, static_cast<double>(digits) - 9.0); }
 };
 
-/// Of two in the middle the smaller; 0 of none.
+/// Returns the lower median; 0 if there are no values.
 double Median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + (std::ssize(values) - 1) / 2;
@@ -49,8 +49,9 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-/// The unit of timestamps t that are d apart, on their medians: the first of s, ms, us and ns in
-/// which they are of a clock that counts from 1970, or else of one that counts from its own start.
+/// Determines the unit of timestamps from the medians of their values t and differences d. It is
+/// the first of s, ms, us and ns that is plausible for a clock that counts from 1970, or else for a
+/// clock that counts from its own start:
 ///
 ///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
 ///   from its start           t < 9.2e9 s,   d < 1000 s in s, else d < 2 s
@@ -65,15 +66,15 @@ TimeUnit UnitOf(const std::vector<double>& timestamps) {
   for (const bool since_1970 : {true, false}) {
     for (const TimeUnit& unit : kUnits) {
       const double t_s = size * unit.seconds();
-      const double most_step_s = since_1970 || unit.digits == 9 ? 1000.0 : 2.0;
+      const double max_step_s = since_1970 || unit.digits == 9 ? 1000.0 : 2.0;
       if (since_1970 && t_s < 1e9) continue;
-      if (t_s < cell::kTimeLimit && step * unit.seconds() < most_step_s) return unit;
+      if (t_s < cell::kTimeLimit && step * unit.seconds() < max_step_s) return unit;
     }
   }
   return kUnits[3];
 }
 
-/// Reads one file, row by row.
+/// Reader of one pose file.
 class TrajectoryReader {
  public:
   TrajectoryReader(const std::filesystem::path& file, Format format)
@@ -84,16 +85,16 @@ class TrajectoryReader {
   Trajectory Read() {
     trajectory_.name = rows_.name();
     while (rows_.Next()) AddRow();
-    if (lines_.empty()) rows_.FailLine("no poses", kForms);
+    if (lines_.empty()) rows_.FailLine("no poses", kFormats);
     trajectory_.first_line = lines_.front();
     trajectory_.positions.resize(3, std::ssize(positions_));
     for (std::size_t i = 0; i < positions_.size(); ++i) {
       trajectory_.positions.col(static_cast<Eigen::Index>(i)) = positions_[i];
     }
-    if (trajectory_.format == Format::kTum) TakeTumTimestamps();
+    if (trajectory_.format == Format::kTum) ConvertTumTimestamps();
     CheckFirstQuaternion();
     if (trajectory_.format == Format::kKitti) return std::move(trajectory_);
-    return InOrder();
+    return Sorted();
   }
 
  private:
@@ -110,7 +111,7 @@ class TrajectoryReader {
       case Format::kEuroc:
         trajectory_.timestamps.push_back(rows_.Index(0, "t"));
         if (!(Seconds(trajectory_.timestamps.back()) < cell::kTimeLimit))
-          rows_.FailCell(0, "t", "is beyond 292 years", "ns, as EuRoC has them");
+          rows_.FailCell(0, "t", "is beyond 292 years", "ns, as in EuRoC");
         AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
         break;
       default:
@@ -119,7 +120,7 @@ class TrajectoryReader {
     lines_.push_back(rows_.line());
   }
 
-  /// Of the format, of those that the first row may have.
+  /// Returns the number of columns for the format and the first row.
   std::size_t ExpectedColumns() const {
     const std::size_t columns = rows_.size();
     if (trajectory_.format == Format::kKitti) return 12;
@@ -128,7 +129,7 @@ class TrajectoryReader {
   }
   std::string ColumnNames() const {
     if (trajectory_.format == Format::kKitti) return "the upper three rows of world_from_body";
-    if (trajectory_.format == Format::kEuroc) return "t,x,y,z,qw,qx,qy,qz and maybe nine more";
+    if (trajectory_.format == Format::kEuroc) return "t,x,y,z,qw,qx,qy,qz and optionally nine more";
     return columns_ == 20 ? "t x y z qx qy qz qw and two covariances" : kTumColumns;
   }
 
@@ -143,22 +144,22 @@ class TrajectoryReader {
     trajectory_.position_covariances.push_back(Covariance(upper + 6, "position"));
   }
 
-  /// The symmetric matrix of its upper triangle, row by row. Its numbers may be rounded to six
-  /// digits: only an eigenvalue that is negative beyond that is refused.
-  Eigen::Matrix3d Covariance(const double* upper, const char* of) const {
+  /// Converts a row-wise upper triangle to a symmetric matrix. Its numbers may be rounded to six
+  /// digits: only an eigenvalue that is more negative than that is an error.
+  Eigen::Matrix3d Covariance(const double* upper, const char* quantity) const {
     constexpr double kRounding = 1e-5;
     Eigen::Matrix3d matrix;
     matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
         upper[5];
     const Eigen::VectorXd eigenvalues = internal::EigenvaluesOf(matrix);
     if (eigenvalues[0] >= -kRounding * eigenvalues.cwiseAbs().maxCoeff()) return matrix;
-    rows_.FailLine(std::string("the covariance of the ") + of +
+    rows_.FailLine(std::string("the covariance of the ") + quantity +
                        " is not positive semi-definite: its smallest eigenvalue is " +
                        internal::RoundedText(eigenvalues[0]),
-                   "a covariance");
+                   "a positive semi-definite matrix");
   }
 
-  /// Of columns 1 to 7.
+  /// Appends the pose in columns 1 to 7.
   void AddPose(const std::array<const char*, 7>& names) {
     const std::array<double, 7> v = PoseNumbers(rows_, names);
     AddPosition({v[0], v[1], v[2]});
@@ -169,14 +170,14 @@ class TrajectoryReader {
   }
 
   void AddPosition(const Eigen::Vector3d& position) {
-    constexpr double kFar = 1e15;  // m; there doubles are 0.1 m apart
-    if (!(position.cwiseAbs().maxCoeff() <= kFar))
-      rows_.FailLine("the position is more than 1e15 m away", "metres");
+    constexpr double kMaxCoordinate = 1e15;  // m, at which the spacing of doubles is 0.1 m
+    if (!(position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
+      rows_.FailLine("a coordinate is beyond 1e15 m", "a position in metres");
     positions_.push_back(position);
   }
 
   void AddKitti() {
-    constexpr double kDefect = 1e-3;
+    constexpr double kTolerance = 1e-3;
     Eigen::Matrix<double, 3, 4, Eigen::RowMajor> pose;
     for (std::size_t i = 0; i < 12; ++i) {
       pose.data()[i] = rows_.Number(i, "element");
@@ -184,20 +185,20 @@ class TrajectoryReader {
     const Eigen::Matrix3d rotation = pose.leftCols<3>();
     const double defect =
         (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(defect <= kDefect) || !(rotation.determinant() > 0.0)) {
-      rows_.FailLine("columns 1-3, 5-7, 9-11 are no rotation", "R R' = 1 to 1e-3, det R = 1");
+    if (!(defect <= kTolerance) || !(rotation.determinant() > 0.0)) {
+      rows_.FailLine("columns 1-3, 5-7, 9-11 are not a rotation", "R R' = 1 to 1e-3, det R = 1");
     }
     AddPosition(pose.col(3));
     trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
   }
 
-  void TakeTumTimestamps() {
+  void ConvertTumTimestamps() {
     const TimeUnit unit = UnitOf(seconds_);
-    const char* const expected = "seconds, as TUM has them";
+    const char* const expected = "seconds, as in TUM";
     if (unit.digits != 9) {
       Warn(lines_.front(), "t",
-           '\'' + timestamp_texts_.front() + "' and what follows cannot be seconds; read as " +
-               unit.name,
+           '\'' + timestamp_texts_.front() +
+               "' and the following timestamps are not plausible as seconds; read as " + unit.name,
            expected);
     }
     for (std::size_t i = 0; i < seconds_.size(); ++i) {
@@ -212,36 +213,38 @@ class TrajectoryReader {
     }
   }
 
-  /// A path that starts at the origin starts at the identity too, as a rule.
+  /// Warns if a trajectory starts at the origin, but is at the identity only in the other order of
+  /// quaternions.
   void CheckFirstQuaternion() {
     if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
-    const Trajectory other = trajectory_.Select({0}).WithOtherQuaternionOrder();
-    if (other.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
+    const Trajectory reordered = trajectory_.Select({0}).WithOtherQuaternionOrder();
+    if (reordered.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
     const bool w_first = trajectory_.format == Format::kEuroc;
     Warn(lines_.front(), w_first ? "qw" : "qx",
          std::string("the first pose is the identity if its quaternion is written w ") +
              (w_first ? "last" : "first"),
-         w_first ? "qw qx qy qz, as EuRoC has it" : "qx qy qz qw, as TUM has it");
+         w_first ? "qw qx qy qz, as in EuRoC" : "qx qy qz qw, as in TUM");
   }
 
-  /// Sorted; poses of one timestamp stay in the order of the file.
-  Trajectory InOrder() {
+  /// Sorts the poses. Poses with equal timestamps stay in the order of the file.
+  Trajectory Sorted() {
     const std::vector<Timestamp>& timestamps = trajectory_.timestamps;
     std::vector<int> order(timestamps.size());
     std::iota(order.begin(), order.end(), 0);
     const auto earlier = [&](int a, int b) { return At(timestamps, a) < At(timestamps, b); };
-    const auto back = std::is_sorted_until(order.begin(), order.end(), earlier);
-    const bool sorted = back == order.end();
-    if (!sorted) {
-      Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(timestamps, *back)),
+    const auto first_unsorted = std::is_sorted_until(order.begin(), order.end(), earlier);
+    const bool is_sorted = first_unsorted == order.end();
+    if (!is_sorted) {
+      Warn(At(lines_, *first_unsorted), "t",
+           "goes back: " + internal::SecondsText(At(timestamps, *first_unsorted)),
            "poses in the order of their timestamps; they are sorted");
       std::stable_sort(order.begin(), order.end(), earlier);
     }
     WarnOfDuplicates(order);
-    return sorted ? std::move(trajectory_) : trajectory_.Select(order);
+    return is_sorted ? std::move(trajectory_) : trajectory_.Select(order);
   }
 
-  /// `order` sorts the timestamps.
+  /// Warns of duplicate timestamps. `order` sorts the timestamps.
   void WarnOfDuplicates(const std::vector<int>& order) {
     const std::vector<Timestamp>& timestamps = trajectory_.timestamps;
     int first = -1, count = 0;
@@ -250,17 +253,17 @@ class TrajectoryReader {
         first = order[k];
     }
     if (count == 0) return;
-    std::string what = "duplicate timestamp " + internal::SecondsText(At(timestamps, first));
-    if (count > 1) what += ", the first of " + std::to_string(count) + " such rows";
-    Warn(At(lines_, first), "t", what, "each timestamp once; all poses are kept");
+    std::string text = "duplicate timestamp " + internal::SecondsText(At(timestamps, first));
+    if (count > 1) text += ", the first of " + std::to_string(count) + " such rows";
+    Warn(At(lines_, first), "t", text, "each timestamp once; all poses are kept");
   }
 
   template <class T>
   static const T& At(const std::vector<T>& values, int i) {
     return values[static_cast<std::size_t>(i)];
   }
-  void Warn(int line, const char* key, const std::string& what, const std::string& expected) {
-    trajectory_.warnings.push_back(ErrorLine({rows_.name(), line, 0}, key, what, expected));
+  void Warn(int line, const char* key, const std::string& problem, const std::string& expected) {
+    trajectory_.warnings.push_back(ErrorLine({rows_.name(), line, 0}, key, problem, expected));
   }
 
   NumberRows rows_;
@@ -268,21 +271,22 @@ class TrajectoryReader {
   std::size_t columns_ = 0;
   std::vector<int> lines_;
   std::vector<Eigen::Vector3d> positions_;
-  std::vector<double> seconds_;               ///< of TUM, before their unit is known
-  std::vector<std::string> timestamp_texts_;  ///< likewise
+  std::vector<double> seconds_;               ///< TUM timestamps before their unit is known
+  std::vector<std::string> timestamp_texts_;  ///< texts of the TUM timestamps
 };
 
-/// The name of the file that holds the times of one file of KITTI alone.
-std::filesystem::path OwnTimes(const std::filesystem::path& file) {
+/// Returns the name of the file with the times of a single KITTI file.
+std::filesystem::path DedicatedTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
 
-/// The file of timestamps next to a file of KITTI; empty where there is none.
-std::filesystem::path TimesBeside(const std::filesystem::path& file) {
-  for (const std::filesystem::path& name : {OwnTimes(file), std::filesystem::path("times.txt")}) {
-    const std::filesystem::path beside = file.parent_path() / name;
+/// Finds the timestamp file in the folder of a KITTI file; empty if it does not exist.
+std::filesystem::path FindTimes(const std::filesystem::path& file) {
+  for (const std::filesystem::path& name :
+       {DedicatedTimes(file), std::filesystem::path("times.txt")}) {
+    const std::filesystem::path candidate = file.parent_path() / name;
     std::error_code error;
-    if (std::filesystem::is_regular_file(beside, error)) return beside;
+    if (std::filesystem::is_regular_file(candidate, error)) return candidate;
   }
   return {};
 }
@@ -298,11 +302,12 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
     }
   }
   if (std::ssize(trajectory.timestamps) == trajectory.size()) return;
-  const std::filesystem::path own = OwnTimes(trajectory.name);
-  const bool shared = times.filename() != own;
-  rows.FailLine(std::to_string(trajectory.timestamps.size()) + " times for " +
-                    std::to_string(trajectory.size()) + " poses of " + trajectory.name,
-                "one for each pose" + (shared ? ", or " + own.string() + " next to it" : ""));
+  const std::filesystem::path dedicated = DedicatedTimes(trajectory.name);
+  const bool shared = times.filename() != dedicated;
+  rows.FailLine(
+      std::to_string(trajectory.timestamps.size()) + " times for " +
+          std::to_string(trajectory.size()) + " poses of " + trajectory.name,
+      "one for each pose" + (shared ? ", or " + dedicated.string() + " in the same folder" : ""));
 }
 
 }  // namespace
@@ -340,18 +345,18 @@ Trajectory Trajectory::Select(const std::vector<int>& indices) const {
 }
 
 Trajectory Trajectory::WithOtherQuaternionOrder() const {
-  Trajectory other = *this;
-  for (Eigen::Quaterniond& q : other.orientations) {
+  Trajectory reordered = *this;
+  for (Eigen::Quaterniond& q : reordered.orientations) {
     q = format == TrajectoryFormat::kEuroc ? Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y())
                                            : Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
   }
-  return other;
+  return reordered;
 }
 
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
   Trajectory trajectory = TrajectoryReader(file, format).Read();
   if (trajectory.format == TrajectoryFormat::kKitti) {
-    const std::filesystem::path times = TimesBeside(file);
+    const std::filesystem::path times = FindTimes(file);
     if (!times.empty()) ReadTimes(times, trajectory);
   }
   const std::vector<Timestamp>& timestamps = trajectory.timestamps;
@@ -360,8 +365,8 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
     return trajectory;
   }
   throw Error(ExitCode::kBadData,
-              ErrorLine({trajectory.name}, "t", "its timestamps are more than 292 years apart",
-                        "those of one clock"));
+              ErrorLine({trajectory.name}, "t", "the timestamps span more than 292 years",
+                        "timestamps of one clock"));
 }
 
 }  // namespace alidade

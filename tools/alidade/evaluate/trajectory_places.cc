@@ -23,19 +23,19 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-[[noreturn]] void FailMissing(const fs::path& folder, const std::string& what,
+[[noreturn]] void FailMissing(const fs::path& folder, const std::string& problem,
                               const std::string& expected) {
-  throw Error(ExitCode::kInputMissing, ErrorLine({folder.string()}, {}, what, expected));
+  throw Error(ExitCode::kInputMissing, ErrorLine({folder.string()}, {}, problem, expected));
 }
 
-/// `runs/slam/` is called slam.
+/// Returns the name of a folder: slam for `runs/slam/`.
 std::string NameOf(const fs::path& folder) {
   return folder.filename().empty() ? folder.parent_path().filename().string()
                                    : folder.filename().string();
 }
 
-/// The trajectory that an estimator left in its folder; an empty path where it left none.
-TrajectoryFile OfEstimator(const fs::path& folder) {
+/// Finds the trajectory in the folder of an estimator; an empty path if it does not exist.
+TrajectoryFile EstimatorTrajectory(const fs::path& folder) {
   for (const char* name : {kWithCovariance, kTrajectory}) {
     if (!IsFile(folder / name)) continue;
     const fs::path innovations = folder / "innovations.csv";
@@ -47,16 +47,16 @@ TrajectoryFile OfEstimator(const fs::path& folder) {
 }  // namespace
 
 TrajectoryFile ReferenceAt(const fs::path& path) {
-  const auto named = [](const fs::path& file) {
+  const auto labelled = [](const fs::path& file) {
     return TrajectoryFile{file, file.stem().string(), {}};
   };
-  if (!IsFolder(path)) return named(path);
+  if (!IsFolder(path)) return labelled(path);
   for (const fs::path& file : {path / kTruth, path / "groundtruth.tum",
                                path / "mav0" / kEurocReference, path / kEurocReference}) {
-    if (IsFile(file)) return named(file);
+    if (IsFile(file)) return labelled(file);
   }
   FailMissing(path, "no reference in this folder",
-              "truth.tum of a run whose source knows a pose, or mav0/ of EuRoC; or name the file");
+              "truth.tum of a run whose source provides true poses, mav0/ of EuRoC, or a file");
 }
 
 TrajectoryFile TruthOf(const fs::path& path) {
@@ -64,35 +64,38 @@ TrajectoryFile TruthOf(const fs::path& path) {
     std::error_code error;
     if (!fs::exists(path, error)) FailMissing(path, "no such folder", "the folder of a run");
     throw Error(ExitCode::kUsage,
-                ErrorLine({path.string()}, {}, "one file has nothing to be compared with",
+                ErrorLine({path.string()}, {}, "a single file cannot be evaluated",
                           "REF EST, or the folder of a run"));
   }
-  std::vector<fs::path> places = {path / kTruth};
-  if (!OfEstimator(path).file.empty()) {
-    places.push_back((path / "..").lexically_normal() / kTruth);
+  std::vector<fs::path> candidates = {path / kTruth};
+  if (!EstimatorTrajectory(path).file.empty()) {
+    candidates.push_back((path / "..").lexically_normal() / kTruth);
   }
-  for (const fs::path& file : places) {
+  for (const fs::path& file : candidates) {
     if (IsFile(file)) return {file, file.stem().string(), {}};
   }
   FailMissing(path, std::string("no ") + kTruth + " in this run",
-              "a run whose source knows a pose; or REF EST");
+              "a run whose source provides true poses; or REF EST");
 }
 
 std::vector<TrajectoryFile> EstimatesAt(const fs::path& path) {
   if (!IsFolder(path)) return {{path, path.stem().string(), {}}};
   std::vector<TrajectoryFile> found;
-  if (TrajectoryFile own = OfEstimator(path); !own.file.empty()) return {own};
+  if (TrajectoryFile trajectory = EstimatorTrajectory(path); !trajectory.file.empty())
+    return {trajectory};
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
     if (!entry.is_directory(error)) continue;
-    if (TrajectoryFile one = OfEstimator(entry.path()); !one.file.empty()) found.push_back(one);
+    if (TrajectoryFile trajectory = EstimatorTrajectory(entry.path()); !trajectory.file.empty())
+      found.push_back(trajectory);
   }
   std::ranges::sort(found, {}, &TrajectoryFile::label);
   if (!found.empty()) return found;
-  FailMissing(path, "no trajectory in this folder",
-              std::string("NAME/") + kTrajectory +
-                  " of an estimator with blocks X.position and X.orientation, or X.heading of a "
-                  "planar pose; or name the file");
+  FailMissing(
+      path, "no trajectory in this folder",
+      std::string("NAME/") + kTrajectory +
+          " of an estimator with blocks X.position and X.orientation (planar: X.heading), or "
+          "a file");
 }
 
 }  // namespace alidade

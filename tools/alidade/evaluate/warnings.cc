@@ -19,14 +19,14 @@ using internal::EigenOf;
 using internal::EigenvaluesOf;
 using internal::RoundedText;
 
-constexpr int kFewPoses = 10;            ///< tell nothing about frames and scale
-constexpr double kFewMatches = 0.5;      ///< share of those possible
-constexpr double kLateTimestamps = 0.5;  ///< median difference, as a share of the tolerance
-constexpr double kMetricScale = 0.1;     ///< off 1
-constexpr double kShortPath = 0.5;       ///< share of the reference's
-constexpr double kOtherWorld = 10.0;     ///< error without alignment over that with
-constexpr double kBodyTurnDeg = 10.0;    ///< a turn of the body that is no error of an estimate
-constexpr double kClearly = 0.25;        ///< what explains the rest
+constexpr int kMinPoses = 10;             ///< fewer do not determine frames and scale
+constexpr double kMinMatches = 0.5;       ///< share of the possible matches
+constexpr double kMaxTimeOffset = 0.5;    ///< median difference, as a share of the tolerance
+constexpr double kMaxScaleError = 0.1;    ///< deviation of the scale from 1
+constexpr double kMinLength = 0.5;        ///< share of the reference's length
+constexpr double kMaxErrorRatio = 10.0;   ///< error without alignment / error with alignment
+constexpr double kMinBodyTurnDeg = 10.0;  ///< larger turns are not an error of an estimate
+constexpr double kMaxRemainder = 0.25;    ///< share of the error that an explanation may leave
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
@@ -34,8 +34,8 @@ double Rmse(const Trajectory& reference, const Trajectory& estimate) {
   return internal::AbsoluteErrors(PoseRelation::kTranslation, reference, estimate).statistics.rmse;
 }
 
-/// Whether a file is named like ground truth: its name, or that of EuRoC's folder, has `truth` in
-/// it, or `gt` as a word.
+/// Returns true if a file is named like ground truth: it is in the ground-truth folder of EuRoC, or
+/// its name contains `truth`, or `gt` as a word.
 bool IsNamedLikeTruth(const std::string& file) {
   const std::filesystem::path path = file;
   if (path.parent_path().filename() == kEurocTruth) return true;
@@ -53,13 +53,13 @@ bool IsNamedLikeTruth(const std::string& file) {
   return false;
 }
 
-/// How the orientations of two trajectories of one world differ: by one turn of the body,
-/// ref = est Exp(d), and by what each pose is off that, rms.
+/// Difference between the orientations of two trajectories in the same world: a common turn of the
+/// body, ref = est Exp(d), and the rms deviation of the poses from it.
 struct BodyTurn {
   double turn_deg, spread_deg;
 };
 
-/// The turn is the mean of [Markley2007], of est^-1 ref.
+/// Computes the turn as the mean of est^-1 ref [Markley2007].
 BodyTurn BodyTurnOf(const Trajectory& reference, const Trajectory& estimate) {
   Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
   std::vector<Eigen::Quaterniond> turns;
@@ -77,7 +77,7 @@ BodyTurn BodyTurnOf(const Trajectory& reference, const Trajectory& estimate) {
           kDegrees * std::sqrt(sum / static_cast<double>(turns.size()))};
 }
 
-/// Whether the positions determine a rotation: not all nearly on one line.
+/// Returns true if the positions determine a rotation, that is if they are not nearly collinear.
 bool SpansAPlane(const Eigen::Matrix3Xd& points) {
   constexpr double kThin = 1e-3;
   const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
@@ -85,29 +85,29 @@ bool SpansAPlane(const Eigen::Matrix3Xd& points) {
   return squared_widths[1] > kThin * kThin * squared_widths[2];
 }
 
-/// Collects the warnings of one evaluation.
-class Warnings {
+/// Collector of the warnings of one evaluation.
+class WarningCollector {
  public:
-  Warnings(const Evaluation& evaluation, const Matches& matches, const Trajectory& reference,
-           const Trajectory& estimate)
+  WarningCollector(const Evaluation& evaluation, const Matches& matches,
+                   const Trajectory& reference, const Trajectory& estimate)
       : evaluation_(evaluation),
         matches_(matches),
         whole_reference_(reference),
         whole_estimate_(estimate) {}
 
-  std::vector<std::string> Take() {
+  std::vector<std::string> Collect() {
     CheckOrder();
     CheckMatches();
     CheckTimestamps();
     CheckPath();
-    if (evaluation_.estimate.size() < kFewPoses || !evaluation_.sim3_scale) return warnings_;
+    if (evaluation_.estimate.size() < kMinPoses || !evaluation_.sim3_scale) return warnings_;
     const Trajectory& reference = evaluation_.reference;
     const Similarity sim3 = Align(Alignment::kSim3, reference, evaluation_.estimate);
     CheckScale(sim3);
     CheckWorld();
-    const bool turned =
+    const bool planar =
         SpansAPlane(reference.positions) && SpansAPlane(evaluation_.estimate.positions);
-    if (turned) {
+    if (planar) {
       CheckOrientations(sim3);
     } else {
       CheckLine();
@@ -116,12 +116,12 @@ class Warnings {
   }
 
  private:
-  void Warn(const std::string& what, const std::string& remedy) {
-    warnings_.push_back(ErrorLine({whole_estimate_.name}, {}, what, remedy));
+  void Warn(const std::string& problem, const std::string& remedy) {
+    warnings_.push_back(ErrorLine({whole_estimate_.name}, {}, problem, remedy));
   }
 
-  /// Sees that the reference and the estimate are swapped. Numbers of poses would not do: truth may
-  /// be at a lower rate, too.
+  /// Detects a swap of reference and estimate. Numbers of poses cannot show it: the truth may have
+  /// the lower rate.
   void CheckOrder() {
     const Trajectory &reference = whole_reference_, &estimate = whole_estimate_;
     const char* const remedy = "REF first, then EST";
@@ -130,13 +130,13 @@ class Warnings {
     } else if (reference.has_covariances() && !estimate.has_covariances()) {
       warnings_.push_back(ErrorLine(
           {reference.name}, {},
-          "has covariances, as an estimate does, and " + estimate.name + " has none", remedy));
+          "has covariances, as an estimate does, but " + estimate.name + " has none", remedy));
     }
   }
 
   void CheckMatches() {
     const int matched = evaluation_.estimate.size();
-    if (matched >= kFewMatches * matches_.possible) return;
+    if (matched >= kMinMatches * matches_.possible) return;
     Warn(std::to_string(matched) + " of " + std::to_string(matches_.possible) +
              " possible poses match within " + RoundedText(Seconds(evaluation_.options.max_diff)) +
              " s",
@@ -145,90 +145,93 @@ class Warnings {
 
   void CheckTimestamps() {
     if (matches_.by_row) return;
-    std::vector<Timestamp> off;
+    std::vector<Timestamp> differences;
     for (std::size_t k = 0; k < matches_.estimate.size(); ++k) {
-      off.push_back(evaluation_.reference.timestamps[k] -
-                    (evaluation_.estimate.timestamps[k] + evaluation_.options.offset));
+      differences.push_back(evaluation_.reference.timestamps[k] -
+                            (evaluation_.estimate.timestamps[k] + evaluation_.options.offset));
     }
-    const auto middle = off.begin() + std::ssize(off) / 2;
-    std::nth_element(off.begin(), middle, off.end());
-    const double late_s = std::abs(Seconds(*middle));
-    if (!(late_s > kLateTimestamps * Seconds(evaluation_.options.max_diff))) return;
-    Warn("its timestamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
-             " those of the reference on the median",
+    const auto middle = differences.begin() + std::ssize(differences) / 2;
+    std::nth_element(differences.begin(), middle, differences.end());
+    const double offset_s = std::abs(Seconds(*middle));
+    if (!(offset_s > kMaxTimeOffset * Seconds(evaluation_.options.max_diff))) return;
+    Warn("the median timestamp is " + RoundedText(offset_s) + " s " +
+             (*middle > 0 ? "before" : "after") + " that of the reference",
          "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }
 
   void CheckPath() {
-    const double whole = whole_reference_.Length(0, whole_reference_.size() - 1);
+    const double length = whole_reference_.Length(0, whole_reference_.size() - 1);
     const double matched =
         whole_reference_.Length(matches_.reference.front(), matches_.reference.back());
-    if (!(matched < kShortPath * whole)) return;
-    Warn("it covers " + RoundedText(matched, 3) + " m of the reference's trajectory of " +
-             RoundedText(whole, 3) + " m",
-         "a figure of the whole trajectory");
+    if (!(matched < kMinLength * length)) return;
+    Warn("the estimate covers only " + RoundedText(matched, 3) + " m of the " +
+             RoundedText(length, 3) + " m of the reference",
+         "an estimate of the whole trajectory");
   }
 
   void CheckScale(const Similarity& sim3) {
     const Alignment alignment = evaluation_.options.alignment;
     if (alignment == Alignment::kSim3 || alignment == Alignment::kScale) return;
-    if (std::abs(std::log(sim3.scale)) <= std::log1p(kMetricScale)) return;
+    if (std::abs(std::log(sim3.scale)) <= std::log1p(kMaxScaleError)) return;
     const Similarity se3 = Align(Alignment::kSe3, evaluation_.reference, evaluation_.estimate);
-    const double with_scale = Rmse(evaluation_.reference, sim3 * evaluation_.estimate);
-    const double without = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
-    if (!(with_scale < 0.5 * without)) return;
-    Warn("scale " + RoundedText(sim3.scale, 4) + " (error " + RoundedText(with_scale, 4) +
-             " m by sim3, " + RoundedText(without, 4) +
-             " m by se3): looks like a run without metric scale",
+    const double sim3_error = Rmse(evaluation_.reference, sim3 * evaluation_.estimate);
+    const double se3_error = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
+    if (!(sim3_error < 0.5 * se3_error)) return;
+    Warn("scale " + RoundedText(sim3.scale, 4) + " (error " + RoundedText(sim3_error, 4) +
+             " m by sim3, " + RoundedText(se3_error, 4) +
+             " m by se3): probably a run without metric scale",
          "-as");
   }
 
   void CheckWorld() {
     if (evaluation_.options.alignment != Alignment::kNone) return;
     const Similarity se3 = Align(Alignment::kSe3, evaluation_.reference, evaluation_.estimate);
-    const double aligned = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
-    const double as_is = Rmse(evaluation_.reference, evaluation_.estimate);
-    if (!(as_is > kOtherWorld * aligned)) return;
-    Warn("not aligned, the error is " + RoundedText(as_is, 4) + " m, and " +
-             RoundedText(aligned, 4) + " m by se3: looks like another world frame",
+    const double aligned_error = Rmse(evaluation_.reference, se3 * evaluation_.estimate);
+    const double original = Rmse(evaluation_.reference, evaluation_.estimate);
+    if (!(original > kMaxErrorRatio * aligned_error)) return;
+    Warn("the error is " + RoundedText(original, 4) + " m without alignment and " +
+             RoundedText(aligned_error, 4) + " m with se3: probably another world frame",
          "--align");
   }
 
   void CheckLine() {
     const Alignment alignment = evaluation_.options.alignment;
     if (alignment != Alignment::kSe3 && alignment != Alignment::kSim3) return;
-    Warn(std::string("its positions, or the reference's, lie on a line: the turn about it by ") +
-             ToString(alignment) + " is arbitrary, and so are errors of orientation",
-         "no alignment, --align-origin or --align-mode yaw for those");
+    Warn(std::string("positions of the estimate or the reference are collinear: the rotation of ") +
+             ToString(alignment) + " about the line is arbitrary, and so are orientation errors",
+         "no alignment, --align-origin or --align-mode yaw for orientation errors");
   }
 
   void CheckOrientations(const Similarity& sim3) {
     const Trajectory& reference = evaluation_.reference;
     const Trajectory& estimate = evaluation_.estimate;
-    const BodyTurn as_is = BodyTurnOf(reference, sim3 * estimate);
-    const BodyTurn estimate_other =
+    const BodyTurn original = BodyTurnOf(reference, sim3 * estimate);
+    const BodyTurn estimate_reordered =
         BodyTurnOf(reference, sim3 * estimate.WithOtherQuaternionOrder());
-    const BodyTurn reference_other =
+    const BodyTurn reference_reordered =
         BodyTurnOf(reference.WithOtherQuaternionOrder(), sim3 * estimate);
-    const bool of_estimate = estimate_other.spread_deg <= reference_other.spread_deg;
-    const double other = std::min(estimate_other.spread_deg, reference_other.spread_deg);
-    if (as_is.spread_deg > kBodyTurnDeg && other < kClearly * as_is.spread_deg) {
-      const Trajectory& wrong = of_estimate ? whole_estimate_ : whole_reference_;
+    const bool estimate_is_wrong = estimate_reordered.spread_deg <= reference_reordered.spread_deg;
+    const double reordered_spread_deg =
+        std::min(estimate_reordered.spread_deg, reference_reordered.spread_deg);
+    if (original.spread_deg > kMinBodyTurnDeg &&
+        reordered_spread_deg < kMaxRemainder * original.spread_deg) {
+      const Trajectory& wrong = estimate_is_wrong ? whole_estimate_ : whole_reference_;
       const bool w_first = wrong.format == TrajectoryFormat::kEuroc;
-      warnings_.push_back(
-          ErrorLine({wrong.name, wrong.first_line, 0}, {},
-                    "the orientations fit to " + internal::FixedText(other, 1) +
-                        " deg if quaternions are read w " + (w_first ? "last, to " : "first, to ") +
-                        internal::FixedText(as_is.spread_deg, 1) + " deg as they are",
-                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
-    } else if (as_is.turn_deg > kBodyTurnDeg && as_is.spread_deg < kClearly * as_is.turn_deg) {
-      Warn("its orientations are turned by " + RoundedText(as_is.turn_deg, 4) +
-               " deg, the same for all poses: looks like another body frame",
-           "poses of the same body; its positions may be of another point too");
+      warnings_.push_back(ErrorLine(
+          {wrong.name, wrong.first_line, 0}, {},
+          "the orientations fit to " + internal::FixedText(reordered_spread_deg, 1) +
+              " deg if quaternions are read w " + (w_first ? "last, but to " : "first, but to ") +
+              internal::FixedText(original.spread_deg, 1) + " deg as read",
+          w_first ? "qw qx qy qz" : "qx qy qz qw"));
+    } else if (original.turn_deg > kMinBodyTurnDeg &&
+               original.spread_deg < kMaxRemainder * original.turn_deg) {
+      Warn("all orientations are turned by the same " + RoundedText(original.turn_deg, 4) +
+               " deg: probably another body frame",
+           "poses of the same body; the positions may also be of another point");
     }
   }
 
-  const Evaluation& evaluation_;  ///< the estimate not aligned yet
+  const Evaluation& evaluation_;  ///< its estimate is not yet aligned
   const Matches& matches_;
   const Trajectory& whole_reference_;
   const Trajectory& whole_estimate_;
@@ -241,7 +244,7 @@ std::vector<std::string> internal::EvaluationWarnings(const Evaluation& evaluati
                                                       const Matches& matches,
                                                       const Trajectory& reference,
                                                       const Trajectory& estimate) {
-  return Warnings(evaluation, matches, reference, estimate).Take();
+  return WarningCollector(evaluation, matches, reference, estimate).Collect();
 }
 
 }  // namespace alidade

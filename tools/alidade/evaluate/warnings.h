@@ -8,8 +8,8 @@
 
 namespace alidade::internal {
 
-/// What makes the figures of an evaluation mean something else than they say. `matches` are the
-/// poses of `reference` and `estimate`, as they were read, that the evaluation is of.
+/// Returns warnings of conditions under which the results of an evaluation are misleading.
+/// `matches` are the evaluated poses of `reference` and `estimate`, which are as read from files.
 std::vector<std::string> EvaluationWarnings(const Evaluation& evaluation, const Matches& matches,
                                             const Trajectory& reference,
                                             const Trajectory& estimate);

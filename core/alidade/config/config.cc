@@ -23,11 +23,11 @@ using internal::Quoted;
 
 namespace {
 
-bool NamesAnotherModel(const ConfigTree& old, const ConfigTree& next) {
+bool NamesAnotherModel(const ConfigTree& old_map, const ConfigTree& new_map) {
   for (const char* key : {"model", "type"}) {
-    const ConfigTree* old_name = Child(old, key);
-    const ConfigTree* next_name = Child(next, key);
-    if (old_name != nullptr && next_name != nullptr && old_name->text != next_name->text) {
+    const ConfigTree* old_name = Child(old_map, key);
+    const ConfigTree* new_name = Child(new_map, key);
+    if (old_name != nullptr && new_name != nullptr && old_name->text != new_name->text) {
       return true;
     }
   }

@@ -251,9 +251,9 @@ class TreeBuilder : public YAML::EventHandler {
   void RejectTag(const YAML::Mark& mark, const std::string& tag) const {
     if (tag.empty() || tag == "?" || tag == "!") return;
     constexpr std::string_view kStandard = "tag:yaml.org,2002:";
-    const std::string shown =
+    const std::string tag_text =
         tag.starts_with(kStandard) ? "!!" + tag.substr(kStandard.size()) : tag;
-    Fail(mark, "tag " + Quoted(shown) + " is not supported");
+    Fail(mark, "tag " + Quoted(tag_text) + " is not supported");
   }
 
   void SetKey(const YAML::Mark& mark, const std::string& tag, const std::string& key) {

@@ -67,14 +67,14 @@ std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
     }
     if (Child(map, known) == nullptr) absent.push_back(known);
   }
-  std::string near = Nearest(child.key, absent);
-  if (near.empty()) near = Nearest(child.key, map.known_keys);
+  std::string nearest = Nearest(child.key, absent);
+  if (nearest.empty()) nearest = Nearest(child.key, map.known_keys);
   constexpr std::size_t kListed = 8;
   std::string expected;
-  if (near.empty() && !absent.empty() && absent.size() <= kListed) {
+  if (nearest.empty() && !absent.empty() && absent.size() <= kListed) {
     expected = (absent.size() > 1 ? "one of " : "") + Join(absent);
   }
-  return ErrorLine(KeyPlace(child), PathOf(child), "unknown key", expected, near);
+  return ErrorLine(KeyPlace(child), PathOf(child), "unknown key", expected, nearest);
 }
 
 }  // namespace
@@ -91,10 +91,10 @@ void FailMissing(const ConfigTree& map, std::string_view key, std::string_view n
   }
   std::string message = "missing key";
   if (!needed_by.empty()) message.append(", needed by ").append(needed_by);
-  const std::string near = Nearest(key, unread);
-  if (!near.empty()) {
-    message += "; found '" + near + "'";
-    const int line = Child(map, near)->key_line;
+  const std::string nearest = Nearest(key, unread);
+  if (!nearest.empty()) {
+    message += "; found '" + nearest + "'";
+    const int line = Child(map, nearest)->key_line;
     if (line > 0) message += " at line " + std::to_string(line);
   }
   FailAt(KeyPlace(map), PathBelow(PathOf(map), key), message);

@@ -51,12 +51,12 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   std::vector<std::string> names;
   const auto list = entry.Find("sensors");
   if (!list) return names;
-  std::vector<std::string> known;
-  for (const auto& [name, sensor] : root.At("sensors").Entries()) known.push_back(name);
+  std::vector<std::string> known_names;
+  for (const auto& [name, sensor] : root.At("sensors").Entries()) known_names.push_back(name);
   for (const Node& item : list->Items()) {
     const std::string name = item.Text();
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      item.Fail("no sensor '" + name + "'", "a name from `sensors`", Nearest(name, known));
+    if (std::find(known_names.begin(), known_names.end(), name) == known_names.end()) {
+      item.Fail("no sensor '" + name + "'", "a name from `sensors`", Nearest(name, known_names));
     }
     if (std::find(names.begin(), names.end(), name) != names.end()) {
       item.Fail("sensor '" + name + "' is listed twice", "each sensor once");
@@ -152,13 +152,14 @@ void CheckOverrides(const Node& overrides, const Node& root, const Node& merged)
       value.Fail("'" + key + "' is common to all estimators of a run",
                  "state, sensors, landmarks or initial_time_s");
     }
-    std::vector<std::string> known;
-    for (const auto& [name, entry] : root.At(key).Entries()) known.push_back(name);
+    std::vector<std::string> known_names;
+    for (const auto& [name, entry] : root.At(key).Entries()) known_names.push_back(name);
     for (const auto& [name, entry] : value.Entries()) {
-      if (std::ranges::find(known, name) != known.end()) continue;
+      if (std::ranges::find(known_names, name) != known_names.end()) continue;
       if (merged.At(key).At(name).Find("model")) continue;
       entry.Fail("no entry '" + name + "' in '" + key + "' to override",
-                 "one of " + Join(known) + ", or a new entry with a model", Nearest(name, known));
+                 "one of " + Join(known_names) + ", or a new entry with a model",
+                 Nearest(name, known_names));
     }
   }
 }
@@ -201,9 +202,9 @@ void CheckInputs(const EstimatorSpec& filter, const EstimatorSpec& spec, const N
 }
 
 /// Returns the index of the estimator whose accepted measurements `spec` uses according to the key
-/// `use`; -1 if it uses all. `before` are the estimators listed before it. Error: kBadConfig.
+/// `use`; -1 if it uses all. `earlier_estimators` are those listed before it. Error: kBadConfig.
 int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
-            const std::vector<EstimatorSpec>& before) {
+            const std::vector<EstimatorSpec>& earlier_estimators) {
   if (!use.is_map()) {
     if (use.Text() == "all") return -1;
     use.Fail("'" + use.Text() + "' is not a choice of data", "all, or {accepted_by: NAME}");
@@ -211,21 +212,21 @@ int ReadUse(const Node& use, const EstimatorSpec& spec, const Node& estimators,
   const Node key = use.At("accepted_by", "use");
   const std::string name = key.Text();
   if (name == spec.name) key.Fail("'" + name + "' is this estimator itself", "another estimator");
-  const auto found = std::ranges::find(before, name, &EstimatorSpec::name);
-  if (found == before.end()) {
-    std::vector<std::string> known;
-    for (const auto& [listed, entry] : estimators.Entries()) known.push_back(listed);
-    if (std::ranges::find(known, name) != known.end()) {
+  const auto found = std::ranges::find(earlier_estimators, name, &EstimatorSpec::name);
+  if (found == earlier_estimators.end()) {
+    std::vector<std::string> known_names;
+    for (const auto& [listed, entry] : estimators.Entries()) known_names.push_back(listed);
+    if (std::ranges::find(known_names, name) != known_names.end()) {
       key.Fail("'" + name + "' is listed after '" + spec.name + "'",
                "an estimator listed before it, which processes each frame first");
     }
-    std::erase(known, spec.name);
-    key.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
+    std::erase(known_names, spec.name);
+    key.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known_names));
   }
   CheckAccepts(*found, spec, key);
-  const int first = static_cast<int>(found - before.begin());
-  for (int i = first; i >= 0; i = before[static_cast<std::size_t>(i)].accepted_by) {
-    CheckInputs(before[static_cast<std::size_t>(i)], spec, key);
+  const int first = static_cast<int>(found - earlier_estimators.begin());
+  for (int i = first; i >= 0; i = earlier_estimators[static_cast<std::size_t>(i)].accepted_by) {
+    CheckInputs(earlier_estimators[static_cast<std::size_t>(i)], spec, key);
   }
   return first;
 }
@@ -238,7 +239,7 @@ std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const EstimatorSpe
     return make(spec.problem, streams != nullptr ? *streams : spec.problem.streams);
   };
   if (plugin == nullptr) return create();
-  std::string why = "an exception of unknown type";
+  std::string reason = "an exception of unknown type";
   try {
     return create();
   } catch (const Error&) {
@@ -246,13 +247,13 @@ std::unique_ptr<Estimator> Create(const EstimatorMaker& make, const EstimatorSpe
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& e) {
-    why = e.what();
+    reason = e.what();
   } catch (...) {
   }
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
                         "estimator '" + plugin->name + "' of plugin " + plugin->plugin.string() +
-                            " failed while being created: " + why));
+                            " failed while being created: " + reason));
 }
 
 /// Rejects an estimator that cannot roll back for out-of-sequence frames.
@@ -267,7 +268,7 @@ void CheckCanRollBack(const EstimatorSpec& spec, const Node& entry) {
 
 EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                              const PluginHost& host, const std::vector<StreamInfo>* streams,
-                             const std::vector<EstimatorSpec>& before) {
+                             const std::vector<EstimatorSpec>& earlier_estimators) {
   CheckName(name, entry);
   EstimatorSpec spec;
   spec.name = name;
@@ -320,7 +321,8 @@ EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const C
     if (landmarks.prior) landmarks.prior->min_observations = 0;
   }
   spec.estimator = Create(make, spec, streams, of_plugin, entry);
-  if (use) spec.accepted_by = ReadUse(*use, spec, config.root().At("estimators"), before);
+  if (use)
+    spec.accepted_by = ReadUse(*use, spec, config.root().At("estimators"), earlier_estimators);
   return spec;
 }
 
@@ -328,11 +330,11 @@ int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {
   const int index = FindStreamOf(sensor, model.measurement().geometry.ambient,
                                  "model '" + model.name() + "' measures", streams);
-  const int known = streams[static_cast<std::size_t>(index)].known;
-  if (known != model.known_size()) {
+  const int known_size = streams[static_cast<std::size_t>(index)].known;
+  if (known_size != model.known_size()) {
     sensor.At("stream").Fail(
         "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
-            std::to_string(known) + " known numbers per measurement",
+            std::to_string(known_size) + " known numbers per measurement",
         std::to_string(model.known_size()) + ", as model '" + model.name() + "' requires" +
             (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
                                     : std::string()));

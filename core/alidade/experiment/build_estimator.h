@@ -17,11 +17,11 @@ int FindStream(const Node& sensor, const SensorModel& model,
 void CheckStreams(const Node& root, const Problem& problem, const std::vector<StreamInfo>& streams);
 
 /// Builds the entry `name` of `estimators:`. `streams` are those of the source, or null for the
-/// streams that the entry names; `before` are the estimators listed before it. Errors: those of
+/// streams that the entry names; `earlier_estimators` are those listed before it. Errors: those of
 /// BuildExperiment.
 EstimatorSpec BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                              const PluginHost& host, const std::vector<StreamInfo>* streams,
-                             const std::vector<EstimatorSpec>& before);
+                             const std::vector<EstimatorSpec>& earlier_estimators);
 
 /// Builds the entry `name` of `estimators:` and appends it to the experiment; appends nothing if
 /// that fails. `config` includes the calibration of the data. Errors: those of BuildExperiment.

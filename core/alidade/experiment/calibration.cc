@@ -17,8 +17,8 @@ void MarkAsRead(const Node& map) {
 
 Config WithCalibration(const Config& config, const Source& source) {
   const Node root = config.root();
-  if (const auto written = root.Find("calibration")) {
-    written->Fail("not a key of a config: the data provide the calibration", "'camera'");
+  if (const auto node = root.Find("calibration")) {
+    node->Fail("not a key of a config: the data provide the calibration", "'camera'");
   }
   const auto use = root.At("source").Find("calibration");
   if (use && use->Choice({"use", "ignore"}) == 1) return config;

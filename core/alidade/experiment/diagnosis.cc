@@ -63,7 +63,7 @@ void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
 /// Adds an event `unused` for each sensor without a used measurement in the whole run.
 void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
   for (const SensorBinding& sensor : problem.sensors) {
-    std::int64_t used = 0, total = 0;
+    std::int64_t used_count = 0, total = 0;
     std::vector<std::string> unused_counts;
     for (const auto& [key, count] : result.counts) {
       const std::size_t colon = key.find(':');
@@ -71,12 +71,12 @@ void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
       if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
       total += count;
       if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
-        used += count;
+        used_count += count;
       } else {
         unused_counts.push_back(std::to_string(count) + ' ' + outcome);
       }
     }
-    if (used > 0) continue;
+    if (used_count > 0) continue;
     const std::string finding =
         total > 0
             ? " used none of " + std::to_string(total) +

@@ -23,9 +23,9 @@ constexpr int kSchema = 1;
 
 void CheckSchema(const Node& root) {
   const Node version = root.At("alidade", "every config: the version of its schema");
-  const std::int64_t found = version.Integer(1, 1'000'000);
-  if (found > kSchema) {
-    version.Fail("schema version " + std::to_string(found),
+  const std::int64_t config_version = version.Integer(1, 1'000'000);
+  if (config_version > kSchema) {
+    version.Fail("schema version " + std::to_string(config_version),
                  std::to_string(kSchema) +
                      ", the newest version that this program reads, or a newer alidade");
   }
@@ -72,15 +72,15 @@ void CheckTruths(const Node& source, const Experiment& experiment, const Problem
     const auto has_block = [&](const EstimatorSpec& estimator) {
       return internal::WhyNoBlock(estimator.problem.layout, truths, t).empty();
     };
-    const std::string why = internal::WhyNoBlock(full_problem.layout, truths, t);
-    if (!node || why.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
+    const std::string reason = internal::WhyNoBlock(full_problem.layout, truths, t);
+    if (!node || reason.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
     std::vector<std::string> names;
     for (const Block& block : full_problem.layout.blocks()) {
       names.push_back(block.name);
       names.push_back(block.name.substr(block.owner.size() + 1));
     }
     std::erase(names, truths[t].name);
-    node->Fail("the truth does not match a block: " + why,
+    node->Fail("the truth does not match a block: " + reason,
                "the name and size of one block, as in ENTRY.BLOCK", Nearest(truths[t].name, names));
   }
 }
@@ -90,8 +90,8 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   OutOfSequencePolicy policy;
   const auto entry = root.Find("out_of_sequence");
   if (!entry) return policy;
-  const Node chosen = entry->At("policy", "out_of_sequence");
-  policy.policy = static_cast<OutOfSequence>(chosen.Choice({"reject", "buffer", "rollback"}));
+  const Node policy_node = entry->At("policy", "out_of_sequence");
+  policy.policy = static_cast<OutOfSequence>(policy_node.Choice({"reject", "buffer", "rollback"}));
   const auto window = entry->Find("window_s");
   if (window && policy.policy == OutOfSequence::kReject) {
     window->Fail("has no effect: 'policy: reject' does not buffer frames",
@@ -99,8 +99,8 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   }
   if (window) policy.window = TimestampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
-    chosen.Fail("'rollback' without 'window_s'",
-                "'window_s', the largest lag of an out-of-sequence frame");
+    policy_node.Fail("'rollback' without 'window_s'",
+                     "'window_s', the largest lag of an out-of-sequence frame");
   }
   entry->RejectUnread();
   return policy;

@@ -119,8 +119,9 @@ std::string RepresentationText(const SensorBinding& sensor) {
   return representation ? ToString(*representation) : "a custom representation";
 }
 
-/// Rejects a sensor that cannot share landmarks with `first`, or whose roles are not in order.
-void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first) {
+/// Rejects a sensor that cannot share landmarks with `first_sensor`, or whose roles are not in
+/// order.
+void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first_sensor) {
   const auto is_landmark = [](const Space& role) { return role.landmark(); };
   if (!std::ranges::is_partitioned(sensor.model->roles(), std::not_fn(is_landmark))) {
     model.Fail("model '" + sensor.model->name() + "' has roles after those of its landmark",
@@ -134,10 +135,10 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   const auto is_same = [](const Space& a, const Space& b) {
     return a.name == b.name && a.geometry == b.geometry;
   };
-  if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), is_same)) {
+  if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first_sensor), is_same)) {
     model.Fail("model '" + sensor.model->name() + "' represents landmarks as " +
-                   RepresentationText(sensor) + ", unlike sensor '" + first.name + '\'',
-               "the same representation, " + RepresentationText(first));
+                   RepresentationText(sensor) + ", unlike sensor '" + first_sensor.name + '\'',
+               "the same representation, " + RepresentationText(first_sensor));
   }
 }
 

@@ -308,8 +308,8 @@ class OwnedStateReader {
         kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
     const BlockId id =
         internal::AddOwnedState(problem, name_, space, Read(space, defaults, problem));
-    const std::string why = internal::OffsetInTime(problem, id, sensor);
-    if (!why.empty()) offset_->Fail(why, "the key left out");
+    const std::string reason = internal::OffsetInTime(problem, id, sensor);
+    if (!reason.empty()) offset_->Fail(reason, "the key left out");
   }
 
   void RejectUnread() const {
@@ -369,10 +369,10 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
 /// Reads `{NAME: SCALE}` for one of kLosses except `none`.
 RobustLoss ReadLoss(const Node& node) {
   std::optional<RobustLoss> loss;
-  std::vector<std::string> known;
+  std::vector<std::string> loss_texts;
   int count = 0;
   for (std::size_t i = 1; i < kLosses.size(); ++i) {
-    known.push_back(std::string("{") + kLosses[i].name + ": SCALE}");
+    loss_texts.push_back(std::string("{") + kLosses[i].name + ": SCALE}");
     const auto scale = node.Find(kLosses[i].name);
     if (!scale) continue;
     ++count;
@@ -381,7 +381,7 @@ RobustLoss ReadLoss(const Node& node) {
   }
   node.RejectUnread();
   if (count != 1)
-    node.Fail("needs exactly one loss with its scale", "one of " + internal::Join(known));
+    node.Fail("needs exactly one loss with its scale", "one of " + internal::Join(loss_texts));
   return *loss;
 }
 

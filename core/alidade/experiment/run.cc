@@ -80,19 +80,19 @@ bool Advance(EstimatorRun& run, const FrameWithSegments& frame, const Frame& vis
     run.AddEstimate(static_cast<std::size_t>(result.frames), frame, after.state(), report, options);
     run.result.record_s += SecondsSince(start);
   }
-  if (const std::string why = run.HandleFailures(report); !why.empty()) {
+  if (const std::string reason = run.HandleFailures(report); !reason.empty()) {
     if (result.status == RunStatus::kOk) {
       Fail(result, ExitCode::kPlugin,
-           "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + why);
+           "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + reason);
     }
     return false;
   }
   const bool ends_run = run.spec.on_divergence == OnDivergence::kFail && run.diverged;
   if (!run.finished && !ends_run) return true;
   if (result.status == RunStatus::kOk) {
-    const std::string why = Cause(report.events, "diverged");
+    const std::string reason = Cause(report.events, "diverged");
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + why);
+         "estimator '" + run.spec.name + "'" + TimeText(frame.frame) + ": " + reason);
   }
   return !ends_run;
 }
@@ -102,9 +102,9 @@ bool Advance(EstimatorRun& run, const FrameWithSegments& frame, const Frame& vis
 Frame AcceptedBy(int estimator, const std::vector<EstimatorRun>& runs, const Frame& frame,
                  const Source& source) {
   const EstimatorRun& filter = runs[static_cast<std::size_t>(estimator)];
-  const int before = filter.spec.accepted_by;
+  const int earlier = filter.spec.accepted_by;
   return internal::AcceptedMeasurements(
-      before < 0 ? frame : AcceptedBy(before, runs, frame, source), source.streams(),
+      earlier < 0 ? frame : AcceptedBy(earlier, runs, frame, source), source.streams(),
       filter.spec.problem, filter.last_report ? *filter.last_report : UpdateReport());
 }
 
@@ -182,12 +182,12 @@ void ComputeMetrics(EstimatorRun& run, RunResult& result) {
 }
 
 /// Records that the smoothing of an estimator was stopped. The results of the others remain.
-void RecordStop(EstimatorRun& run, const char* why, RunResult& result) {
-  run.AddEvents({{run.spec.estimator->timestamp(), "stopped", why}});
+void RecordStop(EstimatorRun& run, const char* reason, RunResult& result) {
+  run.AddEvents({{run.spec.estimator->timestamp(), "stopped", reason}});
   if (result.status != RunStatus::kOk) return;
   result.status = RunStatus::kStopped;
   result.code = ExitCode::kStopped;
-  result.reason = "estimator '" + run.spec.name + "': " + why;
+  result.reason = "estimator '" + run.spec.name + "': " + reason;
 }
 
 /// Computes the estimates of the offline estimators.

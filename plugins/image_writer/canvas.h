@@ -39,7 +39,8 @@ inline const char* NameOf(Mark mark) {
   return kNames[static_cast<std::size_t>(mark)];
 }
 
-/// A number with so many digits, as many after the point as one below 10 has: `0.0123`, `-40.72`.
+/// Formats a number with `digits` digits. A number below 1 has the decimals of one below 10:
+/// `0.0123`, `-40.72`.
 inline std::string Digits(double value, int digits) {
   if (!std::isfinite(value)) return "-";
   const double size = std::abs(value);
@@ -53,7 +54,7 @@ inline std::string Digits(double value, int digits) {
   return text;
 }
 
-/// A small number in two digits that count: `0.0029`, `14`, `3.1e-04`.
+/// Formats a number with two significant digits: `0.0029`, `14`, `3.1e-04`.
 inline std::string TwoDigits(double value) {
   if (!std::isfinite(value)) return "-";
   const double size = std::abs(value);
@@ -68,63 +69,65 @@ inline std::string TwoDigits(double value) {
   return text;
 }
 
-/// An image to draw on at places between its pixels, px.
+/// Image to draw on, with positions in fractions of a pixel.
 class Canvas {
  public:
   explicit Canvas(cv::Mat& image) : image_(image) {}
 
-  /// The pixels of a part, which are those of this one.
+  /// Returns a part of the image that shares its pixels.
   cv::Mat Part(const cv::Rect2d& box) {
     return image_(cv::Rect(box) & cv::Rect({0, 0}, image_.size()));
   }
 
   enum class Align { kLeft, kRight, kMiddle };
-  /// `at` is on the base line; what OpenCV has no letters for is shown as '?'.
-  void Text(cv::Point2d at, const std::string& text, const cv::Scalar& colour, double size = 0.45,
-            Align align = Align::kLeft, int thickness = 1) {
+  /// `position` is on the base line. Characters that OpenCV cannot draw are shown as '?'.
+  void Text(cv::Point2d position, const std::string& text, const cv::Scalar& colour,
+            double size = 0.45, Align align = Align::kLeft, int thickness = 1) {
     std::string ascii;
     for (const char c : text) {
-      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U) continue;  // the rest of a UTF-8 letter
+      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U)
+        continue;  // continuation of a UTF-8 letter
       ascii += c >= ' ' && c <= '~' ? c : '?';
     }
-    int below = 0;
-    const int width = cv::getTextSize(ascii, kFont, size, thickness, &below).width;
-    if (align == Align::kRight) at.x -= width;
-    if (align == Align::kMiddle) at.x -= 0.5 * width;
-    cv::putText(image_, ascii, {cvRound(at.x), cvRound(at.y)}, kFont, size, colour, thickness,
-                cv::LINE_AA);
+    int baseline = 0;
+    const int width = cv::getTextSize(ascii, kFont, size, thickness, &baseline).width;
+    if (align == Align::kRight) position.x -= width;
+    if (align == Align::kMiddle) position.x -= 0.5 * width;
+    cv::putText(image_, ascii, {cvRound(position.x), cvRound(position.y)}, kFont, size, colour,
+                thickness, cv::LINE_AA);
   }
   void Line(cv::Point2d a, cv::Point2d b, const cv::Scalar& colour, int thickness = 1) {
     Path({a, b}, colour, thickness);
   }
   void Path(const std::vector<cv::Point2d>& points, const cv::Scalar& colour, int thickness = 1,
             bool closed = false) {
-    const std::vector<cv::Point> at = Fixed(points);
-    if (at.size() > 1) {
-      cv::polylines(image_, at, closed, colour, thickness, cv::LINE_AA, kShift);
+    const std::vector<cv::Point> vertices = ToFixedPoint(points);
+    if (vertices.size() > 1) {
+      cv::polylines(image_, vertices, closed, colour, thickness, cv::LINE_AA, kShift);
     }
   }
   void Area(const std::vector<cv::Point2d>& points, const cv::Scalar& colour) {
-    const std::vector<cv::Point> at = Fixed(points);
-    if (at.size() > 2) cv::fillPoly(image_, {at}, colour, cv::LINE_AA, kShift);
+    const std::vector<cv::Point> vertices = ToFixedPoint(points);
+    if (vertices.size() > 2) cv::fillPoly(image_, {vertices}, colour, cv::LINE_AA, kShift);
   }
   void Disc(cv::Point2d centre, double radius, const cv::Scalar& colour) {
-    if (!Near(centre)) return;
-    cv::circle(image_, Fixed(centre), cvRound(radius * kOne), colour, cv::FILLED, cv::LINE_AA,
-               kShift);
+    if (!IsDrawable(centre)) return;
+    cv::circle(image_, ToFixedPoint(centre), cvRound(radius * kFixedPointScale), colour, cv::FILLED,
+               cv::LINE_AA, kShift);
   }
   void Cross(cv::Point2d centre, double reach, const cv::Scalar& colour) {
     Line({centre.x - reach, centre.y - reach}, {centre.x + reach, centre.y + reach}, colour, 2);
     Line({centre.x - reach, centre.y + reach}, {centre.x + reach, centre.y - reach}, colour, 2);
   }
-  /// The ellipse r' P^-1 r = 9 about a mean, both in units of `per_unit` px; y grows upwards where
-  /// that is negative in y.
-  void ThreeSigma(cv::Point2d centre, const PlaneGaussian& of, cv::Point2d per_unit,
+  /// Draws the ellipse r' P^-1 r = 9 about a mean, in units of `per_unit` px. y grows upwards if
+  /// per_unit.y is negative.
+  void ThreeSigma(cv::Point2d centre, const PlaneGaussian& gaussian, cv::Point2d per_unit,
                   const cv::Scalar& colour, int thickness = 1) {
     constexpr int kCorners = 40;
-    const double middle = 0.5 * (of.xx + of.yy), half = 0.5 * (of.xx - of.yy);
-    const double reach = std::hypot(half, of.xy);
-    const double turn = 0.5 * std::atan2(of.xy, half);
+    const double middle = 0.5 * (gaussian.xx + gaussian.yy),
+                 half = 0.5 * (gaussian.xx - gaussian.yy);
+    const double reach = std::hypot(half, gaussian.xy);
+    const double turn = 0.5 * std::atan2(gaussian.xy, half);
     const double a = 3.0 * std::sqrt(std::max(0.0, middle + reach));
     const double b = 3.0 * std::sqrt(std::max(0.0, middle - reach));
     std::vector<cv::Point2d> ring;
@@ -139,15 +142,19 @@ class Canvas {
 
  private:
   static constexpr int kShift = 4, kFont = cv::FONT_HERSHEY_SIMPLEX;
-  static constexpr double kOne = 1 << kShift;
-  static constexpr double kFar = 1e5;  ///< px: OpenCV takes no place beyond 2^31 / 2^kShift
+  static constexpr double kFixedPointScale = 1 << kShift;
+  static constexpr double kDrawableLimit = 1e5;  ///< px: OpenCV is limited to 2^31 / 2^kShift
 
-  static bool Near(cv::Point2d at) { return std::abs(at.x) < kFar && std::abs(at.y) < kFar; }
-  static cv::Point Fixed(cv::Point2d at) { return {cvRound(at.x * kOne), cvRound(at.y * kOne)}; }
-  static std::vector<cv::Point> Fixed(const std::vector<cv::Point2d>& points) {
+  static bool IsDrawable(cv::Point2d point) {
+    return std::abs(point.x) < kDrawableLimit && std::abs(point.y) < kDrawableLimit;
+  }
+  static cv::Point ToFixedPoint(cv::Point2d point) {
+    return {cvRound(point.x * kFixedPointScale), cvRound(point.y * kFixedPointScale)};
+  }
+  static std::vector<cv::Point> ToFixedPoint(const std::vector<cv::Point2d>& points) {
     std::vector<cv::Point> fixed;
-    for (const cv::Point2d& at : points) {
-      if (Near(at)) fixed.push_back(Fixed(at));
+    for (const cv::Point2d& point : points) {
+      if (IsDrawable(point)) fixed.push_back(ToFixedPoint(point));
     }
     return fixed;
   }

@@ -14,7 +14,7 @@
 
 namespace alidade::draw {
 
-/// The text and the plot next to the image of a frame.
+/// Panel with the text and the plot next to the image of a frame.
 class Panel {
  public:
   static constexpr int kWidth = 400;  ///< px
@@ -56,11 +56,11 @@ class Panel {
     canvas_.Text({kRight, y_}, std::to_string(view.landmarks), kInk, 0.45, Canvas::Align::kRight);
     y_ += kRow;
   }
-  /// So that it fits the width.
+  /// Returns the font size at which the title fits the width.
   static double TitleSize(const std::string& title) {
-    constexpr double kUsual = 0.6, kLetter = 18.5;  // px of a letter, for a size of 1
+    constexpr double kDefault = 0.6, kLetter = 18.5;  // width of a letter at size 1, px
     const double width = kLetter * static_cast<double>(std::max<std::size_t>(1, title.size()));
-    return std::clamp((kRight - kLeft) / width, 0.35, kUsual);
+    return std::clamp((kRight - kLeft) / width, 0.35, kDefault);
   }
   void Legend(const std::array<int, kMarks>& counts) {
     for (int i = 0; i < kMarks; ++i) {
@@ -80,7 +80,7 @@ class Panel {
     y_ += 10.0;
     Rule();
   }
-  /// For each measurement its value and where its innovation lies between -4 and 4 sigma.
+  /// Draws the value of each measurement, and its innovation between -4 and 4 sigma.
   void Innovations(const std::vector<ViewInnovation>& innovations) {
     constexpr double kMiddle = 0.5 * (250.0 + kRight), kPerSigma = (kRight - 250.0) / 8.0;
     canvas_.Text({kLeft, y_}, "measured", kFaint);
@@ -90,21 +90,21 @@ class Panel {
     }
     canvas_.Text({246.0, y_}, "sigma", kFaint, 0.4, Canvas::Align::kRight);
     y_ += kRow + 1.0;
-    for (const ViewInnovation& one : innovations) {
+    for (const ViewInnovation& innovation : innovations) {
       const double middle = y_ - 4.5;
-      canvas_.Text({kLeft, y_}, one.name, kInk);
-      canvas_.Text({200.0, y_}, Digits(one.measured, 5), kInk, 0.45, Canvas::Align::kRight);
+      canvas_.Text({kLeft, y_}, innovation.name, kInk);
+      canvas_.Text({200.0, y_}, Digits(innovation.measured, 5), kInk, 0.45, Canvas::Align::kRight);
       canvas_.Line({kMiddle - 4.0 * kPerSigma, middle}, {kMiddle + 4.0 * kPerSigma, middle}, kRule);
       for (const int sigma : {-3, 0, 3}) {
         const double x = kMiddle + sigma * kPerSigma;
         canvas_.Line({x, middle - 5.0}, {x, middle + 5.0}, kRule);
       }
-      if (std::isfinite(one.sigmas)) {
-        const double x = kMiddle + kPerSigma * std::clamp(one.sigmas, -4.0, 4.0);
-        canvas_.Line({kMiddle, middle}, {x, middle}, ColourOf(one.mark), 2);
-        canvas_.Disc({x, middle}, 4.5, ColourOf(one.mark));
+      if (std::isfinite(innovation.sigmas)) {
+        const double x = kMiddle + kPerSigma * std::clamp(innovation.sigmas, -4.0, 4.0);
+        canvas_.Line({kMiddle, middle}, {x, middle}, ColourOf(innovation.mark), 2);
+        canvas_.Disc({x, middle}, 4.5, ColourOf(innovation.mark));
       } else {
-        canvas_.Disc({kMiddle, middle}, 4.5, ColourOf(one.mark));
+        canvas_.Disc({kMiddle, middle}, 4.5, ColourOf(innovation.mark));
       }
       y_ += kRow;
     }
@@ -112,26 +112,26 @@ class Panel {
     Rule();
   }
   void Elements(const std::vector<ViewElement>& elements) {
-    const bool known = std::ranges::any_of(
-        elements, [](const ViewElement& one) { return std::isfinite(one.truth); });
-    const double fitting = known ? 19.0 : 26.0;  // letters
-    const double value = known ? 234.0 : 290.0, sigma = known ? 308.0 : kRight;
+    const bool has_truth = std::ranges::any_of(
+        elements, [](const ViewElement& element) { return std::isfinite(element.truth); });
+    const double max_letters = has_truth ? 19.0 : 26.0;  // letters that fit
+    const double value = has_truth ? 234.0 : 290.0, sigma = has_truth ? 308.0 : kRight;
     canvas_.Text({kLeft, y_}, "estimate", kFaint);
     canvas_.Text({sigma, y_}, "sigma", kFaint, 0.45, Canvas::Align::kRight);
-    if (known) canvas_.Text({kRight, y_}, "error", kFaint, 0.45, Canvas::Align::kRight);
+    if (has_truth) canvas_.Text({kRight, y_}, "error", kFaint, 0.45, Canvas::Align::kRight);
     y_ += kRow + 1.0;
-    for (const ViewElement& one : elements) {
-      std::string name = one.name.substr(one.name.find('.') + 1);
-      if (!one.unit.empty()) name += " [" + one.unit + ']';
+    for (const ViewElement& element : elements) {
+      std::string name = element.name.substr(element.name.find('.') + 1);
+      if (!element.unit.empty()) name += " [" + element.unit + ']';
       canvas_.Text({kLeft, y_}, name, kInk,
-                   std::min(0.45, 0.45 * fitting / static_cast<double>(name.size())));
-      canvas_.Text({value, y_}, Digits(one.value, 5), kInk, 0.45, Canvas::Align::kRight);
-      canvas_.Text({sigma, y_}, TwoDigits(one.sigma), kFaint, 0.43, Canvas::Align::kRight);
-      const double error = one.value - one.truth;
+                   std::min(0.45, 0.45 * max_letters / static_cast<double>(name.size())));
+      canvas_.Text({value, y_}, Digits(element.value, 5), kInk, 0.45, Canvas::Align::kRight);
+      canvas_.Text({sigma, y_}, TwoDigits(element.sigma), kFaint, 0.43, Canvas::Align::kRight);
+      const double error = element.value - element.truth;
       if (std::isfinite(error)) {
-        const bool far = std::abs(error) > 3.0 * one.sigma;
-        canvas_.Text({kRight, y_}, TwoDigits(error), far ? ColourOf(Mark::kRejected) : kTruth, 0.45,
-                     Canvas::Align::kRight);
+        const bool is_large = std::abs(error) > 3.0 * element.sigma;
+        canvas_.Text({kRight, y_}, TwoDigits(error), is_large ? ColourOf(Mark::kRejected) : kTruth,
+                     0.45, Canvas::Align::kRight);
       }
       y_ += kRow;
     }
@@ -139,59 +139,60 @@ class Panel {
     canvas_.Line({kLeft, y_}, {kRight, y_}, kRule);
   }
 
-  /// Path, landmarks and 3 sigma from above, all axes to one scale.
+  /// Draws the trajectory, landmarks and 3-sigma ellipses from above, at the same scale on both
+  /// axes.
   void Map(const ViewMap& map, const cv::Rect2d& box) {
     const double left = map.bounds[0], right = map.bounds[1];
     const double bottom = map.bounds[2], top = map.bounds[3];
     constexpr double kMargin = 14.0;
-    const double wide = std::max(right - left, 1e-9), high = std::max(top - bottom, 1e-9);
-    const double times =
-        std::min((box.width - 2.0 * kMargin) / wide, (box.height - 2.0 * kMargin) / high);
+    const double width = std::max(right - left, 1e-9), height = std::max(top - bottom, 1e-9);
+    const double scale =
+        std::min((box.width - 2.0 * kMargin) / width, (box.height - 2.0 * kMargin) / height);
     const cv::Point2d middle(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
-    const auto place = [&](double x, double y) {
-      return cv::Point2d(middle.x + times * (x - 0.5 * (left + right)),
-                         middle.y - times * (y - 0.5 * (bottom + top)));
+    const auto to_box = [&](double x, double y) {
+      return cv::Point2d(middle.x + scale * (x - 0.5 * (left + right)),
+                         middle.y - scale * (y - 0.5 * (bottom + top)));
     };
     Inset inset(canvas_, box);
-    for (const PlaneGaussian& one : map.landmarks) {
-      // The longer, the paler: what is uncertain does not hide what is not.
+    for (const PlaneGaussian& landmark : map.landmarks) {
+      // A longer ellipse is paler, so that uncertain landmarks do not hide the others.
       constexpr double kShort = 25.0;  // px
-      const double length = 3.0 * times * std::sqrt(std::max(one.xx, one.yy));
+      const double length = 3.0 * scale * std::sqrt(std::max(landmark.xx, landmark.yy));
       const double strength = std::clamp(kShort / length, 0.12, 1.0);
-      inset.canvas.ThreeSigma(inset(place(one.x, one.y)), one, {times, -times},
+      inset.canvas.ThreeSigma(inset(to_box(landmark.x, landmark.y)), landmark, {scale, -scale},
                               kPaper * (1.0 - strength) + cv::Scalar(150, 160, 80) * strength);
     }
-    for (const PlaneGaussian& one : map.landmarks) {
-      inset.canvas.Disc(inset(place(one.x, one.y)), 1.8, {210, 220, 130});
+    for (const PlaneGaussian& landmark : map.landmarks) {
+      inset.canvas.Disc(inset(to_box(landmark.x, landmark.y)), 1.8, {210, 220, 130});
     }
     const auto trajectory = [&](const std::vector<std::array<double, 2>>& path,
                                 const cv::Scalar& colour) {
       std::vector<cv::Point2d> points;
-      for (const auto& [x, y] : path) points.push_back(inset(place(x, y)));
+      for (const auto& [x, y] : path) points.push_back(inset(to_box(x, y)));
       inset.canvas.Path(points, colour, 2);
     };
     trajectory(map.true_path, kTruth);
     trajectory(map.path, kInk);
-    const cv::Point2d here = inset(place(map.position.x, map.position.y));
-    inset.canvas.ThreeSigma(here, map.position, {times, -times}, ColourOf(Mark::kAccepted), 2);
+    const cv::Point2d camera = inset(to_box(map.position.x, map.position.y));
+    inset.canvas.ThreeSigma(camera, map.position, {scale, -scale}, ColourOf(Mark::kAccepted), 2);
     const double length = std::hypot(map.heading[0], map.heading[1]);
     if (length > 1e-6) {
-      const cv::Point2d ahead(map.heading[0] / length, -map.heading[1] / length);
-      const cv::Point2d aside(-ahead.y, ahead.x);
-      inset.canvas.Area(
-          {here + 16.0 * ahead + 8.0 * aside, here, here + 16.0 * ahead - 8.0 * aside},
-          ColourOf(Mark::kAccepted));
+      const cv::Point2d forward(map.heading[0] / length, -map.heading[1] / length);
+      const cv::Point2d sideways(-forward.y, forward.x);
+      inset.canvas.Area({camera + 16.0 * forward + 8.0 * sideways, camera,
+                         camera + 16.0 * forward - 8.0 * sideways},
+                        ColourOf(Mark::kAccepted));
     }
-    inset.canvas.Disc(here, 3.5, kInk);
+    inset.canvas.Disc(camera, 3.5, kInk);
     Frame(box, map.right + ", " + map.up + " [m]");
-    ScaleBar(box, times);
+    ScaleBar(box, scale);
   }
-  /// A round length of a fifth to a half of the width.
+  /// Draws a bar of a round length between a fifth and a half of the width.
   void ScaleBar(const cv::Rect2d& box, double px_per_m) {
     double length_m = std::pow(10.0, std::floor(std::log10(0.5 * box.width / px_per_m)));
-    for (const double more : {5.0, 2.0}) {
-      if (more * length_m * px_per_m < 0.5 * box.width) {
-        length_m *= more;
+    for (const double factor : {5.0, 2.0}) {
+      if (factor * length_m * px_per_m < 0.5 * box.width) {
+        length_m *= factor;
         break;
       }
     }
@@ -202,7 +203,7 @@ class Panel {
     canvas_.Text({x, y - 7.0}, text, kFaint, 0.4);
   }
 
-  /// One element over time within 3 sigma, and its truth.
+  /// Draws one element over time with its 3-sigma band, and its truth.
   void Series(const ViewSeries& series, const cv::Rect2d& box) {
     double low = INFINITY, high = -INFINITY;
     for (std::size_t i = 0; i < series.value.size(); ++i) {
@@ -218,18 +219,18 @@ class Panel {
     high += margin;
     const double start = series.t_s.front(), end = std::max(series.t_s.back(), start + 1e-3);
     Inset inset(canvas_, box);
-    const auto place = [&](std::size_t i, double y) {
+    const auto to_box = [&](std::size_t i, double y) {
       const double x = (series.t_s[i] - start) / (end - start);
       return inset({box.x + x * box.width, box.y + box.height * (high - y) / (high - low)});
     };
     std::vector<cv::Point2d> line, upper, lower, truth;
     for (std::size_t i = 0; i < series.value.size(); ++i) {
-      // What lies outside of the box is cut at it: a band may be wide at first.
+      // The band may be wide at first, and is clipped to the box.
       const double reach = std::min(3.0 * series.sigma[i], 10.0 * (high - low));
-      line.push_back(place(i, series.value[i]));
-      upper.push_back(place(i, series.value[i] + reach));
-      lower.push_back(place(i, series.value[i] - reach));
-      if (std::isfinite(series.truth[i])) truth.push_back(place(i, series.truth[i]));
+      line.push_back(to_box(i, series.value[i]));
+      upper.push_back(to_box(i, series.value[i] + reach));
+      lower.push_back(to_box(i, series.value[i] - reach));
+      if (std::isfinite(series.truth[i])) truth.push_back(to_box(i, series.truth[i]));
     }
     std::vector<cv::Point2d> band = upper;
     band.insert(band.end(), lower.rbegin(), lower.rend());
@@ -256,11 +257,11 @@ class Panel {
     canvas_.Text({box.x + 8.0, box.y + 18.0}, title, kFaint, 0.42);
   }
 
-  /// A part of the panel that clips what is drawn in it.
+  /// Part of the panel that clips its contents.
   struct Inset {
-    Inset(Canvas& of, const cv::Rect2d& box)
-        : image(of.Part(box)), canvas(image), corner(box.tl()) {}
-    cv::Point2d operator()(const cv::Point2d& at) const { return at - corner; }
+    Inset(Canvas& panel, const cv::Rect2d& box)
+        : image(panel.Part(box)), canvas(image), corner(box.tl()) {}
+    cv::Point2d operator()(const cv::Point2d& point) const { return point - corner; }
     cv::Mat image;
     Canvas canvas;
     cv::Point2d corner;

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A window that shows each image as it comes. Closing it does not end the run.
+/// Writer that shows each image in a window. Closing the window does not end the run.
 class WindowWriter : public MatWriter {
  public:
   explicit WindowWriter(const ImageArguments& arguments)

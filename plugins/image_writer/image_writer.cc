@@ -20,11 +20,11 @@
 namespace alidade {
 namespace {
 
-/// One PNG for each frame, `000000.png` and so on.
+/// Writer of one PNG for each frame, `000000.png`, `000001.png`, ...
 class ImageSequenceWriter : public MatWriter {
  public:
   explicit ImageSequenceWriter(const ImageArguments& arguments)
-      : MatWriter(arguments.width, arguments.height), to_(arguments) {}
+      : MatWriter(arguments.width, arguments.height), destination_(arguments) {}
   void Close() override {}
 
  private:
@@ -33,36 +33,38 @@ class ImageSequenceWriter : public MatWriter {
     cv::imencode(".png", image, bytes);
     char name[32];
     std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(number));
-    std::ofstream file(to_.path / name, std::ios::binary);
+    std::ofstream file(destination_.path / name, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));
     file.close();
     if (file) return;
-    throw Error(ExitCode::kIo, ErrorLine({to_.shown + '/' + name}, {}, "cannot be written"));
+    throw Error(ExitCode::kIo,
+                ErrorLine({destination_.shown + '/' + name}, {}, "cannot be written"));
   }
 
-  ImageArguments to_;
+  ImageArguments destination_;
 };
 
-/// A video, MJPG in AVI, of as many frames a second as the first two are apart, to whole numbers
-/// from 1; of a single frame 30. No image leaves no video. Errors: kCannotCreate, kIo.
+/// Writer of a video, MJPG in AVI. Its frame rate is that of the first two frames, rounded to a
+/// whole number of at least 1 Hz, or 30 Hz for a single frame. Without an image it writes no video.
+/// Errors: kCannotCreate, kIo.
 class VideoWriter : public MatWriter {
  public:
   explicit VideoWriter(const ImageArguments& arguments)
-      : MatWriter(arguments.width, arguments.height), to_(arguments) {}
+      : MatWriter(arguments.width, arguments.height), destination_(arguments) {}
 
   void Close() override {
     if (first_.empty()) return;
-    if (!video_.isOpened()) Open(kRateOfOne);
+    if (!video_.isOpened()) Open(kSingleFrameRate);
     video_.release();
     if (IsComplete()) return;
-    throw Error(ExitCode::kIo, ErrorLine({to_.shown}, {}, "cannot be written in full"));
+    throw Error(ExitCode::kIo, ErrorLine({destination_.shown}, {}, "cannot be written in full"));
   }
 
  private:
-  static constexpr double kRateOfOne = 30.0;  ///< Hz, of a single frame
+  static constexpr double kSingleFrameRate = 30.0;  ///< Hz, of a single frame
 
-  /// All images are as large as the first.
+  /// All images have the size of the first image.
   void Write(std::int64_t /*number*/, Timestamp timestamp, const cv::Mat& image) override {
     if (first_.empty()) {
       first_ = image;
@@ -72,37 +74,41 @@ class VideoWriter : public MatWriter {
     if (!video_.isOpened()) {
       const double gap_s = Seconds(timestamp - first_timestamp_);
       constexpr double kMaxRate = 1e6;
-      Open(gap_s > 0.0 ? std::clamp(std::round(1.0 / gap_s), 1.0, kMaxRate) : kRateOfOne);
+      Open(gap_s > 0.0 ? std::clamp(std::round(1.0 / gap_s), 1.0, kMaxRate) : kSingleFrameRate);
     }
     Encode(image);
   }
   void Open(double rate_hz) {
     const int fourcc = cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
-    if (!video_.open(to_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, rate_hz, first_.size())) {
-      throw Error(ExitCode::kCannotCreate, ErrorLine({to_.shown}, {}, "cannot be created",
-                                                     "OpenCV with its writer of Motion JPEG"));
+    if (!video_.open(destination_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, rate_hz,
+                     first_.size())) {
+      throw Error(ExitCode::kCannotCreate, ErrorLine({destination_.shown}, {}, "cannot be created",
+                                                     "OpenCV with its Motion JPEG writer"));
     }
-    constexpr double kQuality = 90.0;  // as good as JPEG files of quality 95 by imencode
+    constexpr double kQuality = 90.0;  // corresponds to quality 95 of a JPEG by imencode
     video_.set(cv::VIDEOWRITER_PROP_QUALITY, kQuality);
     Encode(first_);
   }
   void Encode(const cv::Mat& image) {
-    cv::Mat colour = image;  // grey images are not encoded right by OpenCV 4.6
+    cv::Mat colour = image;  // OpenCV 4.6 encodes grey images incorrectly
     if (image.channels() == 1) cv::cvtColor(image, colour, cv::COLOR_GRAY2BGR);
     video_.write(colour);
   }
-  /// Whether the file is as long as its RIFF header says: OpenCV reports no write that fails.
+  /// Returns true if the file is as long as its RIFF header states. OpenCV does not report failed
+  /// writes.
   bool IsComplete() const {
-    constexpr std::uintmax_t kHead = 8;  // bytes "RIFF" and the number of those that follow
-    unsigned char head[kHead] = {};
-    std::ifstream(to_.path, std::ios::binary).read(reinterpret_cast<char*>(head), sizeof head);
+    constexpr std::uintmax_t kHeaderSize =
+        8;  // bytes: "RIFF" and the number of the remaining bytes
+    unsigned char header[kHeaderSize] = {};
+    std::ifstream(destination_.path, std::ios::binary)
+        .read(reinterpret_cast<char*>(header), sizeof header);
     std::uintmax_t size = 0;
-    for (int i = 7; i >= 4; --i) size = size << 8U | head[i];
+    for (int i = 7; i >= 4; --i) size = size << 8U | header[i];
     std::error_code error;
-    return std::filesystem::file_size(to_.path, error) == kHead + size && !error;
+    return std::filesystem::file_size(destination_.path, error) == kHeaderSize + size && !error;
   }
 
-  ImageArguments to_;
+  ImageArguments destination_;
   cv::VideoWriter video_;
   cv::Mat first_;
   Timestamp first_timestamp_ = 0;

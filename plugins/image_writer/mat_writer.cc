@@ -12,14 +12,15 @@ namespace {
 
 cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>>& pixels, int width,
              int height) {
-  constexpr int kShift = 8, kRadius = 4;  // bits behind the point; px
+  constexpr int kShift = 8, kRadius = 4;  // fractional bits; px
   constexpr double kOne = 1 << kShift, kMargin = kRadius + 1.0;
   const cv::Scalar white(255, 255, 255), grey(50, 50, 50);
   cv::Mat image(height, width, CV_8UC3, cv::Scalar());
   cv::putText(image, std::to_string(number), {4, height - 5}, cv::FONT_HERSHEY_PLAIN, 1.0, grey);
   for (const auto& [u, v] : pixels) {
-    const bool seen = u > -kMargin && u < width + kMargin && v > -kMargin && v < height + kMargin;
-    if (!seen) continue;
+    const bool is_visible =
+        u > -kMargin && u < width + kMargin && v > -kMargin && v < height + kMargin;
+    if (!is_visible) continue;
     const cv::Point centre(cvRound(u * kOne), cvRound(v * kOne));
     cv::circle(image, centre, kRadius << kShift, white, cv::FILLED, cv::LINE_AA, kShift);
   }

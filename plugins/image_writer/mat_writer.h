@@ -10,14 +10,14 @@
 
 namespace alidade {
 
-/// A writer of images of any kind: draws each frame, which a derived class writes or shows.
+/// Image writer that draws each frame. A derived class writes or shows the image.
 ///
-/// Of pixels (u, v) the image has on black a white disc of radius 4 px at each, placed to 1/256 px,
-/// and the frame's number in dark grey at the lower left. The centre of the upper left pixel is
-/// (0, 0).
+/// Pixels (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px, with the
+/// number of the frame in dark grey at the lower left. The centre of the upper left pixel is (0,
+/// 0).
 class MatWriter : public ImageWriter {
  public:
-  /// px, of the images that are drawn from points
+  /// Size of the images that are drawn from points, px.
   MatWriter(int width, int height) : width_(width), height_(height) {}
 
   void Add(std::int64_t number, Timestamp timestamp,

@@ -23,51 +23,51 @@
 
 namespace alidade {
 
-/// A window in a process of its own: what draws windows ends a process that has no display, and
-/// wants one thread for itself. Images go there by a socket.
+/// Window in a process of its own. The library that draws windows ends a process without a display,
+/// and needs one thread for itself. Images are sent to the process by a socket.
 class WindowProcess {
  public:
   /// Opens the window. Error: kCannotCreate, with `shown`.
   WindowProcess(const std::string& title, const std::string& shown) {
-    std::array<int, 2> ends{};
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
+    std::array<int, 2> sockets{};
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets.data()) == 0) {
       child_ = ::fork();
       if (child_ == 0) {
-        ::close(ends[0]);
-        Child(ends[1], title);
+        ::close(sockets[0]);
+        RunChild(sockets[1], title);
       }
-      ::close(ends[1]);
-      socket_ = ends[0];
+      ::close(sockets[1]);
+      socket_ = sockets[0];
     }
-    const timeval patience{10, 0};
-    ::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    const timeval timeout{10, 0};
+    ::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
     char opened = 0;
     if (child_ > 0 && ::recv(socket_, &opened, 1, 0) == 1) return;
     End();
     throw Error(ExitCode::kCannotCreate, ErrorLine({}, shown, "no window can be opened",
-                                                   "a display, as DISPLAY names it; --save-video "
-                                                   "FILE.avi needs none"));
+                                                   "the display in DISPLAY; or --save-video "
+                                                   "FILE.avi, which needs no display"));
   }
   ~WindowProcess() { End(); }
   WindowProcess(const WindowProcess&) = delete;
   WindowProcess& operator=(const WindowProcess&) = delete;
 
-  /// Shows an image, 8 bit BGR. Does nothing once the window was closed.
+  /// Shows an image, 8 bit BGR. Does nothing after the window has been closed.
   void Show(const cv::Mat& image) {
     const std::array<int, 2> size{image.cols, image.rows};
-    const cv::Mat whole = image.isContinuous() ? image : image.clone();
-    closed_ = closed_ || !Send(size.data(), sizeof size) ||
-              !Send(whole.data, whole.total() * whole.elemSize());
+    const cv::Mat continuous = image.isContinuous() ? image : image.clone();
+    is_closed_ = is_closed_ || !Send(size.data(), sizeof size) ||
+                 !Send(continuous.data, continuous.total() * continuous.elemSize());
   }
 
  private:
   bool Send(const void* data, std::size_t size) const {
-    const char* at = static_cast<const char*>(data);
+    const char* position = static_cast<const char*>(data);
     while (size > 0) {
-      const ssize_t sent = ::send(socket_, at, size, MSG_NOSIGNAL);
+      const ssize_t sent = ::send(socket_, position, size, MSG_NOSIGNAL);
       if (sent < 0 && errno == EINTR) continue;
       if (sent <= 0) return false;
-      at += sent;
+      position += sent;
       size -= static_cast<std::size_t>(sent);
     }
     return true;
@@ -76,31 +76,32 @@ class WindowProcess {
     if (socket_ >= 0) ::close(socket_);
     socket_ = -1;
     if (child_ > 0) {
-      ::kill(child_, SIGKILL);  // it may wait for its display
+      ::kill(child_, SIGKILL);  // the child may wait for its display
       ::waitpid(child_, nullptr, 0);
     }
     child_ = -1;
   }
 
-  /// The life of the child: it ends with its parent, at the end of the images, or as its window is
+  /// Runs the child process. It ends with its parent, after the last image, or when its window is
   /// closed.
-  [[noreturn]] static void Child(int socket, const std::string& title) {
+  [[noreturn]] static void RunChild(int socket, const std::string& title) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    for (const int one : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) {
-      ::signal(one, SIG_DFL);
+    for (const int signal_number :
+         {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) {
+      ::signal(signal_number, SIG_DFL);
     }
     const rlimit no_core{0, 0};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    // What it has to say of fonts and settings is of no use to anyone.
-    const int nowhere = ::open("/dev/null", O_RDWR);
+    // Discards messages about fonts and settings.
+    const int null_device = ::open("/dev/null", O_RDWR);
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-      ::dup2(nowhere, stream);
+      ::dup2(null_device, stream);
     }
     try {
       cv::namedWindow(title, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO | cv::WINDOW_GUI_NORMAL);
       const char opened = 1;
       if (::send(socket, &opened, 1, MSG_NOSIGNAL) == 1) ShowAll(socket, title);
-    } catch (const std::exception&) {  // the parent sees that it ended
+    } catch (const std::exception&) {  // the parent detects the end
     }
     ::_exit(0);
   }
@@ -122,19 +123,19 @@ class WindowProcess {
     }
   }
   static bool Receive(int socket, void* data, std::size_t size) {
-    char* at = static_cast<char*>(data);
+    char* position = static_cast<char*>(data);
     while (size > 0) {
-      const ssize_t got = ::recv(socket, at, size, 0);
-      if (got <= 0) return false;
-      at += got;
-      size -= static_cast<std::size_t>(got);
+      const ssize_t received = ::recv(socket, position, size, 0);
+      if (received <= 0) return false;
+      position += received;
+      size -= static_cast<std::size_t>(received);
     }
     return true;
   }
 
   int socket_ = -1;
   pid_t child_ = -1;
-  bool closed_ = false;
+  bool is_closed_ = false;
 };
 
 }  // namespace alidade

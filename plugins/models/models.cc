@@ -26,18 +26,18 @@ class Models : public Source {
  public:
   explicit Models(const SourceArguments& arguments) {
     Params& p = arguments.params;
-    const double rate_hz = p.Number("rate_hz", "Hz", "time steps a second", {1e-6, 1e6}, 30.0);
+    const double rate_hz = p.Number("rate_hz", "Hz", "time steps per second", {1e-6, 1e6}, 30.0);
     const double duration_s =
-        p.Number("duration_s", "s", "time of the last step, at most", {0.0, 1e9}, 10.0);
+        p.Number("duration_s", "s", "upper limit of the time of the last step", {0.0, 1e9}, 10.0);
     const Node& entry = arguments.entry;
     for (const char* key : {"start", "initial", "overrides", "sensors", "inputs", "landmarks"}) {
       entry.Declare(key);
     }
     if (arguments.config == nullptr || arguments.host == nullptr) {
-      throw Error(ExitCode::kBadConfig, "source 'models' draws from the models of a config");
+      throw Error(ExitCode::kBadConfig, "source 'models' needs the models of a config");
     }
     dt_s_ = 1.0 / rate_hz;
-    // A few units in the last place, for durations that are multiples of the step but for rounding.
+    // Allows for rounding if the duration is a multiple of the step.
     count_ = 1 + static_cast<std::int64_t>(duration_s * rate_hz * (1.0 + 1e-15));
     BuildTruth(arguments);
     DrawStart(entry, arguments.seed);
@@ -63,7 +63,7 @@ class Models : public Source {
     frame.measurements.clear();
     for (Sensor& sensor : sensors_) Measure(sensor, frame);
     if (!frame.measurements.empty()) {
-      for (Motion& motion : motions_) motion.held = false;
+      for (Motion& motion : motions_) motion.is_noise_held = false;
     }
     for (Motion& motion : motions_) EmitInput(motion, frame);
     ++index_;
@@ -74,38 +74,38 @@ class Models : public Source {
   struct Motion {
     const MotionBinding* binding;
     Random noise;
-    int stream = -1;             ///< of its control input
-    const Motion* of = nullptr;  ///< that draws the stream, where it is not this one
+    int stream = -1;                       ///< of its control input
+    const Motion* input_source = nullptr;  ///< motion that draws the stream, if it is another one
     std::vector<double> input, mean, amplitude;
     double frequency_hz = 0.0;
-    std::vector<double> w;  ///< as it is drawn
-    bool held = false;      ///< w stays, as nothing has been measured since
+    std::vector<double> w;       ///< current noise
+    bool is_noise_held = false;  ///< w is reused, because nothing has been measured since
   };
   struct Sensor {
     const SensorBinding* binding;
-    SharedSensor model;  ///< of landmarks that are xyz
+    SharedSensor model;  ///< with landmarks as xyz
     int stream;
     models::Schedule schedule;
     Random noise;
-    int max_per_frame;  ///< of landmarks
+    int max_per_frame;  ///< landmarks per frame
   };
 
-  /// The problem of the config, with what `overrides` has of it.
+  /// Builds the problem of the config, merged with `overrides`.
   void BuildTruth(const SourceArguments& arguments) {
     const auto overrides = arguments.entry.Find("overrides");
     const Config truth =
         overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
-    system_ = ReadProblem(truth.root(), *arguments.host, {});
-    start_s_ = system_.initial_time_s.value_or(0.0);
+    problem_ = ReadProblem(truth.root(), *arguments.host, {});
+    start_s_ = problem_.initial_time_s.value_or(0.0);
     if (!overrides) return;
     for (const auto& [key, node] : overrides->Entries()) {
       if (!truth.root().HasUnread(key)) continue;
       node.Fail("the truth has no key '" + key + "'",
-                "`state`, `sensors`, and what their models read");
+                "`state`, `sensors`, or a key that their models read");
     }
   }
 
-  /// n of N(0, P) as a vector of the tangent; P may be singular.
+  /// Returns a sample of N(0, P) as a tangent vector. P may be singular.
   static Eigen::VectorXd DrawFrom(const Eigen::MatrixXd& p, Random& random) {
     const Eigen::LDLT<Eigen::MatrixXd> root(p);
     Eigen::VectorXd n(p.rows());
@@ -117,20 +117,20 @@ class Models : public Source {
 
   void DrawStart(const Node& entry, std::uint64_t seed) {
     const auto start = entry.Find("start");
-    const bool draws = !start || start->Choice({"prior", "mean"}) == 0;
-    const auto given = entry.Find("initial");
+    const bool draws_from_prior = !start || start->Choice({"prior", "mean"}) == 0;
+    const auto initial_values = entry.Find("initial");
     Random random(seed, 0);
-    x_.resize(system_.layout.blocks().size());
-    for (const Prior& prior : system_.priors) {
-      const Block& block = system_.layout[prior.block];
+    x_.resize(problem_.layout.blocks().size());
+    for (const Prior& prior : problem_.priors) {
+      const Block& block = problem_.layout[prior.block];
       std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
       const std::string name = block.name.substr(block.owner.size() + 1);
-      const auto owner = given ? given->Find(block.owner) : std::nullopt;
+      const auto owner = initial_values ? initial_values->Find(block.owner) : std::nullopt;
       if (owner && !owner->is_map()) owner->Fail("not a map", "{BLOCK: value}");
       if (const auto value = owner ? owner->Find(name) : std::nullopt) {
-        constexpr double kUnitLength = 1e-3;
+        constexpr double kLengthTolerance = 1e-3;
         x = value->Numbers(block.geometry().ambient);
-        if (DistanceFrom(block.geometry(), x.data()) > kUnitLength) {
+        if (DistanceFrom(block.geometry(), x.data()) > kLengthTolerance) {
           value->Fail("not of unit length", "a unit vector or quaternion [w, x, y, z] to 1e-3");
         }
         block.geometry().Normalise(x.data());
@@ -142,26 +142,26 @@ class Models : public Source {
             "source.initial: {" + block.owner + ": {" + name + ": value}}");
       }
       x = prior.mean;
-      if (!draws || prior.covariance.size() == 0) continue;
+      if (!draws_from_prior || prior.covariance.size() == 0) continue;
       const Eigen::VectorXd d = DrawFrom(prior.covariance, random);
       block.geometry().Plus(x.data(), d.data(), x.data());
     }
-    if (given) {
-      for (const Block& block : system_.layout.blocks()) {
-        if (const auto owner = given->Find(block.owner)) owner->RejectUnread();
+    if (initial_values) {
+      for (const Block& block : problem_.layout.blocks()) {
+        if (const auto owner = initial_values->Find(block.owner)) owner->RejectUnread();
       }
-      given->RejectUnread();
+      initial_values->RejectUnread();
     }
-    for (const Block& block : system_.layout.blocks()) {
+    for (const Block& block : problem_.layout.blocks()) {
       truths_.push_back({block.name, block.geometry().ambient});
     }
   }
 
   void AddMotions(const Node& entry, std::uint64_t seed) {
     const auto inputs = entry.Find("inputs");
-    motions_.reserve(system_.motions.size());  // they point to each other
-    for (std::size_t i = 0; i < system_.motions.size(); ++i) {
-      const MotionBinding& binding = system_.motions[i];
+    motions_.reserve(problem_.motions.size());  // motions point to each other
+    for (std::size_t i = 0; i < problem_.motions.size(); ++i) {
+      const MotionBinding& binding = problem_.motions[i];
       Motion motion{&binding, Random(seed, 100 + i), -1, nullptr, {}, {}, {}, 0.0, {}, false};
       motion.w.resize(static_cast<std::size_t>(binding.model->noise_size()));
       if (binding.model->has_input()) ReadInput(entry, inputs, motion);
@@ -177,14 +177,14 @@ class Models : public Source {
           "rate_hz above 1 / timeout_s");
     }
     const std::string& stream = motion.binding->input.stream;
-    for (const Motion& other : motions_) {
-      if (other.stream < 0 || other.binding->input.stream != stream) continue;
-      if (const auto twice = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
-        twice->Fail("stream '" + stream + "' is that of '" + other.binding->name + "' too",
-                    "the input of '" + other.binding->name + "' alone");
+    for (const Motion& earlier : motions_) {
+      if (earlier.stream < 0 || earlier.binding->input.stream != stream) continue;
+      if (const auto duplicate = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
+        duplicate->Fail("stream '" + stream + "' also belongs to '" + earlier.binding->name + "'",
+                        "only the input of '" + earlier.binding->name + "'");
       }
-      motion.stream = other.stream;
-      motion.of = &other;
+      motion.stream = earlier.stream;
+      motion.input_source = &earlier;
       return;
     }
     const Geometry& geometry = motion.binding->model->input().geometry;
@@ -199,7 +199,7 @@ class Models : public Source {
       if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
       if (const auto amplitude = entry->Find("amplitude")) {
         if (geometry.kind != GeometryKind::kVector) {
-          amplitude->Fail("the input is no vector", "`mean` alone");
+          amplitude->Fail("the input is not a vector", "only `mean`");
         }
         motion.amplitude = amplitude->Numbers(geometry.ambient);
         motion.frequency_hz = entry->At("frequency_hz", "an amplitude").Number(0.0, 1e6);
@@ -218,32 +218,34 @@ class Models : public Source {
   void AddSensors(const Node& entry, std::uint64_t seed, double rate_hz) {
     const auto settings = entry.Find("sensors");
     const auto landmarks = entry.Find("landmarks");
-    const auto most = landmarks ? landmarks->Find("max_per_frame") : std::nullopt;
-    const int max_per_frame = most ? static_cast<int>(most->Integer(1, LandmarkOptions::kUnlimited))
-                                   : LandmarkOptions::kUnlimited;
+    const auto max_entry = landmarks ? landmarks->Find("max_per_frame") : std::nullopt;
+    const int max_per_frame =
+        max_entry ? static_cast<int>(max_entry->Integer(1, LandmarkOptions::kUnlimited))
+                  : LandmarkOptions::kUnlimited;
     const std::ptrdiff_t inputs = std::ssize(streams_);
-    for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
-      const SensorBinding& binding = system_.sensors[i];
-      const auto own = settings ? settings->Find(binding.name) : std::nullopt;
+    for (std::size_t i = 0; i < problem_.sensors.size(); ++i) {
+      const SensorBinding& binding = problem_.sensors[i];
+      const auto sensor_settings = settings ? settings->Find(binding.name) : std::nullopt;
       const int known = binding.model->known_size();
       const models::Schedule schedule =
-          models::ReadSchedule(own, rate_hz, known, seed, 1001 + 2 * i);
-      const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
-      if (taken != streams_.end()) {
-        const bool input = taken - streams_.begin() < inputs;
+          models::ReadSchedule(sensor_settings, rate_hz, known, seed, 1001 + 2 * i);
+      const auto existing = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
+      if (existing != streams_.end()) {
+        const bool input = existing - streams_.begin() < inputs;
         if (input) {
           entry.Fail("stream '" + binding.stream + "' of sensor '" + binding.name +
-                         "' is that of a control input",
-                     "a stream of its own");
+                         "' belongs to a control input",
+                     "a separate stream");
         }
-        if (own) {
-          own->Fail("a sensor before it has the stream '" + binding.stream + "', and draws it",
-                    "the entry of that sensor");
+        if (sensor_settings) {
+          sensor_settings->Fail(
+              "an earlier sensor has the stream '" + binding.stream + "', and draws it",
+              "the entry of that sensor");
         }
         continue;
       }
-      if (known > 0 && !own) {
-        entry.Fail("sensor '" + binding.name + "' takes known numbers with each measurement",
+      if (known > 0 && !sensor_settings) {
+        entry.Fail("sensor '" + binding.name + "' needs known numbers with each measurement",
                    "sensors." + binding.name + ".known, a list of them for each measurement");
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
@@ -254,7 +256,7 @@ class Models : public Source {
     if (settings) settings->RejectUnread();
   }
 
-  /// The model with landmarks that are points, or poses.
+  /// Returns the model with landmarks as points or poses.
   static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
     if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
@@ -263,13 +265,13 @@ class Models : public Source {
     const auto representation = RepresentationOf(binding.model->roles());
     if (!representation || !IsXyz(*representation)) {
       entry.Fail("model '" + binding.model->name() + "' of sensor '" + binding.name +
-                     "' has no representation xyz, which the points are drawn in",
-                 "a source with landmarks of its own");
+                     "' has no representation xyz, in which the points are drawn",
+                 "a source with its own landmarks");
     }
     return binding.model;
   }
 
-  /// Whether its landmarks are a position and an orientation.
+  /// Returns true if the landmarks of the model consist of a position and an orientation.
   static bool HasPose(const SensorModel& model) {
     const std::size_t last = model.roles().size() - 1;
     return model.roles().size() >= 2 && model.roles()[last - 1].landmark() &&
@@ -281,10 +283,10 @@ class Models : public Source {
   void DrawPoints(const Node& entry, std::uint64_t seed) {
     const auto landmarks = entry.Find("landmarks");
     if (!landmarks) return;
-    if (!system_.landmarks) landmarks->Fail("no sensor measures landmarks", "the key left out");
-    constexpr int kMost = 1'000'000;
+    if (!problem_.landmarks) landmarks->Fail("no sensor measures landmarks", "no key `landmarks`");
+    constexpr int kMaxCount = 1'000'000;
     const auto count =
-        static_cast<std::size_t>(landmarks->At("count", "landmarks").Integer(1, kMost));
+        static_cast<std::size_t>(landmarks->At("count", "landmarks").Integer(1, kMaxCount));
     const Node box = landmarks->At("box", "landmarks");
     const std::vector<double> low = box.At("min").Numbers(3), high = box.At("max").Numbers(3);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -297,17 +299,17 @@ class Models : public Source {
     for (auto& point : points_) {
       for (std::size_t k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * random.Uniform();
     }
-    Random of_orientations(seed, 2);
+    Random orientation_random(seed, 2);
     orientations_.resize(count);
     for (auto& orientation : orientations_) {
-      for (double& value : orientation) value = of_orientations.Normal();
+      for (double& value : orientation) value = orientation_random.Normal();
       Geometry::UnitQuaternion().Normalise(orientation.data());
     }
-    for (const KnownLandmark& known : system_.landmarks->known) {
+    for (const KnownLandmark& known : problem_.landmarks->known) {
       if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) {
         landmarks->At("count").Fail(
             "no point has the id " + std::to_string(known.id) + " of `landmarks.known`",
-            "more than its greatest id");
+            "a count above the largest id");
       }
       auto& point = points_[static_cast<std::size_t>(known.id)];
       for (std::size_t k = 0; k < 3; ++k) {
@@ -318,7 +320,7 @@ class Models : public Source {
 
   double Time() const { return start_s_ + static_cast<double>(index_) * dt_s_; }
 
-  /// To the next time step.
+  /// Advances the truth to the next time step.
   void Step() {
     const double t_s = Time();
     std::vector<std::vector<double>> next = x_;
@@ -326,16 +328,17 @@ class Models : public Source {
       const SharedMotion& model = motion.binding->model;
       if (model->stationary()) continue;
       std::vector<const double*> blocks;
-      std::vector<double*> moved;
+      std::vector<double*> destinations;
       for (const BlockId id : motion.binding->blocks) {
         blocks.push_back(x_[static_cast<std::size_t>(id)].data());
-        moved.push_back(next[static_cast<std::size_t>(id)].data());
+        destinations.push_back(next[static_cast<std::size_t>(id)].data());
       }
       Status status = Status::kOk;
       const double* const input = motion.input.empty() ? nullptr : motion.input.data();
-      if (!motion.held || !model->discrete_noise()) status = DrawNoise(blocks, input, motion);
+      if (!motion.is_noise_held || !model->discrete_noise())
+        status = DrawNoise(blocks, input, motion);
       if (status == Status::kOk) {
-        status = model->Step(blocks.data(), input, motion.w.data(), dt_s_, {moved.data()});
+        status = model->Step(blocks.data(), input, motion.w.data(), dt_s_, {destinations.data()});
       }
       if (status != Status::kOk) {
         throw Error(ExitCode::kBadData, "source 'models': the truth leaves the domain of model '" +
@@ -343,12 +346,12 @@ class Models : public Source {
                                             "' before t = " + std::to_string(t_s) + " s");
       }
       for (const BlockId id : motion.binding->blocks) {
-        system_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
+        problem_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
       }
     }
-    // A constant block stays, whatever its model makes of it.
+    // A constant block keeps its value, whatever its model computes.
     for (std::size_t id = 0; id < x_.size(); ++id) {
-      if (system_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
+      if (problem_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
         x_[id] = next[id];
     }
   }
@@ -361,7 +364,7 @@ class Models : public Source {
     Eigen::VectorXd drawn(n);
     for (double& value : drawn) value = motion.noise.Normal();
     Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;
-    motion.held = true;
+    motion.is_noise_held = true;
     return status;
   }
 
@@ -369,19 +372,20 @@ class Models : public Source {
     if (!sensor.schedule.IsDue(index_)) return;
     for (const std::vector<double>& known : sensor.schedule.known) {
       if (!sensor.model->has_landmark()) {
-        MeasureOne(sensor, -1, known, frame);
+        EmitMeasurement(sensor, -1, known, frame);
         continue;
       }
-      int left = sensor.max_per_frame;
-      for (std::size_t id = 0; id < points_.size() && left > 0; ++id) {
-        left -= MeasureOne(sensor, static_cast<std::int64_t>(id), known, frame) ? 1 : 0;
+      int remaining = sensor.max_per_frame;
+      for (std::size_t id = 0; id < points_.size() && remaining > 0; ++id) {
+        remaining -= EmitMeasurement(sensor, static_cast<std::int64_t>(id), known, frame) ? 1 : 0;
       }
     }
   }
 
-  /// Whether there is something to measure; what is missing counts.
-  bool MeasureOne(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
-                  Frame& frame) {
+  /// Emits one measurement. Returns false if h is not defined or the value is not valid. A
+  /// measurement that is missing counts as emitted.
+  bool EmitMeasurement(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
+                       Frame& frame) {
     const Geometry& geometry = sensor.model->measurement().geometry;
     std::vector<const double*> roles;
     for (const RoleBinding& role : sensor.binding->roles) {
@@ -397,19 +401,19 @@ class Models : public Source {
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
-    // Before it is known whether h is defined: where the truth is does not shift the noise.
+    // Drawn before the domain of h is checked, so that the true state does not shift the noise.
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
-    const auto fate = sensor.schedule.Draw();
+    const auto outcome = sensor.schedule.Draw();
     if (sensor.model->Predict(roles.data(), z.data(), known.data()) != Status::kOk ||
         sensor.model->Valid({z.data(), known.data()}) != Status::kOk ||
         sensor.model->SqrtNoise(roles.data(), z.data(), l.data(), known.data()) != Status::kOk) {
       return false;
     }
-    const Eigen::VectorXd d = fate.sigma_scale * (l * n);
+    const Eigen::VectorXd d = outcome.sigma_scale * (l * n);
     geometry.Plus(z.data(), d.data(), z.data());
     if (sensor.model->Valid({z.data(), known.data()}) != Status::kOk) return false;
-    if (fate.missing) return true;
+    if (outcome.missing) return true;
     Measurement& measurement = frame.measurements.emplace_back();
     measurement.timestamp = frame.timestamp;
     measurement.stream = sensor.stream;
@@ -421,15 +425,16 @@ class Models : public Source {
 
   void EmitInput(Motion& motion, Frame& frame) {
     if (motion.stream < 0) return;
-    motion.input = motion.of != nullptr ? motion.of->input : InputAt(motion, Time());
-    if (motion.of != nullptr) return;
+    motion.input =
+        motion.input_source != nullptr ? motion.input_source->input : InputAt(motion, Time());
+    if (motion.input_source != nullptr) return;
     Measurement& measurement = frame.measurements.emplace_back();
     measurement.timestamp = frame.timestamp;
     measurement.stream = motion.stream;
     measurement.values = motion.input;
   }
 
-  Problem system_;
+  Problem problem_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<double>> x_;  ///< the true value of each block
   std::vector<Motion> motions_;

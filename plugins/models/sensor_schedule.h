@@ -11,50 +11,50 @@
 
 namespace alidade::models {
 
-/// When a sensor of the simulation measures, and what becomes of its measurements.
+/// Schedule of a simulated sensor: its time steps, missing measurements and outliers.
 struct Schedule {
-  struct Fate {
+  struct Outcome {
     bool missing;
-    double sigma_scale;  ///< of its noise; 1 unless it is an outlier
+    double sigma_scale;  ///< factor of the noise; 1 unless it is an outlier
   };
 
-  /// Whether it measures at time step `index`.
+  /// Returns true if the sensor measures at time step `index`.
   bool IsDue(std::int64_t index) const {
     const auto count = [&](std::int64_t k) {
       return static_cast<std::int64_t>(static_cast<double>(k) * per_step * (1.0 + 1e-12));
     };
     return index == 0 || count(index) > count(index - 1);
   }
-  Fate Draw() {
-    const bool lost = random.Uniform() < missing;
-    const bool outlier = random.Uniform() < outliers;
-    return {lost, outlier ? sigma_scale : 1.0};
+  Outcome Draw() {
+    const bool is_missing = random.Uniform() < missing;
+    const bool is_outlier = random.Uniform() < outliers;
+    return {is_missing, is_outlier ? sigma_scale : 1.0};
   }
 
-  double per_step = 1.0;  ///< measurements to a time step, at most 1
-  /// Of each measurement at one time step, the known numbers that come with it: none of most.
+  double per_step = 1.0;  ///< measurements per time step, at most 1
+  /// Known numbers of each measurement of one time step. Most sensors have an empty list.
   std::vector<std::vector<double>> known;
   double missing = 0.0, outliers = 0.0, sigma_scale = 1.0;
   Random random;
 };
 
-/// Reads the entry of a sensor: `rate_hz`, `missing`, `outliers: {share, sigma_scale}`, and of one
-/// that takes `known_size` known numbers `known`, a list of such lists; none: one measurement at
-/// each of the `rate_hz` steps a second. Errors: kBadConfig.
+/// Reads the entry of a sensor: `rate_hz`, `missing` and `outliers: {share, sigma_scale}`. A sensor
+/// with `known_size` known numbers also has `known`, a list of lists. Without an entry the sensor
+/// measures at each of the `rate_hz` steps per second. Errors: kBadConfig.
 inline Schedule ReadSchedule(const std::optional<Node>& entry, double rate_hz, int known_size,
                              std::uint64_t seed, std::uint64_t stream) {
   Schedule schedule{1.0, {}, 0.0, 0.0, 1.0, Random(seed, stream)};
   if (known_size == 0) schedule.known.emplace_back();
   if (!entry) return schedule;
   if (known_size > 0) {
-    const Node known = entry->At("known", "a sensor that takes known numbers");
+    const Node known = entry->At("known", "a sensor with known numbers");
     for (const Node& row : known.Items()) schedule.known.push_back(row.Numbers(known_size));
     if (schedule.known.empty())
       known.Fail("empty",
                  "a list of " + std::to_string(known_size) + " numbers for each measurement");
   }
-  if (const auto own = entry->Find("rate_hz")) {
-    schedule.per_step = own->Number(0.0, rate_hz, true) / rate_hz;
+  if (const auto sensor_rate = entry->Find("rate_hz")) {
+    schedule.per_step = sensor_rate->Number(0.0, rate_hz, true) / rate_hz;
   }
   if (const auto missing = entry->Find("missing")) schedule.missing = missing->Number(0.0, 1.0);
   if (const auto outliers = entry->Find("outliers")) {

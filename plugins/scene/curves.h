@@ -18,44 +18,44 @@ using Quaternion = std::array<double, 4>;  ///< w x y z
 ///   h_i-1 M_i-1 + 2 (h_i-1 + h_i) M_i + h_i M_i+1
 ///          = 6 ((y_i+1 - y_i) / h_i - (y_i - y_i-1) / h_i-1),   M_0 = M_n = 0
 ///
-/// One point stands still; two are a straight line. Beyond the ends the outer cubics go on.
-/// Source       [Press2007] sec. 3.3.
+/// A single point is constant; two points form a straight line. The outer cubics continue beyond
+/// the ends. Source       [Press2007] sec. 3.3.
 class CubicSpline {
  public:
-  /// As many times as points, one at least.
+  /// `times_s` and `points` have the same size, at least one.
   CubicSpline(std::vector<double> times_s, std::vector<Eigen::Vector3d> points);
 
   Eigen::Vector3d At(double t_s) const;
 
  private:
-  /// Elimination and substitution in the tridiagonal system of M.
-  void SolveBend();
+  /// Solves the tridiagonal system of M by elimination and substitution.
+  void SolveSecondDerivatives();
 
   std::vector<double> times_;
-  std::vector<Eigen::Vector3d> points_, bend_;  ///< y_i, M_i
+  std::vector<Eigen::Vector3d> points_, second_derivatives_;  ///< y_i, M_i
 };
 
-/// Cubic Bezier curve on the unit quaternions through q_i at times t_i: C1, whatever the times.
+/// Cubic Bezier curve on the unit quaternions through q_i at times t_i: C1 for any times.
 ///
 ///   q(t) = q_i Exp(b1(s) w1) Exp(b2(s) w2) Exp(b3(s) w3),   s = (t - t_i) / h
 ///          b1 = 1 - (1 - s)^3,  b2 = 3 s^2 - 2 s^3,  b3 = s^3
 ///          w1 = omega_i h / 3,  w3 = omega_i+1 h / 3,
 ///          w2 = Log(Exp(-w1) q_i^-1 q_i+1 Exp(-w3))
 ///
-/// so that the angular velocity at q_i is omega_i: the mean of those of the turns Log(q_i^-1 q_i+1)
-/// before and after, each weighted with the time of the other; at the ends that of the one turn.
-/// Two key frames, or several at one rate about one axis, are a slerp.
-/// Source       [Kim1995] sec. 4.
+/// so that the angular velocity at q_i is omega_i. omega_i is the mean of the rates of the
+/// rotations Log(q_i^-1 q_i+1) before and after q_i, each weighted with the duration of the other.
+/// At the ends it is the rate of the only rotation. Two key frames form a slerp, and so do several
+/// with the same rate about the same axis. Source       [Kim1995] sec. 4.
 class RotationCurve {
  public:
-  /// As many times as unit quaternions, one at least.
+  /// `times_s` and `values` have the same size, at least one; the values are unit quaternions.
   RotationCurve(std::vector<double> times_s, std::vector<Quaternion> values);
 
   Quaternion At(double t_s) const;
 
  private:
   static Quaternion Plus(const Quaternion& q, const Eigen::Vector3d& d);
-  /// Of the turn from i to i + 1, rad/s.
+  /// Returns the angular velocity from i to i + 1, rad/s.
   Eigen::Vector3d Rate(std::size_t i) const;
 
   std::vector<double> times_;

@@ -9,27 +9,29 @@
 namespace alidade::scene {
 
 Keyframes::Keyframes(Params& p, std::uint64_t seed) : noise_(seed, 5) {
-  every_ = static_cast<std::size_t>(p.Integer(
+  interval_ = static_cast<std::size_t>(p.Integer(
       "keyframes.every_frames",
-      "frames from one keyframe to the next, for stream relative_poses; 0: none", 0, 1'000'000, 0));
-  if (every_ == 0) return;
+      "frames between keyframes, for stream relative_poses; 0: no keyframes", 0, 1'000'000, 0));
+  if (interval_ == 0) return;
   sigma_r_ = p.NonNegative("keyframes.sigma_position_m", "m", "noise of a relative pose, 1 sigma");
-  sigma_q_ = p.NonNegative("keyframes.sigma_orientation_rad", "rad", "likewise");
-  to_previous_ =
-      p.Flag("keyframes.to_previous", "whether the way to the keyframe before is measured", true);
+  sigma_q_ = p.NonNegative("keyframes.sigma_orientation_rad", "rad",
+                           "noise of a relative orientation, 1 sigma");
+  measures_previous_ = p.Flag("keyframes.to_previous",
+                              "whether the pose of the previous keyframe is measured", true);
   radius_ = p.NonNegative("keyframes.closure_radius_m", "m",
-                          "how near a keyframe has to be for a loop to be closed; 0: never", 0.0);
-  apart_ = static_cast<std::size_t>(p.Integer(
-      "keyframes.closure_after", "keyframes that lie between, at least", 1, 1'000'000, 50));
+                          "largest distance of a keyframe that closes a loop; 0: no closures", 0.0);
+  min_keyframes_between_ = static_cast<std::size_t>(
+      p.Integer("keyframes.closure_after",
+                "minimum number of keyframes between the two of a closure", 1, 1'000'000, 50));
 }
 
-void Keyframes::Emit(std::size_t index, const CameraState& now, int stream, std::size_t first,
+void Keyframes::Emit(std::size_t index, const CameraState& state, int stream, std::size_t first,
                      Frame& frame) {
-  if (index % every_ != 0) return;
-  if (to_previous_ && !keyframes_.empty())
-    EmitRelative(now, keyframes_.size() - 1, stream, first, frame);
-  if (const std::size_t near = Nearest(now); near < keyframes_.size()) {
-    EmitRelative(now, near, stream, first, frame);
+  if (index % interval_ != 0) return;
+  if (measures_previous_ && !keyframes_.empty())
+    EmitRelative(state, keyframes_.size() - 1, stream, first, frame);
+  if (const std::size_t closure = Nearest(state); closure < keyframes_.size()) {
+    EmitRelative(state, closure, stream, first, frame);
   }
   Measurement self{frame.timestamp,
                    stream,
@@ -37,38 +39,38 @@ void Keyframes::Emit(std::size_t index, const CameraState& now, int stream, std:
                    {0, 0, 0, 1, 0, 0, 0},
                    std::vector<double>(36, 0.0)};
   frame.measurements.push_back(std::move(self));
-  keyframes_.push_back(now);
+  keyframes_.push_back(state);
 }
 
-std::size_t Keyframes::Nearest(const CameraState& now) const {
+std::size_t Keyframes::Nearest(const CameraState& state) const {
   std::size_t nearest = keyframes_.size();
-  double least = radius_ * radius_;
-  for (std::size_t j = 0; radius_ > 0.0 && j + apart_ < keyframes_.size(); ++j) {
-    double way[3];
-    Vec<3>::Minus(keyframes_[j].position.data(), now.position.data(), way);
-    const double squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
-    if (squared > least) continue;
-    least = squared;
+  double smallest = radius_ * radius_;
+  for (std::size_t j = 0; radius_ > 0.0 && j + min_keyframes_between_ < keyframes_.size(); ++j) {
+    double offset[3];
+    Vec<3>::Minus(keyframes_[j].position.data(), state.position.data(), offset);
+    const double squared = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+    if (squared > smallest) continue;
+    smallest = squared;
     nearest = j;
   }
   return nearest;
 }
 
-void Keyframes::EmitRelative(const CameraState& now, std::size_t j, int stream, std::size_t first,
+void Keyframes::EmitRelative(const CameraState& state, std::size_t j, int stream, std::size_t first,
                              Frame& frame) {
-  const CameraState& then = keyframes_[j];
-  double way[3], turn[4], n[3];
+  const CameraState& keyframe = keyframes_[j];
+  double offset[3], rotation[4], n[3];
   Measurement measurement{
       frame.timestamp, stream, static_cast<std::int64_t>(first + j), std::vector<double>(7), {}};
   double* const z = measurement.values.data();
-  Vec<3>::Minus(then.position.data(), now.position.data(), way);
-  UnitQuaternion::RotateBack(now.orientation.data(), way, z);
+  Vec<3>::Minus(keyframe.position.data(), state.position.data(), offset);
+  UnitQuaternion::RotateBack(state.orientation.data(), offset, z);
   for (int i = 0; i < 3; ++i) z[i] += sigma_r_ * noise_.Normal();
-  const double back[4] = {now.orientation[0], -now.orientation[1], -now.orientation[2],
-                          -now.orientation[3]};
-  UnitQuaternion::Multiply(back, then.orientation.data(), turn);
-  for (double& one : n) one = sigma_q_ * noise_.Normal();
-  UnitQuaternion::Plus(turn, n, z + 3);
+  const double inverse[4] = {state.orientation[0], -state.orientation[1], -state.orientation[2],
+                             -state.orientation[3]};
+  UnitQuaternion::Multiply(inverse, keyframe.orientation.data(), rotation);
+  for (double& value : n) value = sigma_q_ * noise_.Normal();
+  UnitQuaternion::Plus(rotation, n, z + 3);
   frame.measurements.push_back(std::move(measurement));
 }
 

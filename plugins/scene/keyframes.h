@@ -12,38 +12,39 @@
 
 namespace alidade::scene {
 
-/// Relative poses between frames of a trajectory. Every so many frames one is a keyframe k:
+/// Relative poses between frames of a trajectory. One of `every_frames` frames is a keyframe k:
 ///
-///   z = (R_k' (r_j - r_k) + n_r, (q_k^-1 q_j) (+) n_q)   of the keyframe before, j = k - 1, unless
-///                                                        to_previous is false; and of the nearest
-///                                                        one of those that are old enough and near
-///                                                        enough: a loop is closed
-///   z = (0, 1), without noise                            of k itself: that is where it is
+///   z = (R_k' (r_j - r_k) + n_r, (q_k^-1 q_j) (+) n_q)   for the previous keyframe, j = k - 1,
+///                                                        unless to_previous is false; and for the
+///                                                        nearest keyframe that is old enough and
+///                                                        near enough, which closes a loop
+///   z = (0, 1), without noise                            for k itself, which defines its pose
 ///
-/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is j, or k,
-/// plus `first`.
+/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is `first` + j,
+/// or `first` + k.
 class Keyframes {
  public:
   Keyframes(Params& p, std::uint64_t seed);
 
-  bool any() const { return every_ > 0; }
-  /// How many there are so far, and where they are.
+  bool is_enabled() const { return interval_ > 0; }
+  /// Number of keyframes so far.
   std::size_t size() const { return keyframes_.size(); }
   const std::array<double, 3>& position(std::size_t k) const { return keyframes_[k].position; }
 
-  /// The measurements of frame `index`, of that stream; the frames come in turn. The landmarks are
-  /// numbered from `first` on.
-  void Emit(std::size_t index, const CameraState& now, int stream, std::size_t first, Frame& frame);
+  /// Appends the measurements of frame `index` to stream `stream` of `frame`. To be called for each
+  /// frame in order. Ids of landmarks start at `first`.
+  void Emit(std::size_t index, const CameraState& state, int stream, std::size_t first,
+            Frame& frame);
 
  private:
-  /// Of the old ones within the radius; how many there are where there is none.
-  std::size_t Nearest(const CameraState& now) const;
+  /// Returns the nearest keyframe within the radius that is old enough, or size().
+  std::size_t Nearest(const CameraState& state) const;
 
-  void EmitRelative(const CameraState& now, std::size_t j, int stream, std::size_t first,
+  void EmitRelative(const CameraState& state, std::size_t j, int stream, std::size_t first,
                     Frame& frame);
 
-  std::size_t every_ = 0, apart_ = 0;
-  bool to_previous_ = true;
+  std::size_t interval_ = 0, min_keyframes_between_ = 0;
+  bool measures_previous_ = true;
   double sigma_r_ = 0.0, sigma_q_ = 0.0, radius_ = 0.0;
   Random noise_;
   std::vector<CameraState> keyframes_;

@@ -33,52 +33,52 @@ Quaternion ReadQuaternion(const Node& node) {
 }
 
 Quaternion ReadOrientation(const Node& node) {
-  const auto [kind, what] = OneOf(node, {"euler_deg", "matrix", "axis_angle_deg", "quaternion"});
+  const auto [kind, value] = OneOf(node, {"euler_deg", "matrix", "axis_angle_deg", "quaternion"});
   constexpr double kRadPerDeg = std::numbers::pi / 180.0;
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
-  if (kind == "quaternion") return ReadQuaternion(what);
+  if (kind == "quaternion") return ReadQuaternion(value);
   if (kind == "euler_deg") {
-    const Vector3d angle = kRadPerDeg * ReadVector(what);
+    const Vector3d angle = kRadPerDeg * ReadVector(value);
     return ToArray(Eigen::Quaterniond(AngleAxisd(angle.z(), Vector3d::UnitZ()) *
                                       AngleAxisd(angle.y(), Vector3d::UnitY()) *
                                       AngleAxisd(angle.x(), Vector3d::UnitX())));
   }
   if (kind == "axis_angle_deg") {
-    const std::vector<double> v = what.Numbers(4);
+    const std::vector<double> v = value.Numbers(4);
     const Vector3d axis(v[0], v[1], v[2]);
-    if (!(axis.norm() > 0.0)) what.Fail("no axis", "[x, y, z, angle], (x, y, z) not 0");
+    if (!(axis.norm() > 0.0)) value.Fail("no axis", "[x, y, z, angle], (x, y, z) not 0");
     return ToArray(Eigen::Quaterniond(AngleAxisd(kRadPerDeg * v[3], axis.normalized())));
   }
   Eigen::Matrix3d rotation;
-  const std::vector<Node> rows = what.Items();
-  if (rows.size() != 3) what.Fail("not three rows", "[[a, b, c], [d, e, f], [g, h, i]]");
+  const std::vector<Node> rows = value.Items();
+  if (rows.size() != 3) value.Fail("not three rows", "[[a, b, c], [d, e, f], [g, h, i]]");
   for (int i = 0; i < 3; ++i) {
     rotation.row(i) = ReadVector(rows[static_cast<std::size_t>(i)]).transpose();
   }
   const double skew = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   if (!(skew <= 1e-3) || !(rotation.determinant() > 0.0)) {
-    what.Fail("not a rotation", "R R' = I to 1e-3, determinant 1");
+    value.Fail("not a rotation", "R R' = I to 1e-3, determinant 1");
   }
   return ToArray(Eigen::Quaterniond(rotation).normalized());
 }
 
-bool LookAt(const Eigen::Vector3d& from, const Eigen::Vector3d& at, const Eigen::Vector3d& up,
-            Quaternion& orientation) {
-  constexpr double kLeast = 1e-9;
-  const Eigen::Vector3d ahead = at - from;
-  if (!(ahead.norm() > kLeast)) return false;
+bool LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target,
+            const Eigen::Vector3d& up_direction, Quaternion& orientation) {
+  constexpr double kMinLength = 1e-9;
+  const Eigen::Vector3d forward = target - position;
+  if (!(forward.norm() > kMinLength)) return false;
   Eigen::Matrix3d rotation;
-  rotation.col(2) = ahead.normalized();
-  const Eigen::Vector3d right = rotation.col(2).cross(up.normalized());
-  if (!(right.norm() > kLeast)) return false;
+  rotation.col(2) = forward.normalized();
+  const Eigen::Vector3d right = rotation.col(2).cross(up_direction.normalized());
+  if (!(right.norm() > kMinLength)) return false;
   rotation.col(0) = right.normalized();
   rotation.col(1) = rotation.col(2).cross(rotation.col(0));
   orientation = ToArray(Eigen::Quaterniond(rotation).normalized());
   return true;
 }
 
-Eigen::Vector3d UndoTurn(const Eigen::Vector3d& phi, const Eigen::Vector3d& y) {
+Eigen::Vector3d BodyFrameDisplacement(const Eigen::Vector3d& phi, const Eigen::Vector3d& y) {
   const double angle = phi.norm();
   constexpr double kSeries = 1e-4;
   const double a = angle < kSeries ? 0.5 : (1.0 - std::cos(angle)) / (angle * angle);

@@ -7,8 +7,8 @@
 namespace alidade::scene {
 namespace {
 
-/// Uniform on the unit sphere.
-Eigen::Vector3d Direction(Random& random) {
+/// Returns a random direction, uniform on the unit sphere.
+Eigen::Vector3d RandomDirection(Random& random) {
   Eigen::Vector3d point;
   do {
     for (int i = 0; i < 3; ++i) point[i] = random.Normal();
@@ -16,7 +16,7 @@ Eigen::Vector3d Direction(Random& random) {
   return point.normalized();
 }
 
-/// Points on spheres about `centre`, in turn on each of `radii`.
+/// Returns points on spheres about `centre`, in turn on each of `radii`.
 std::vector<Eigen::Vector3d> OnShells(const Node& node, std::size_t count, Random& random) {
   const Node radii_node = node.At("radii", "shells");
   const std::vector<double> radii = radii_node.Numbers();
@@ -28,7 +28,7 @@ std::vector<Eigen::Vector3d> OnShells(const Node& node, std::size_t count, Rando
   node.RejectUnread();
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < count; ++i) {
-    points.emplace_back(origin + radii[i % radii.size()] * Direction(random));
+    points.emplace_back(origin + radii[i % radii.size()] * RandomDirection(random));
   }
   return points;
 }
@@ -46,21 +46,21 @@ Box::Box(const Node& node)
   node.RejectUnread();
 }
 
-Eigen::Vector3d Box::Inside(Random& random) const {
+Eigen::Vector3d Box::PointInside(Random& random) const {
   Eigen::Vector3d point;
   for (int i = 0; i < 3; ++i) point[i] = min[i] + (max[i] - min[i]) * random.Uniform();
   return point;
 }
 
-Eigen::Vector3d Box::OnFaces(Random& random) const {
+Eigen::Vector3d Box::PointOnFaces(Random& random) const {
   const Eigen::Vector3d size = max - min;
-  const double area[3] = {size.y() * size.z(), size.z() * size.x(), size.x() * size.y()};
-  double at = (area[0] + area[1] + area[2]) * random.Uniform();
+  const double areas[3] = {size.y() * size.z(), size.z() * size.x(), size.x() * size.y()};
+  double offset = (areas[0] + areas[1] + areas[2]) * random.Uniform();
   int axis = 0;  // normal to the face
-  while (axis < 2 && at >= area[axis]) at -= area[axis++];
-  const bool far = random.Uniform() < 0.5;
-  Eigen::Vector3d point = Inside(random);
-  point[axis] = far ? max[axis] : min[axis];
+  while (axis < 2 && offset >= areas[axis]) offset -= areas[axis++];
+  const bool is_upper_face = random.Uniform() < 0.5;
+  Eigen::Vector3d point = PointInside(random);
+  point[axis] = is_upper_face ? max[axis] : min[axis];
   return point;
 }
 
@@ -69,36 +69,36 @@ std::pair<std::string, Node> OneOf(const Node& node, const std::vector<std::stri
   for (const std::string& name : names) listed += (listed.empty() ? "" : ", ") + name;
   std::optional<std::pair<std::string, Node>> found;
   for (const std::string& name : names) {
-    const auto one = node.Find(name);
-    if (one && found) {
-      one->Fail("'" + found->first + "' and '" + name + "' are both given", "one of " + listed);
+    const auto entry = node.Find(name);
+    if (entry && found) {
+      entry->Fail("'" + found->first + "' and '" + name + "' are both given", "one of " + listed);
     }
-    if (one) found.emplace(name, *one);
+    if (entry) found.emplace(name, *entry);
   }
   if (!found) {
-    node.RejectUnread();  // a key that is nearly one of them
-    node.Fail("says nothing of its kind", "one of " + listed);
+    node.RejectUnread();  // reports a misspelt key
+    node.Fail("the kind is missing", "one of " + listed);
   }
   return *found;
 }
 
 std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random) {
-  constexpr std::int64_t kMost = 1'000'000;
+  constexpr std::int64_t kMaxCount = 1'000'000;
   const std::optional<Node> count_node = node.Find("count");
-  const auto [kind, what] = OneOf(node, {"list", "box", "room", "shells"});
+  const auto [kind, value] = OneOf(node, {"list", "box", "room", "shells"});
   std::vector<Eigen::Vector3d> points;
   if (kind == "list") {
-    if (count_node) count_node->Fail("a list has its own count", "'list' alone");
-    for (const Node& item : what.Items()) points.push_back(ReadVector(item));
-    if (points.empty()) what.Fail("no points", "a list of [x, y, z], m");
+    if (count_node) count_node->Fail("a list has its own count", "only 'list'");
+    for (const Node& item : value.Items()) points.push_back(ReadVector(item));
+    if (points.empty()) value.Fail("no points", "a list of [x, y, z], m");
     return points;
   }
-  const Node needed = node.At("count", "points that are drawn");
-  const auto count = static_cast<std::size_t>(needed.Integer(1, kMost));
-  if (kind == "shells") return OnShells(what, count, random);
-  const Box box(what);
+  const Node count_entry = node.At("count", "points that are drawn");
+  const auto count = static_cast<std::size_t>(count_entry.Integer(1, kMaxCount));
+  if (kind == "shells") return OnShells(value, count, random);
+  const Box box(value);
   for (std::size_t i = 0; i < count; ++i) {
-    points.push_back(kind == "box" ? box.Inside(random) : box.OnFaces(random));
+    points.push_back(kind == "box" ? box.PointInside(random) : box.PointOnFaces(random));
   }
   return points;
 }

@@ -9,27 +9,28 @@
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
 
-/// The points of a scene, from the config's `source.points`. Their places in the list are ids.
+/// Points of a scene, from the config's `source.points`. The index of a point in the list is its
+/// id.
 namespace alidade::scene {
 
 Eigen::Vector3d ReadVector(const Node& node);
 
-/// `{min: [x, y, z], max: [x, y, z]}`
+/// Box `{min: [x, y, z], max: [x, y, z]}`.
 struct Box {
   Eigen::Vector3d min, max;
 
   explicit Box(const Node& node);
-  /// Uniform in the volume.
-  Eigen::Vector3d Inside(Random& random) const;
-  /// Uniform on the six faces.
-  Eigen::Vector3d OnFaces(Random& random) const;
+  /// Returns a random point, uniform in the volume.
+  Eigen::Vector3d PointInside(Random& random) const;
+  /// Returns a random point, uniform on the six faces.
+  Eigen::Vector3d PointOnFaces(Random& random) const;
 };
 
-/// Of the keys in `names` the one that `node` has. Fails where it has none, or two.
+/// Returns the key of `names` that `node` has, and its value. Fails unless it has exactly one.
 std::pair<std::string, Node> OneOf(const Node& node, const std::vector<std::string>& names);
 
-/// The map `points` of the config, see kSceneKeys; what is not given is drawn from `random`.
-/// Errors: kBadConfig.
+/// Reads the map `points` of the config, see kSceneKeys. Points that are not listed are drawn from
+/// `random`. Errors: kBadConfig.
 std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random);
 
 }  // namespace alidade::scene

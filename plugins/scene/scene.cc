@@ -28,15 +28,15 @@ class Scene : public Source {
     const Node& entry = arguments.entry;
     ReadNumbers(arguments.params);
     for (const char* key : {"points", "trajectory", "surfaces", "state_entry"}) entry.Declare(key);
-    Random of_points(arguments.seed, 0), of_trajectory(arguments.seed, 1);
-    points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
+    Random point_random(arguments.seed, 0), trajectory_random(arguments.seed, 1);
+    points_ = scene::ReadPoints(entry.At("points", "scene"), point_random);
     trajectory_ =
-        scene::ReadTrajectory(entry.At("trajectory", "scene"), count_, dt_s_, of_trajectory);
+        scene::ReadTrajectory(entry.At("trajectory", "scene"), count_, dt_s_, trajectory_random);
     if (const auto surfaces = entry.Find("surfaces")) surfaces_ = scene::ReadSurfaces(*surfaces);
-    seen_before_.assign(points_.size(), false);
-    seen_ever_.assign(points_.size(), false);
+    was_in_previous_frame_.assign(points_.size(), false);
+    was_seen_.assign(points_.size(), false);
     const auto state = entry.Find("state_entry");
-    NameAll(state ? state->Text() : "cam");
+    DefineStreams(state ? state->Text() : "cam");
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -44,10 +44,10 @@ class Scene : public Source {
   std::int64_t size() const override { return static_cast<std::int64_t>(count_); }
 
   std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
-    const auto at = static_cast<std::size_t>(id);
-    if (id < 0 || at >= points_.size() + keyframes_.size()) return std::nullopt;
-    if (at >= points_.size()) return keyframes_.position(at - points_.size());
-    return scene::ToArray(points_[at]);
+    const auto index = static_cast<std::size_t>(id);
+    if (id < 0 || index >= points_.size() + keyframes_.size()) return std::nullopt;
+    if (index >= points_.size()) return keyframes_.position(index - points_.size());
+    return scene::ToArray(points_[index]);
   }
 
   int views() const override { return surfaces_.empty() ? 0 : measures_ == kStereo ? 2 : 1; }
@@ -71,16 +71,17 @@ class Scene : public Source {
     };
     frame.truth = {list(state.position), list(state.orientation), list(state.velocity),
                    list(state.angular_velocity)};
-    for (const Observation& observation : Look(state)) EmitObservation(observation, frame);
+    for (const Observation& observation : Observe(state)) EmitObservation(observation, frame);
     if (odometry_stream_ >= 0 && index_ + 1 < count_) EmitOdometry(frame);
-    if (keyframes_.any()) keyframes_.Emit(index_, state, keyframe_stream_, points_.size(), frame);
+    if (keyframes_.is_enabled())
+      keyframes_.Emit(index_, state, keyframe_stream_, points_.size(), frame);
     ++index_;
     return true;
   }
 
  private:
   enum Measures { kPixel, kStereo, kDepth };
-  /// A point that is seen, with its noise of unit variance.
+  /// Point that is seen, with its noise of unit variance.
   struct Observation {
     std::size_t point;
     double pixel[2];  ///< exact
@@ -89,15 +90,17 @@ class Scene : public Source {
   };
 
   void ReadNumbers(Params& p) {
-    count_ = static_cast<std::size_t>(p.Integer("max_frames", "frames in all", 1, 1'000'000, 150));
-    dt_s_ = 1.0 / p.Number("rate_hz", "Hz", "frames a second", {1e-3, 1e6}, 30.0);
+    count_ =
+        static_cast<std::size_t>(p.Integer("max_frames", "number of frames", 1, 1'000'000, 150));
+    dt_s_ = 1.0 / p.Number("rate_hz", "Hz", "frames per second", {1e-3, 1e6}, 30.0);
     sigma_px_ = p.NonNegative("sigma_px", "px", "noise of a pixel coordinate, 1 sigma", 1.0);
-    most_ = static_cast<std::size_t>(
-        p.Integer("max_features_per_frame", "points seen at most", 1, 1 << 30, 1 << 30));
-    image_noise_grey_ = p.NonNegative(
-        "image_noise_grey", "1", "noise of a pixel's grey, of 255, in images of surfaces", 2.0);
+    max_features_ = static_cast<std::size_t>(p.Integer(
+        "max_features_per_frame", "maximum number of points in a frame", 1, 1 << 30, 1 << 30));
+    image_noise_grey_ =
+        p.NonNegative("image_noise_grey", "1",
+                      "noise of a pixel in images of surfaces, in grey levels of 255", 2.0);
     measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
-                                               "what stream tracks holds of a point", kPixel));
+                                               "values of a point in stream tracks", kPixel));
     if (measures_ == kStereo) {
       baseline_m_ = p.Positive("camera.baseline_m", "m", "stereo baseline");
       if (camera_.model != CameraModel::kPinhole) {
@@ -108,13 +111,15 @@ class Scene : public Source {
       sigma_depth_m_ = p.NonNegative("sigma_depth_m", "m", "noise of the depth, 1 sigma");
     }
     if (measures_ == kPixel) {
-      known_left_ = p.Integer("known_points.count",
-                              "points whose first observation determines depth", 0, 1 << 20, 0);
-      known_sigma_ = p.Number("known_points.sigma_depth_relative", "",
-                              "noise of that depth, share of it", {0.0, 1.0, true, false}, 0.005);
+      remaining_known_ = p.Integer(
+          "known_points.count",
+          "number of points whose depth is measured at their first observation", 0, 1 << 20, 0);
+      known_sigma_ =
+          p.Number("known_points.sigma_depth_relative", "", "noise of that depth, relative to it",
+                   {0.0, 1.0, true, false}, 0.005);
     }
-    if (p.Flag("simulate_odometry", "whether there is a stream odometry", false)) {
-      odometry_stream_ = 0;  // NameAll() gives it its place
+    if (p.Flag("simulate_odometry", "whether the source has a stream odometry", false)) {
+      odometry_stream_ = 0;  // DefineStreams() sets the index
       linear_sigma_ =
           p.NonNegative("odometry_noise.linear_velocity", "m/s", "1 sigma, per axis", 0.0);
       angular_sigma_ =
@@ -122,15 +127,15 @@ class Scene : public Source {
     }
   }
 
-  void NameAll(const std::string& state) {
+  void DefineStreams(const std::string& state) {
     constexpr int kSizes[] = {2, 4, 3};
     streams_ = {{"tracks", kSizes[measures_]}};
-    if (known_left_ > 0) streams_.push_back({"known", 3});
+    if (remaining_known_ > 0) streams_.push_back({"known", 3});
     if (odometry_stream_ >= 0) {
       odometry_stream_ = static_cast<int>(streams_.size());
       streams_.push_back({"odometry", 6});
     }
-    if (keyframes_.any()) {
+    if (keyframes_.is_enabled()) {
       keyframe_stream_ = static_cast<int>(streams_.size());
       streams_.push_back({"relative_poses", 7});
     }
@@ -140,15 +145,15 @@ class Scene : public Source {
                {state + ".angular_velocity", 3}};
   }
 
-  /// What is seen from there, by id.
-  std::vector<Observation> Look(const scene::CameraState& state) {
+  /// Returns the points that are seen from `state`, in the order of their ids.
+  std::vector<Observation> Observe(const scene::CameraState& state) {
     std::vector<Observation> observations;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       Observation observation{i, {}, 0.0, {}};
       for (double& noise : observation.noise) noise = pixel_noise_.Normal();
-      const auto at = scene::ToArray(points_[i]);
+      const auto point = scene::ToArray(points_[i]);
       double offset[3], h[3];
-      Vec<3>::Minus(at.data(), state.position.data(), offset);
+      Vec<3>::Minus(point.data(), state.position.data(), offset);
       UnitQuaternion::RotateBack(state.orientation.data(), offset, h);
       observation.depth = h[2];
       if (!(h[2] > 0.0) || !camera_.Project(h, observation.pixel)) continue;
@@ -157,16 +162,17 @@ class Scene : public Source {
       if (camera_.Contains(observation.pixel) && camera_.Contains(noisy))
         observations.push_back(observation);
     }
-    if (observations.size() > most_) {
-      const auto before = [&](const Observation& observation) {
-        return bool(seen_before_[observation.point]);
+    if (observations.size() > max_features_) {
+      const auto was_in_previous_frame = [&](const Observation& observation) {
+        return bool(was_in_previous_frame_[observation.point]);
       };
-      std::stable_partition(observations.begin(), observations.end(), before);
-      observations.resize(most_);
+      std::stable_partition(observations.begin(), observations.end(), was_in_previous_frame);
+      observations.resize(max_features_);
       std::ranges::sort(observations, {}, &Observation::point);
     }
-    seen_before_.assign(points_.size(), false);
-    for (const Observation& observation : observations) seen_before_[observation.point] = true;
+    was_in_previous_frame_.assign(points_.size(), false);
+    for (const Observation& observation : observations)
+      was_in_previous_frame_[observation.point] = true;
     return observations;
   }
 
@@ -184,8 +190,8 @@ class Scene : public Source {
       measurement.values.push_back(observation.pixel[1] + sigma_px_ * observation.noise[3]);
     } else if (measures_ == kDepth) {
       measurement.values.push_back(observation.depth + sigma_depth_m_ * observation.noise[2]);
-    } else if (!seen_ever_[observation.point] && known_left_ > 0) {
-      --known_left_;
+    } else if (!was_seen_[observation.point] && remaining_known_ > 0) {
+      --remaining_known_;
       const double sigma_m = known_sigma_ * observation.depth, variance_px = sigma_px_ * sigma_px_;
       measurement.stream = 1;
       measurement.values.push_back(observation.depth + sigma_m * observation.noise[2]);
@@ -193,19 +199,19 @@ class Scene : public Source {
         measurement.covariance = {variance_px, 0, 0, 0, variance_px, 0, 0, 0, sigma_m * sigma_m};
       }
     }
-    seen_ever_[observation.point] = true;
+    was_seen_[observation.point] = true;
     frame.measurements.push_back(std::move(measurement));
   }
 
-  /// v = V(phi)^-1 R_WC' (r' - r) / dt, phi = omega dt: as odometry_pose integrates it.
+  /// Emits v = V(phi)^-1 R_WC' (r' - r) / dt with phi = omega dt, as odometry_pose integrates it.
   void EmitOdometry(Frame& frame) {
-    const scene::CameraState& now = trajectory_[index_];
+    const scene::CameraState& current = trajectory_[index_];
     const scene::CameraState& next = trajectory_[index_ + 1];
-    Eigen::Vector3d phi, way, moved;
-    UnitQuaternion::Minus(next.orientation.data(), now.orientation.data(), phi.data());
-    Vec<3>::Minus(next.position.data(), now.position.data(), way.data());
-    UnitQuaternion::RotateBack(now.orientation.data(), way.data(), moved.data());
-    const Eigen::Vector3d linear = scene::UndoTurn(phi, moved) / dt_s_;
+    Eigen::Vector3d phi, displacement, moved;
+    UnitQuaternion::Minus(next.orientation.data(), current.orientation.data(), phi.data());
+    Vec<3>::Minus(next.position.data(), current.position.data(), displacement.data());
+    UnitQuaternion::RotateBack(current.orientation.data(), displacement.data(), moved.data());
+    const Eigen::Vector3d linear = scene::BodyFrameDisplacement(phi, moved) / dt_s_;
     Measurement measurement;
     measurement.timestamp = frame.timestamp;
     measurement.stream = odometry_stream_;
@@ -223,12 +229,12 @@ class Scene : public Source {
   std::vector<Eigen::Vector3d> points_;
   std::vector<Rectangle> surfaces_;
   std::vector<scene::CameraState> trajectory_;
-  std::vector<bool> seen_before_, seen_ever_;
-  std::size_t count_ = 0, index_ = 0, most_ = 0;
+  std::vector<bool> was_in_previous_frame_, was_seen_;
+  std::size_t count_ = 0, index_ = 0, max_features_ = 0;
   double dt_s_ = 0.0, sigma_px_ = 0.0, baseline_m_ = 0.0, sigma_depth_m_ = 0.0;
   double image_noise_grey_ = 0.0;
   Measures measures_ = kPixel;
-  int known_left_ = 0, odometry_stream_ = -1, keyframe_stream_ = -1;
+  int remaining_known_ = 0, odometry_stream_ = -1, keyframe_stream_ = -1;
   double known_sigma_ = 0.0, linear_sigma_ = 0.0, angular_sigma_ = 0.0;
   Random pixel_noise_, odometry_noise_, image_noise_;
   scene::Keyframes keyframes_;

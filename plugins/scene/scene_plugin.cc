@@ -2,5 +2,5 @@
 #include "alidade/experiment/source_plugin.h"
 #include "scene.h"
 
-ALIDADE_SOURCE_PLUGIN({"scene", "simulator: points in space, seen by a camera that moves",
+ALIDADE_SOURCE_PLUGIN({"scene", "simulator: points in space, seen by a moving camera",
                        alidade::kSceneKeys, &alidade::CreateScene})

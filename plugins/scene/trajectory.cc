@@ -13,64 +13,65 @@
 namespace alidade::scene {
 namespace {
 
-/// Pose at a time, of which velocities are those that lead there from the frame before:
+/// Function that returns the pose at a time. The velocities of a frame move the camera there from
+/// the frame before:
 ///
 ///   v = (r(t) - r(t - dt)) / dt,   omega = Log(q(t - dt)^-1 q(t)) / dt
 ///
-/// so that quaternion_pose gives the very poses.
+/// so that quaternion_pose reproduces exactly these poses.
 using PoseAt = std::function<std::pair<Eigen::Vector3d, Quaternion>(double t_s)>;
 
-/// The times `t_s` of the items of a list: of all or of none, which spreads them evenly over
-/// [0, last_s]. They start at 0, increase, and reach last_s.
+/// Returns the times of the items of a list. Either all items have `t_s` or none has; without `t_s`
+/// they are spread evenly over [0, last_s]. Times start at 0, increase, and reach last_s.
 std::vector<double> ReadTimes(const Node& list, const std::vector<Node>& items, double last_s) {
-  if (items.empty()) list.Fail("no items", "one at least");
+  if (items.empty()) list.Fail("no items", "at least one item");
   std::vector<double> times;
   for (const Node& item : items) {
     const auto time = item.Find("t_s");
     const bool first = times.empty();
     if (!first && time.has_value() != (items.front().Find("t_s").has_value())) {
-      item.Fail("'t_s' is given for some, and not for others", "for all, or for none");
+      item.Fail("only some items have 't_s'", "'t_s' in all items, or in none");
     }
     if (!time) {
-      const double share = first ? 0.0 : double(times.size()) / double(items.size() - 1);
-      times.push_back(share * std::max(last_s, 1e-9));
+      const double fraction = first ? 0.0 : double(times.size()) / double(items.size() - 1);
+      times.push_back(fraction * std::max(last_s, 1e-9));
       continue;
     }
     times.push_back(time->Number());
     if (first && times.back() != 0.0) time->Fail("not the start", "0 in the first item");
     if (!first && !(times.back() > times[times.size() - 2])) {
-      time->Fail("not after the item before", "times that increase");
+      time->Fail("not later than in the item before", "increasing times");
     }
   }
-  const auto last = items.back().Find("t_s");
-  if (last && items.size() > 1 && times.back() < last_s * (1.0 - 1e-9)) {
-    last->Fail("before the last frame",
-               "at least " + std::to_string(last_s) + " s, or fewer frames");
+  const auto last_time = items.back().Find("t_s");
+  if (last_time && items.size() > 1 && times.back() < last_s * (1.0 - 1e-9)) {
+    last_time->Fail("before the last frame",
+                    "at least " + std::to_string(last_s) + " s, or fewer frames");
   }
   return times;
 }
 
 std::vector<CameraState> Sample(const PoseAt& pose, std::size_t count, double dt_s) {
   std::vector<CameraState> states;
-  auto [before, q_before] = pose(-dt_s);
+  auto [previous, q_previous] = pose(-dt_s);
   for (std::size_t k = 0; k < count; ++k) {
     const auto [position, orientation] = pose(static_cast<double>(k) * dt_s);
     CameraState state;
     state.position = ToArray(position);
     state.orientation = orientation;
-    state.velocity = ToArray(Eigen::Vector3d((position - before) / dt_s));
-    UnitQuaternion::Minus(orientation.data(), q_before.data(), state.angular_velocity.data());
+    state.velocity = ToArray(Eigen::Vector3d((position - previous) / dt_s));
+    UnitQuaternion::Minus(orientation.data(), q_previous.data(), state.angular_velocity.data());
     for (double& rate : state.angular_velocity) rate /= dt_s;
     states.push_back(state);
-    before = position;
-    q_before = orientation;
+    previous = position;
+    q_previous = orientation;
   }
   return states;
 }
 
-/// `[{position, target, t_s}, ...]`: both interpolated by CubicSpline.
-std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up, std::size_t count,
-                                    double dt_s) {
+/// Reads `[{position, target, t_s}, ...]`, both interpolated by CubicSpline.
+std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up_direction,
+                                    std::size_t count, double dt_s) {
   const std::vector<Node> items = list.Items();
   const std::vector<double> times = ReadTimes(list, items, static_cast<double>(count - 1) * dt_s);
   std::vector<Eigen::Vector3d> positions, targets;
@@ -81,18 +82,18 @@ std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up,
   }
   const CubicSpline position(times, positions), target(times, targets);
   const PoseAt pose = [&](double t_s) {
-    const Eigen::Vector3d from = position.At(t_s);
+    const Eigen::Vector3d camera = position.At(t_s);
     Quaternion orientation;
-    if (!LookAt(from, target.At(t_s), up, orientation)) {
+    if (!LookAt(camera, target.At(t_s), up_direction, orientation)) {
       list.Fail("at " + std::to_string(t_s) + " s the camera has no orientation",
-                "targets off the trajectory, and not straight above or below it");
+                "targets that are neither on the trajectory nor straight above or below it");
     }
-    return std::pair(from, orientation);
+    return std::pair(camera, orientation);
   };
   return Sample(pose, count, dt_s);
 }
 
-/// `[{position, ORIENTATION, t_s}, ...]`: by CubicSpline and RotationCurve.
+/// Reads `[{position, ORIENTATION, t_s}, ...]`, interpolated by CubicSpline and RotationCurve.
 std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, double dt_s) {
   const std::vector<Node> items = list.Items();
   const std::vector<double> times = ReadTimes(list, items, static_cast<double>(count - 1) * dt_s);
@@ -109,7 +110,7 @@ std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, doub
                 dt_s);
 }
 
-/// One number for all axes, or one for each; not negative.
+/// Reads one number for all axes, or one for each axis; not negative.
 Vector ReadSigmas(const Node& node) {
   const std::vector<double> values = node.Numbers();
   if (values.size() != 1 && values.size() != 3) node.Fail("wrong length", "one number, or three");
@@ -119,15 +120,15 @@ Vector ReadSigmas(const Node& node) {
   return {values.front(), values[values.size() / 2], values.back()};
 }
 
-/// Drawn from quaternion_pose itself, with its own discretisation.
+/// Draws a trajectory with quaternion_pose, including its discretisation.
 std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, double dt_s,
                                         Random& random) {
   const QuaternionPose model(
       ReadSigmas(node.At("linear_acceleration", "a trajectory that is drawn")),
       ReadSigmas(node.At("angular_acceleration", "a trajectory that is drawn")));
   CameraState state;
-  const auto read = [&](const char* key, Vector& to) {
-    if (const auto value = node.Find(key)) to = ToArray(ReadVector(*value));
+  const auto read = [&](const char* key, Vector& destination) {
+    if (const auto entry = node.Find(key)) destination = ToArray(ReadVector(*entry));
   };
   read("position", state.position);
   read("velocity", state.velocity);
@@ -136,15 +137,15 @@ std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, dou
   node.RejectUnread();
   std::vector<CameraState> states{state};
   while (states.size() < count) {
-    const CameraState now = states.back();
+    const CameraState current = states.back();
     double w[6];
     for (std::size_t i = 0; i < 6; ++i) {
       w[i] = (i < 3 ? model.sigma_a[i] : model.sigma_alpha[i - 3]) * random.Normal();
     }
     CameraState next;
-    model.Step(now.position.data(), now.orientation.data(), now.velocity.data(),
-               now.angular_velocity.data(), w, dt_s, next.position.data(), next.orientation.data(),
-               next.velocity.data(), next.angular_velocity.data());
+    model.Step(current.position.data(), current.orientation.data(), current.velocity.data(),
+               current.angular_velocity.data(), w, dt_s, next.position.data(),
+               next.orientation.data(), next.velocity.data(), next.angular_velocity.data());
     Normalise<UnitQuaternion>(next.orientation.data());
     states.push_back(next);
   }
@@ -156,13 +157,15 @@ std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, dou
 std::vector<CameraState> ReadTrajectory(const Node& node, std::size_t count, double dt_s,
                                         Random& random) {
   const auto up_node = node.Find("up");
-  const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "random"});
-  if (up_node && kind != "look_at") up_node->Fail("without a use", "'up' next to 'look_at'");
-  const Eigen::Vector3d up = up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
-  if (!(up.norm() > 0.0)) up_node->Fail("no direction", "a vector that is not 0");
-  if (kind == "look_at") return ReadLookAt(what, up, count, dt_s);
-  if (kind == "keyframes") return ReadKeyframes(what, count, dt_s);
-  return DrawTrajectory(what, count, dt_s, random);
+  const auto [kind, value] = OneOf(node, {"look_at", "keyframes", "random"});
+  if (up_node && kind != "look_at")
+    up_node->Fail("has no effect without 'look_at'", "'up' only with 'look_at'");
+  const Eigen::Vector3d up_direction =
+      up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
+  if (!(up_direction.norm() > 0.0)) up_node->Fail("has no direction", "a vector that is not 0");
+  if (kind == "look_at") return ReadLookAt(value, up_direction, count, dt_s);
+  if (kind == "keyframes") return ReadKeyframes(value, count, dt_s);
+  return DrawTrajectory(value, count, dt_s, random);
 }
 
 }  // namespace alidade::scene

@@ -9,10 +9,10 @@
 #include "curves.h"
 #include "orientation.h"
 
-/// Where a camera is at each frame, from the config's `source.trajectory`.
+/// Trajectory of a camera, from the config's `source.trajectory`.
 namespace alidade::scene {
 
-/// A camera at one frame, as the blocks of quaternion_pose have it.
+/// State of a camera at one frame, with the blocks of quaternion_pose.
 struct CameraState {
   Vector position{};
   Quaternion orientation{1.0, 0.0, 0.0, 0.0};  ///< world_from_cam
@@ -20,8 +20,8 @@ struct CameraState {
   Vector angular_velocity{};                   ///< rad/s, cam
 };
 
-/// The map `trajectory` of the config, see kSceneKeys: `count` states, dt_s apart. Errors:
-/// kBadConfig.
+/// Reads the map `trajectory` of the config, see kSceneKeys. Returns `count` states that are dt_s
+/// apart. Errors: kBadConfig.
 std::vector<CameraState> ReadTrajectory(const Node& node, std::size_t count, double dt_s,
                                         Random& random);
 

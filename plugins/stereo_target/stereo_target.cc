@@ -5,16 +5,16 @@ namespace alidade {
 namespace {
 
 constexpr const char* kStereoTargetKeys =
-    "left          images of the left camera, or the only one: a folder, files as in "
+    "left          images of the left camera, or the only one: a folder, files such as "
     "'pairs/left*.jpg', or a video\n"
-    "right         those of the right camera; default: there is none, and no disparity\n"
+    "right         images of the right camera; default: no right camera, and no disparity\n"
     "stereo        an OpenCV calibration file of the pair with M1, D1, M2, D2, R and T, m; "
     "default: "
     "the images are rectified\n"
-    "boxes         a table of where the target is: frame,x,y,width,height, or frame and four "
+    "boxes         table of the target's boxes: frame,x,y,width,height, or frame and four "
     "corners x0,y0,...,x3,y3, px\n"
-    "timestamps    a table frame,t_s; default: rate_hz, or as a video says\n"
-    "truth         a table t_s,NAME,...: the true values";
+    "timestamps    table frame,t_s; default: rate_hz, or the rate of a video\n"
+    "truth         table t_s,NAME,... of true values";
 
 std::unique_ptr<Source> Create(const SourceArguments& arguments) {
   return CreateOnDemand("image_target", arguments);

@@ -17,7 +17,7 @@ std::optional<std::int64_t> FeatureRows::next_frame() const {
   return next_ ? std::optional(next_->frame) : std::nullopt;
 }
 
-std::map<std::int64_t, FeatureRows::Feature> FeatureRows::Take(std::int64_t frame) {
+std::map<std::int64_t, FeatureRows::Feature> FeatureRows::ReadFrame(std::int64_t frame) {
   std::map<std::int64_t, Feature> features;
   while (next_ && next_->frame == frame) {
     Feature& feature = features[next_->feature];
@@ -26,7 +26,7 @@ std::map<std::int64_t, FeatureRows::Feature> FeatureRows::Take(std::int64_t fram
       FailLine("a second value of frame " + std::to_string(frame) + ", feature " +
                    std::to_string(next_->feature) + ", dim " + std::to_string(next_->dim) +
                    "; the first is in line " + std::to_string(line),
-               "one");
+               "one value");
     }
     line = next_->line;
     feature.values[next_->dim] = next_->value;
@@ -52,8 +52,8 @@ std::optional<std::vector<double>> FeatureRows::Values(std::int64_t frame, std::
                              feature.values.begin() + static_cast<std::ptrdiff_t>(size));
 }
 
-void FeatureRows::FailLine(const std::string& what, std::string_view expected) const {
-  rows_.FailLine(what, expected);
+void FeatureRows::FailLine(const std::string& problem, std::string_view expected) const {
+  rows_.FailLine(problem, expected);
 }
 
 void FeatureRows::Advance() {
@@ -76,7 +76,7 @@ void FeatureRows::Advance() {
   }
   row.dim = static_cast<std::size_t>(dim);
   if (!first && row.frame < next_->frame) {
-    rows_.FailCell(0, "frame", "is before that of line " + std::to_string(next_->line),
+    rows_.FailCell(0, "frame", "is smaller than in line " + std::to_string(next_->line),
                    "frames in order");
   }
   next_ = row;

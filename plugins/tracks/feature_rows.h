@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Rows `frame,feature,dim,value`, frame by frame; a header line may stand first.
+/// Rows `frame,feature,dim,value`, ordered by frame. A header line is optional.
 ///
 /// Errors       kBadData with file, line and column; those of NumberRows.
 class FeatureRows {
@@ -22,24 +22,24 @@ class FeatureRows {
   static constexpr std::size_t kDims = 4;
   struct Feature {
     std::array<double, kDims> values{};
-    std::array<int, kDims> lines{};  ///< where they stand; 0: not there
+    std::array<int, kDims> lines{};  ///< lines of the values; 0 if missing
   };
 
   FeatureRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// The frame that comes next; none at the end.
+  /// Returns the next frame, or nullopt at the end.
   std::optional<std::int64_t> next_frame() const;
   Place place() const { return {rows_.name(), rows_.line(), 0}; }
 
-  /// The features of `frame`, by id, where it comes next.
-  std::map<std::int64_t, Feature> Take(std::int64_t frame);
+  /// Reads the features of `frame` by id. Returns none unless `frame` is the next frame.
+  std::map<std::int64_t, Feature> ReadFrame(std::int64_t frame);
 
-  /// The first `size` values of a feature of `frame`. None where one of dims 2 and 3 is not there;
-  /// fails without u or v.
+  /// Returns the first `size` values of a feature of `frame`, or nullopt if dim 2 or 3 is missing.
+  /// Fails without u or v.
   std::optional<std::vector<double>> Values(std::int64_t frame, std::int64_t id,
                                             const Feature& feature, std::size_t size) const;
 
-  [[noreturn]] void FailLine(const std::string& what, std::string_view expected) const;
+  [[noreturn]] void FailLine(const std::string& problem, std::string_view expected) const;
 
  private:
   static constexpr const char* kColumns = "frame,feature,dim,value";
@@ -50,7 +50,7 @@ class FeatureRows {
     int line = 0;
   };
 
-  /// Reads the next row into next_; none at the end.
+  /// Reads the next row into next_, which is empty at the end.
   void Advance();
 
   NumberRows rows_;

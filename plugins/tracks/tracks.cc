@@ -23,7 +23,7 @@ class Tracks : public Source {
     for (const char* key : {"path", "state_entry"}) arguments.entry.Declare(key);
     Open(arguments.entry.At("path", "tracks"), arguments.folder);
     const auto state = arguments.entry.Find("state_entry");
-    NameAll(state ? state->Text() : "cam");
+    DefineStreams(state ? state->Text() : "cam");
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -35,7 +35,7 @@ class Tracks : public Source {
   }
 
   bool Next(SourceFrame& frame) override {
-    if (frames_ == options_.most || !NextFrame(frame.timestamp)) return false;
+    if (frames_ == options_.max_frames || !NextFrame(frame.timestamp)) return false;
     while (frame_ < options_.start_frame) {
       EmitTracks(nullptr);
       const std::string last = std::to_string(frame_);
@@ -52,9 +52,9 @@ class Tracks : public Source {
     auto pose = truth_ ? truth_->At(frame.timestamp, options_.tolerance) : std::nullopt;
     if (truth_ && options_.world == TracksOptions::kFirstCamera) {
       if (frames_ == 0 && !pose) {
-        tracks_->FailLine("the world is to be the camera of frame " + std::to_string(frame_) +
-                              ", which has no true pose",
-                          "one within truth_tolerance_s of it, or world: file");
+        tracks_->FailLine(
+            "frame " + std::to_string(frame_) + " has no true pose, but its camera is the world",
+            "a true pose within truth_tolerance_s, or world: file");
       }
       if (frames_ == 0) {
         first_pose_ = *pose;
@@ -78,30 +78,30 @@ class Tracks : public Source {
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored)) file /= "tracks.csv";
     tracks_.emplace(file, path.place(), path.path());
-    const auto beside = [&](const char* name) -> std::optional<std::filesystem::path> {
-      const std::filesystem::path other = file.parent_path() / name;
-      const bool there = file != "-" && std::filesystem::exists(other, ignored);
-      return there ? std::optional(other) : std::nullopt;
+    const auto find_file = [&](const char* name) -> std::optional<std::filesystem::path> {
+      const std::filesystem::path path_next_to = file.parent_path() / name;
+      const bool exists = file != "-" && std::filesystem::exists(path_next_to, ignored);
+      return exists ? std::optional(path_next_to) : std::nullopt;
     };
-    if (const auto times = beside("timestamps.csv"); times && options_.rate_hz == 0.0) {
+    if (const auto times = find_file("timestamps.csv"); times && options_.rate_hz == 0.0) {
       times_.emplace(*times, path.place(), path.path());
     } else if (options_.rate_hz == 0.0) {
       path.Fail("no timestamps.csv next to the tracks", "that file, or 'rate_hz'");
     }
-    if (const auto other = beside("odometry.csv");
-        other && options_.odometry != TracksOptions::kNone) {
-      odometry_.emplace(*other, path.place(), path.path());
+    if (const auto path_next_to = find_file("odometry.csv");
+        path_next_to && options_.odometry != TracksOptions::kNone) {
+      odometry_.emplace(*path_next_to, path.place(), path.path());
     }
-    if (const auto other = beside("known.csv")) {
-      known_.emplace(*other, path.place(), path.path());
+    if (const auto path_next_to = find_file("known.csv")) {
+      known_.emplace(*path_next_to, path.place(), path.path());
     }
-    calibration_ = beside("calibration.yaml");
-    auto truth = beside("groundtruth.tum");
-    if (!truth) truth = beside("truth.tum");
+    calibration_ = find_file("calibration.yaml");
+    auto truth = find_file("groundtruth.tum");
+    if (!truth) truth = find_file("truth.tum");
     if (truth) truth_.emplace(*truth, path.place(), path.path());
   }
 
-  void NameAll(const std::string& state) {
+  void DefineStreams(const std::string& state) {
     constexpr int kSizes[] = {2, 4, 3};
     streams_ = {{"tracks", kSizes[options_.measures]}};
     if (odometry_) streams_.push_back({"odometry", 6});
@@ -109,7 +109,7 @@ class Tracks : public Source {
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
   }
 
-  /// Number and timestamp of the next frame; false at the end.
+  /// Reads the number and timestamp of the next frame. Returns false at the end.
   bool NextFrame(Timestamp& timestamp) {
     const std::optional<std::int64_t> next = tracks_->next_frame();
     if (!times_) {
@@ -123,27 +123,27 @@ class Tracks : public Source {
       timestamp = TimestampFromSeconds(t_s);
       return true;
     }
-    const bool more = times_->Next(frame_, timestamp);
-    if (next && (!more || *next < frame_)) {
+    const bool has_frame = times_->Next(frame_, timestamp);
+    if (next && (!has_frame || *next < frame_)) {
       tracks_->FailLine("frame " + std::to_string(*next) + " is not in " + times_->name(),
                         "a time for every frame");
     }
-    return more;
+    return has_frame;
   }
 
-  /// Puts those features of frame_ into `frame`, if any, that are not left out.
+  /// Appends the features of frame_ that are not excluded to `frame`, or skips them if it is null.
   void EmitTracks(Frame* frame) {
-    const auto features = tracks_->Take(frame_);
+    const auto features = tracks_->ReadFrame(frame_);
     for (const auto& [id, feature] : features) {
-      if (frame_ < options_.features_from) left_out_.insert(id);
-      if (frame != nullptr && !left_out_.contains(id)) Emit(*tracks_, 0, id, feature, *frame);
+      if (frame_ < options_.features_from) excluded_ids_.insert(id);
+      if (frame != nullptr && !excluded_ids_.contains(id)) Emit(*tracks_, 0, id, feature, *frame);
     }
   }
 
-  /// The observations of frame_ that tell depth; those of frames not given out are dropped.
+  /// Appends the observations of frame_ that determine depth. It drops those of skipped frames.
   void EmitKnown(Frame& frame) {
     for (auto next = known_->next_frame(); next && *next <= frame_; next = known_->next_frame()) {
-      const auto features = known_->Take(*next);
+      const auto features = known_->ReadFrame(*next);
       if (*next < frame_) continue;
       for (const auto& [id, feature] : features) {
         Emit(*known_, streams_.size() - 1, id, feature, frame);
@@ -182,7 +182,7 @@ class Tracks : public Source {
   std::vector<StreamInfo> streams_, truths_;
   TracksOptions options_;
   std::int64_t frames_ = 0, frame_ = -1;
-  std::set<std::int64_t> left_out_;  ///< features of the frames before features_from
+  std::set<std::int64_t> excluded_ids_;  ///< features of frames before features_from
   Pose first_pose_{};
   std::optional<std::filesystem::path> calibration_;
   std::optional<FeatureRows> tracks_, known_;

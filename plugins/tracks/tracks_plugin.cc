@@ -7,10 +7,10 @@ namespace {
 
 constexpr const char* kImageTracksKeys =
     "path           a folder of images, in the order of their names, a video, or a camera\n"
-    "images         which files of the folder: 'left_*.png'; default: all that end like an image\n"
-    "known          a table u,v,depth_m of points in the first image: they give the scale\n"
-    "guide          a filter of `estimators`: features are looked for where it expects them\n"
-    "state_entry    the state entry whose blocks the truth is named after; default cam";
+    "images         pattern of the image files: 'left_*.png'; default: all endings of image files\n"
+    "known          table u,v,depth_m of points in the first image, which determine the scale\n"
+    "guide          filter of `estimators`: features are searched for at its expected positions\n"
+    "state_entry    state entry in the names of the truth; default cam";
 
 std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments) {
   return CreateOnDemand("image_tracks", arguments);
@@ -19,7 +19,7 @@ std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments) {
 }  // namespace
 }  // namespace alidade
 
-ALIDADE_SOURCE_PLUGIN({"tracks", "features followed through images, from rows of a file or a pipe",
+ALIDADE_SOURCE_PLUGIN({"tracks", "features tracked through images, from rows of a file or a pipe",
                        alidade::kTracksKeys, &alidade::CreateTracks},
-                      {"image_tracks", "features found in images and followed through them",
+                      {"image_tracks", "features found in images and tracked through them",
                        alidade::kImageTracksKeys, &alidade::CreateImageTracks})

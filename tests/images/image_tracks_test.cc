@@ -318,8 +318,7 @@ TEST_F(ImageTracks, AreNotOfImagesSmallerThanTheirPatch) {
   EXPECT_EQ(Track(of_small).code, 0);
   const Outcome refused = Track({of_small[0], of_small[1], "--set", "source.window_px=101"});
   EXPECT_EQ(refused.code, 65) << refused.err;
-  EXPECT_TRUE(
-      Contains(refused.err, "s.png: 102x102 px, smaller than the patch that is followed, 101 px"))
+  EXPECT_TRUE(Contains(refused.err, "s.png: 102x102 px, smaller than the tracked patch, 101 px"))
       << refused.err;
   EXPECT_TRUE(Contains(refused.err, "103 px or more")) << refused.err;
 }
@@ -959,7 +958,7 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
   Write("known.csv", "u,v,depth_m\n3,30,2\n");
   const Outcome rim = Call({"run", "config.yaml", "-o", "run", "--force"});
   EXPECT_EQ(rim.code, 65);
-  EXPECT_TRUE(Contains(rim.err, "known.csv:2: the point is not on the image")) << rim.err;
+  EXPECT_TRUE(Contains(rim.err, "known.csv:2: the point is outside the image")) << rim.err;
 }
 
 // Example 29: the target on the desk of MonoSLAM is 0.21 m wide and 0.1485 m high.

@@ -34,19 +34,21 @@ class ImageTarget : public Source {
         start_(arguments.params, arguments.entry) {
     Params& p = arguments.params;
     const Node& entry = arguments.entry;
-    rate_hz_ = p.Number("rate_hz", "Hz", "images a second; 0: by `timestamps`, or as a video says",
+    rate_hz_ = p.Number("rate_hz", "Hz", "images per second; 0: from `timestamps` or the video",
                         {0.0, 1e6}, 0.0);
-    max_frames_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
+    max_frames_ = p.Integer("max_frames", "maximum number of images; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(p.Number(
-        "truth_tolerance_s", "s", "a true value is at most so far off in time", {0.0, 1e3}, 1e-3));
-    sigma_px_ = p.NonNegative("sigma_systematic_px", "px",
-                              "what no residual tells: of the disparity, and of an edge of the "
-                              "target, 1 sigma",
-                              0.1);
-    estimate_noise_ = p.Flag(
-        "estimate_noise", "each measurement brings its variance; false: that of the sensors", true);
+        "truth_tolerance_s", "s", "maximum time difference of a true value", {0.0, 1e3}, 1e-3));
+    sigma_systematic_px_ =
+        p.NonNegative("sigma_systematic_px", "px",
+                      "systematic error not visible in the residuals, of the disparity "
+                      "and of an edge of the target, 1 sigma",
+                      0.1);
+    estimate_noise_ =
+        p.Flag("estimate_noise",
+               "each measurement has its own variance; false: the variance of the sensor", true);
     const std::array<double, 4> box = p.Vector<4>(
-        "target", "px", "[x, y, width, height] of the target in image start_frame; or by `boxes`",
+        "target", "px", "[x, y, width, height] of the target in image start_frame; or `boxes`",
         kNonNegative, std::array<double, 4>{});
     for (const char* key : {"left", "right", "stereo", "boxes", "timestamps", "truth"}) {
       entry.Declare(key);
@@ -55,25 +57,25 @@ class ImageTarget : public Source {
     Open(entry);
     start_.Check(*left_);
     times_->Check(*left_, start_.number(), max_frames_);
-    const bool given = entry.Find("target").has_value();
-    if (given && !(box[2] >= 8.0 && box[3] >= 8.0)) {
+    const bool has_target = entry.Find("target").has_value();
+    if (has_target && !(box[2] >= 8.0 && box[3] >= 8.0)) {
       entry.At("target").Fail("less than 8 px wide or high", "[x, y, width, height], px");
     }
-    if (!given && !boxes_) {
+    if (!has_target && !boxes_) {
       entry.Fail("neither 'target' nor 'boxes'",
                  "target: [x, y, width, height], px, in the first image");
     }
-    if (given) first_ = BoxRows::Of(box[0], box[1], box[2], box[3]);
+    if (has_target) target_corners_ = BoxRows::FromBox(box[0], box[1], box[2], box[3]);
     std::optional<cv::Matx33d> intrinsics;
     if (options_.warp == Warp::kHomography && !entry.Find("stereo")) {
       const Camera camera(p);
       if (camera.model != CameraModel::kPinhole) {
-        p.Fail("camera.model", "not 'pinhole', but the images are taken as free of distortion");
+        p.Fail("camera.model", "not 'pinhole', but the images must have no distortion");
       }
       intrinsics = cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
     }
     if (const auto stereo = entry.Find("stereo")) {
-      if (!right_) stereo->Fail("there is no 'right'", "the images of both cameras");
+      if (!right_) stereo->Fail("needs 'right'", "the images of both cameras");
       stereo_file_ = folder_ / stereo->Text();
       ReadPair();
       has_read_ = true;
@@ -140,8 +142,9 @@ class ImageTarget : public Source {
       const auto path = Find(entry, key);
       if (!path) return;
       const std::string name = path->filename().string();
-      const bool pattern = name.find_first_of("*?[") != name.npos;
-      reader.emplace(pattern ? path->parent_path() : *path, pattern ? name : "", *entry.Find(key));
+      const bool is_pattern = name.find_first_of("*?[") != name.npos;
+      reader.emplace(is_pattern ? path->parent_path() : *path, is_pattern ? name : "",
+                     *entry.Find(key));
     };
     entry.At("left", "source stereo_target");
     open("left", left_);
@@ -149,7 +152,7 @@ class ImageTarget : public Source {
     if (right_ && !right_->is_video() && !left_->is_video() && right_->size() != left_->size()) {
       entry.At("right").Fail(std::to_string(right_->size()) + " images, but 'left' has " +
                                  std::to_string(left_->size()),
-                             "a right image for each left one");
+                             "a right image for each left image");
     }
     const auto table = [&](const char* key, auto& rows) {
       if (const auto path = Find(entry, key)) {
@@ -169,7 +172,7 @@ class ImageTarget : public Source {
     }
   }
 
-  /// The next one from `start_frame` on.
+  /// Reads the next pair of images, from `start_frame` on.
   bool ReadPair() {
     do {
       if (!ReadOnePair()) return false;
@@ -181,60 +184,62 @@ class ImageTarget : public Source {
     if (!left_->Next(image_[0])) {
       start_.Check(left_->number() + 1);
       times_->End(left_->number() + 1);
-      if (!started_) {
+      if (!has_started_) {
         throw Error(ExitCode::kBadData,
                     ErrorLine(place(), {}, "the target was in none of the images",
-                              "a row of 'boxes' where it can be seen"));
+                              "a row of 'boxes' for an image that shows it"));
       }
       return false;
     }
     if (!right_) return true;
     if (!right_->Next(image_[1])) {
-      throw Error(ExitCode::kBadData,
-                  ErrorLine(right_->place(), {}, "the last right image", "as many as left ones"));
+      throw Error(ExitCode::kBadData, ErrorLine(right_->place(), {}, "the last right image",
+                                                "as many right images as left images"));
     }
     if (image_[0].size() != image_[1].size()) {
-      throw Error(
-          ExitCode::kBadData,
-          ErrorLine(right_->place(), {}, "not as large as the left image", "images of one size"));
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(right_->place(), {}, "its size differs from that of the left image",
+                            "images of one size"));
     }
     return true;
   }
 
   void Measure(SourceFrame& frame) {
-    std::optional<BoxRows::Corners> corners = std::exchange(first_, std::nullopt);
+    std::optional<BoxRows::Corners> corners = std::exchange(target_corners_, std::nullopt);
     if (const auto row = boxes_ ? boxes_->At(left_->number()) : std::nullopt) {
-      if (!row->corners) return;  // it is said not to be seen
+      if (!row->corners) return;  // marked as not visible
       if (!corners) corners = row->corners;
     }
     if (corners && rectification_) {
       for (cv::Point2f& corner : *corners) corner = rectification_->Rectify(corner);
     }
-    if (corners && !started_ && !OnImage(*corners)) {
+    if (corners && !has_started_ && !IsInImage(*corners)) {
       throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not on this image",
-                                                "'target' or a row of 'boxes' inside of it"));
+                                                "'target' or a row of 'boxes' inside the image"));
     }
-    const auto seen = tracker_->Track(image_[0], corners);
-    if (!seen && !started_ && !boxes_) {
+    const auto tracked = tracker_->Track(image_[0], corners);
+    if (!tracked && !has_started_ && !boxes_) {
       throw Error(ExitCode::kBadData,
-                  ErrorLine(place(), {}, "the target has no texture", "one that differs in it"));
+                  ErrorLine(place(), {}, "the target has no texture", "a target with texture"));
     }
-    if (!seen) return;
-    started_ = true;
+    if (!tracked) return;
+    has_started_ = true;
     if (right_) {
-      if (const auto found =
-              FindDisparity(image_[0], image_[1], seen->box, seen->middle, disparity_options_)) {
-        Emit(0, found->value, found->variance + sigma_px_ * sigma_px_, frame);
+      if (const auto found = FindDisparity(image_[0], image_[1], tracked->box, tracked->middle,
+                                           disparity_options_)) {
+        Emit(0, found->value, found->variance + sigma_systematic_px_ * sigma_systematic_px_, frame);
       }
     }
-    const double width_px = std::sqrt(seen->box.area());
-    const double systematic = 2.0 * sigma_px_ * seen->inverse_scale / width_px;
-    Emit(right_ ? 1 : 0, seen->inverse_scale, seen->variance + systematic * systematic, frame);
+    const double width_px = std::sqrt(tracked->box.area());
+    const double systematic = 2.0 * sigma_systematic_px_ * tracked->inverse_scale / width_px;
+    Emit(right_ ? 1 : 0, tracked->inverse_scale, tracked->variance + systematic * systematic,
+         frame);
   }
 
-  bool OnImage(const BoxRows::Corners& corners) const {
-    const cv::Rect2f all({-0.5F, -0.5F}, cv::Size2f(image_[0].size()));
-    return std::ranges::all_of(corners, [&](cv::Point2f at) { return all.contains(at); });
+  bool IsInImage(const BoxRows::Corners& corners) const {
+    const cv::Rect2f image_area({-0.5F, -0.5F}, cv::Size2f(image_[0].size()));
+    return std::ranges::all_of(corners,
+                               [&](cv::Point2f corner) { return image_area.contains(corner); });
   }
 
   void Emit(int stream, double value, double variance, Frame& frame) const {
@@ -250,8 +255,8 @@ class ImageTarget : public Source {
   DisparityOptions disparity_options_;
   StartFrame start_;
   CameraSize camera_;
-  double rate_hz_ = 0.0, sigma_px_ = 0.0;
-  bool estimate_noise_ = true, has_read_ = false, started_ = false;
+  double rate_hz_ = 0.0, sigma_systematic_px_ = 0.0;
+  bool estimate_noise_ = true, has_read_ = false, has_started_ = false;
   std::int64_t max_frames_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::filesystem::path folder_, stereo_file_;
@@ -260,7 +265,7 @@ class ImageTarget : public Source {
   std::optional<BoxRows> boxes_;
   std::optional<ImageTimes> times_;
   std::optional<TruthRows> truth_;
-  std::optional<BoxRows::Corners> first_;  ///< the config's `target`
+  std::optional<BoxRows::Corners> target_corners_;  ///< the config's `target`
   std::optional<Rectification> rectification_;
   std::optional<TargetTracker> tracker_;
   cv::Mat image_[2];

@@ -7,22 +7,23 @@
 
 namespace alidade {
 
-/// One target in the images of a stereo pair, or of one camera.
+/// Creates a source that measures one target in the images of a stereo pair or of one camera.
 ///
 ///   stream          size  values       when
-///   disparity       1     d, px        its texture is found in both images: see FindDisparity()
-///   inverse_scale   1     s            the target is followed: see TargetTracker
+///   disparity       1     d, px        both images show its texture: see FindDisparity()
+///   inverse_scale   1     s            the target is tracked: see TargetTracker
 ///
-/// Each comes with its variance, unless `estimate_noise` is false:
+/// Each measurement has its own variance, unless `estimate_noise` is false:
 ///
 ///   of d            var(d) + sigma^2
 ///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target in it
 ///
-/// with sigma the config's sigma_systematic_px: what calibration, interpolation and the target
-/// itself are off by, which no residual tells. var() is that of the alignment. The errors of s
-/// since the template was taken have that of the template in common, which no filter here models.
+/// with sigma the config's sigma_systematic_px: errors of calibration, interpolation and the target
+/// itself that are not visible in the residuals. var() is the variance of the alignment. All errors
+/// of s since a template was recorded contain the error of that template, which no filter here
+/// models.
 ///
-/// A target that is lost, hidden or black gives no measurement, and is looked for in each image.
+/// A target that is lost, hidden or black has no measurement; each image is searched for it.
 ///
 /// Errors       those of ImageReader, TimestampRows, BoxRows, TruthRows, Rectification; kBadConfig.
 std::unique_ptr<Source> CreateImageTarget(const SourceArguments& arguments);

@@ -15,15 +15,15 @@
 
 namespace alidade {
 
-/// Turns the images of a calibrated pair into those of two pinholes side by side, whose rows agree
-/// (cv::stereoRectify).
+/// Rectification of a calibrated pair: converts its images to those of two pinhole cameras side by
+/// side, whose rows agree (cv::stereoRectify).
 ///
 ///   entry of the file   shape       unit  meaning
 ///   M1, M2              3x3         px    camera matrix, left and right
-///   D1, D2              4 to 14     -     k1 k2 p1 p2 [k3 [k4 k5 k6 ...]], as OpenCV counts them
+///   D1, D2              4 to 14     -     k1 k2 p1 p2 [k3 [k4 k5 k6 ...]], in OpenCV's order
 ///   R, T                3x3, 3x1    -, m  right_from_left
 ///
-/// Errors       kInputMissing; kBadData with the file: an entry that lacks, or is of another shape.
+/// Errors       kInputMissing; kBadData with the file: an entry is missing or has another shape.
 class Rectification {
  public:
   Rectification(const std::filesystem::path& file, const Node& key, cv::Size size) {
@@ -71,27 +71,27 @@ class Rectification {
       Fail(file, "not a calibration that OpenCV reads: " + error.err);
     }
     if (!(baseline_m_ > 0.0)) {
-      Fail(file, "its pair does not stand side by side, the right camera to the right");
+      Fail(file, "the right camera is not to the right of the left camera");
     }
     size_ = size;
   }
 
-  /// `view` 0: left, 1: right.
+  /// Rectifies an image; `view` 0 is left, 1 is right.
   cv::Mat Rectify(const cv::Mat& image, int view) const {
     cv::Mat rectified;
     cv::remap(image, rectified, map_[view][0], map_[view][1], cv::INTER_LINEAR);
     return rectified;
   }
-  /// A pixel of the left image, as it was taken, in the rectified one.
+  /// Returns the rectified pixel of a pixel of the original left image.
   cv::Point2f Rectify(cv::Point2f pixel) const {
-    std::vector<cv::Point2f> to;
-    cv::undistortPoints(std::vector<cv::Point2f>{pixel}, to, camera_.matrix, camera_.distortion,
-                        camera_.rotation, camera_.projection);
-    return to[0];
+    std::vector<cv::Point2f> rectified;
+    cv::undistortPoints(std::vector<cv::Point2f>{pixel}, rectified, camera_.matrix,
+                        camera_.distortion, camera_.rotation, camera_.projection);
+    return rectified[0];
   }
   /// Camera matrix of both rectified cameras.
   const cv::Matx33d& intrinsics() const { return intrinsics_; }
-  /// As of Source::Calibration.
+  /// Returns the calibration of the rectified pair, as Source::Calibration.
   Config Calibration(const std::string& origin) const {
     Config config = Config::FromText("calibration: {}", origin);
     const auto set = [&](const std::string& key, double value) {
@@ -111,17 +111,17 @@ class Rectification {
   }
 
  private:
-  [[noreturn]] static void Fail(const std::filesystem::path& file, const std::string& what) {
-    throw Error(ExitCode::kBadData, ErrorLine({file.string()}, {}, what,
+  [[noreturn]] static void Fail(const std::filesystem::path& file, const std::string& problem) {
+    throw Error(ExitCode::kBadData, ErrorLine({file.string()}, {}, problem,
                                               "M1, D1, M2, D2, R and T of cv::stereoCalibrate, T "
                                               "in m"));
   }
 
-  struct Left {
+  struct LeftCamera {
     cv::Mat matrix, distortion, rotation, projection;
   };
   cv::Mat map_[2][2];
-  Left camera_;
+  LeftCamera camera_;
   cv::Matx33d intrinsics_;
   double baseline_m_ = 0.0;
   cv::Size size_;

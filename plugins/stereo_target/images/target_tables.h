@@ -11,12 +11,12 @@
 
 #include "alidade/io/number_rows.h"
 
-/// The tables next to the images of a target, read along with them.
+/// Tables next to the images of a target, which are read together with them.
 namespace alidade {
 
-/// Where the target is: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the
-/// upper left, px; frames count from 0 and increase. A row of `nan` says that it is not seen. A
-/// header may stand first.
+/// Boxes of the target: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the
+/// upper left, px. Frames count from 0 and increase. A row of `nan` marks the target as not
+/// visible. A header is optional.
 class BoxRows {
  public:
   using Corners = std::array<cv::Point2f, 4>;
@@ -24,19 +24,19 @@ class BoxRows {
   BoxRows(const std::filesystem::path& path, const Place& place, const std::string& key)
       : rows_(path, place, key) {
     Advance();
-    if (!has_next_) rows_.FailLine("no rows", kForms);
+    if (!has_next_) rows_.FailLine("no rows", kFormats);
   }
 
-  /// What a table says of one frame.
+  /// Row of one frame.
   struct Row {
-    std::optional<Corners> corners;  ///< none: the target is not seen
+    std::optional<Corners> corners;  ///< empty if the target is not visible
   };
-  /// Of `frame`; none where it has no row. Frames are asked for in order.
+  /// Returns the row of `frame`, or nullopt without one. `frame` may not decrease between calls.
   std::optional<Row> At(std::int64_t frame) {
     while (has_next_ && next_frame_ < frame) Advance();
     return has_next_ && next_frame_ == frame ? std::optional(Row{next_}) : std::nullopt;
   }
-  static Corners Of(double x, double y, double width, double height) {
+  static Corners FromBox(double x, double y, double width, double height) {
     const auto left = static_cast<float>(x), top = static_cast<float>(y);
     const auto right = static_cast<float>(x + width - 1.0);
     const auto bottom = static_cast<float>(y + height - 1.0);
@@ -44,18 +44,18 @@ class BoxRows {
   }
 
  private:
-  static constexpr const char* kForms = "frame,x,y,width,height or frame and four corners";
+  static constexpr const char* kFormats = "frame,x,y,width,height or frame and four corners";
 
   void Advance() {
     const int line_before = rows_.line();
     const bool first = !has_next_;
     has_next_ = rows_.Next() && (line_before > 0 || rows_.text(0) != "frame" || rows_.Next());
     if (!has_next_) return;
-    if (rows_.size() != 5) rows_.ExpectColumns(9, kForms);
+    if (rows_.size() != 5) rows_.ExpectColumns(9, kFormats);
     const std::int64_t frame = rows_.Index(0, "frame");
     if (!first && frame <= next_frame_) {
-      rows_.FailCell(0, "frame", "is not after that of line " + std::to_string(line_before),
-                     "frames in order, each once");
+      rows_.FailCell(0, "frame", "is not larger than in line " + std::to_string(line_before),
+                     "increasing frames");
     }
     next_frame_ = frame;
     next_.reset();
@@ -64,7 +64,7 @@ class BoxRows {
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       const char* const name = kNames[rows_.size() == 5 ? i - 1 : i + 3];
       numbers.push_back(rows_.Number(i, name));
-      if (std::abs(numbers.back()) > 1e5) rows_.FailCell(i, name, "is on no image", "px");
+      if (std::abs(numbers.back()) > 1e5) rows_.FailCell(i, name, "is outside any image", "px");
     }
     if (numbers.size() == 4) {
       for (const std::size_t side : {2, 3}) {
@@ -72,7 +72,7 @@ class BoxRows {
           rows_.FailCell(side + 1, kNames[side], "is less than 4 px", "a box of the target");
         }
       }
-      next_ = Of(numbers[0], numbers[1], numbers[2], numbers[3]);
+      next_ = FromBox(numbers[0], numbers[1], numbers[2], numbers[3]);
       return;
     }
     Corners corners;
@@ -81,7 +81,7 @@ class BoxRows {
     }
     const std::vector<cv::Point2f> outline(corners.begin(), corners.end());
     if (!cv::isContourConvex(outline) || !(cv::contourArea(outline, true) >= 16.0)) {
-      rows_.FailLine("four corners that are not in order, or span no area",
+      rows_.FailLine("four corners that are not in order, or have no area",
                      "clockwise from the upper left: x0,y0,...,x3,y3");
     }
     next_ = corners;
@@ -96,8 +96,8 @@ class BoxRows {
   std::optional<Corners> next_;
 };
 
-/// True values under a header `t_s,NAME,...`, each a number; times increase. An empty cell is
-/// unknown.
+/// True values under a header `t_s,NAME,...`. Each is a number, and times increase. An empty cell
+/// is an unknown value.
 class TruthRows {
  public:
   TruthRows(const std::filesystem::path& path, const Place& place, const std::string& key)
@@ -110,35 +110,36 @@ class TruthRows {
   }
 
   const std::vector<std::string>& names() const { return names_; }
-  /// The values at the row nearest to `timestamp`, where it is within `tolerance`; of two as near
-  /// the earlier. An empty one is unknown. Timestamps are asked for in order.
+  /// Returns the values of the row nearest to `timestamp` if it is within `tolerance`. If two rows
+  /// are equally near, it uses the earlier one. An empty vector is an unknown value. `timestamp`
+  /// may not decrease between calls.
   std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
-    // As floating-point numbers, whose difference does not overflow.
-    const auto off = [timestamp](Timestamp other) {
-      return 1e-9 * std::abs(static_cast<double>(timestamp) - static_cast<double>(other));
+    // Floating-point numbers, because their difference does not overflow.
+    const auto distance = [timestamp](Timestamp candidate) {
+      return 1e-9 * std::abs(static_cast<double>(timestamp) - static_cast<double>(candidate));
     };
-    while (has_next_ && (!has_nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
+    while (has_next_ && (!has_nearest_ || distance(timestamp_) < distance(nearest_timestamp_))) {
       nearest_ = values_;
       nearest_timestamp_ = timestamp_;
       has_nearest_ = true;
       Advance();
     }
-    if (has_nearest_ && off(nearest_timestamp_) <= Seconds(tolerance)) return nearest_;
+    if (has_nearest_ && distance(nearest_timestamp_) <= Seconds(tolerance)) return nearest_;
     return std::vector<std::vector<double>>(names_.size());
   }
 
  private:
   void Advance() {
     const int line_before = rows_.line();
-    const Timestamp before = timestamp_;
+    const Timestamp previous = timestamp_;
     const bool first = !has_next_;
     has_next_ = rows_.Next();
     if (!has_next_) return;
     rows_.ExpectColumns(names_.size() + 1, "as in the header");
     timestamp_ = rows_.Time(0, "t_s");
-    if (!first && timestamp_ <= before) {
-      rows_.FailCell(0, "t_s", "is not after that of line " + std::to_string(line_before),
-                     "times that increase");
+    if (!first && timestamp_ <= previous) {
+      rows_.FailCell(0, "t_s", "is not later than in line " + std::to_string(line_before),
+                     "increasing times");
     }
     values_.clear();
     for (std::size_t i = 0; i < names_.size(); ++i) {

@@ -12,10 +12,10 @@
 
 namespace alidade {
 
-/// A quadrangle in an image or a patch, px, clockwise from the upper left.
+/// Quadrangle in an image or a patch, px, clockwise from the upper left.
 using Corners = std::array<cv::Point2f, 4>;
 
-/// From the unit square, its upper left corner first.
+/// Returns the warp from the unit square; its upper left corner is the first corner.
 inline cv::Matx33d FromUnit(const Corners& corners) {
   const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
   return cv::getPerspectiveTransform(unit.data(), corners.data());
@@ -25,11 +25,11 @@ inline Corners CornersOf(cv::Size size) {
   const auto bottom = static_cast<float>(size.height - 1);
   return {cv::Point2f(0.0F, 0.0F), {right, 0.0F}, {right, bottom}, {0.0F, bottom}};
 }
-inline Corners Moved(const cv::Matx33d& warp, const Corners& corners) {
-  Corners moved;
-  std::ranges::transform(corners, moved.begin(),
-                         [&](cv::Point2f at) { return cv::Point2f(Apply(warp, at)); });
-  return moved;
+inline Corners ApplyToCorners(const cv::Matx33d& warp, const Corners& corners) {
+  Corners transformed;
+  std::ranges::transform(corners, transformed.begin(),
+                         [&](cv::Point2f corner) { return cv::Point2f(Apply(warp, corner)); });
+  return transformed;
 }
 inline double AreaOf(const Corners& corners) {
   return cv::contourArea(std::vector<cv::Point2f>(corners.begin(), corners.end()));
@@ -38,10 +38,11 @@ inline cv::Point2f MiddleOf(const Corners& corners) {
   return 0.25F * (corners[0] + corners[1] + corners[2] + corners[3]);
 }
 
-/// What a target looked like in one image.
+/// Appearance of a target in one image.
 class TargetTemplate {
  public:
-  /// `grey`: the image, as float. `scale`: the inverse scale there; `variance`: of it, relative.
+  /// `grey` is the image as float, `scale` the inverse scale in it, `variance` the relative
+  /// variance of `scale`.
   TargetTemplate(const cv::Mat& grey, const Corners& outline, double scale, double variance)
       : scale_(scale), variance_(variance) {
     const double width =
@@ -49,28 +50,29 @@ class TargetTemplate {
     const double height =
         0.5 * (cv::norm(outline[3] - outline[0]) + cv::norm(outline[2] - outline[1]));
     size_ = {std::max(8, cvRound(width)), std::max(8, cvRound(height))};
-    taken_ = To(outline);
+    image_from_patch_ = WarpTo(outline);
     const int margin = MotionBlur::Margin(size_);
-    const cv::Matx33d from_wide(1, 0, -margin, 0, 1, -margin, 0, 0, 1);
-    cv::warpPerspective(grey, wide_, taken_ * from_wide, size_ + cv::Size(2 * margin, 2 * margin),
+    const cv::Matx33d from_padded(1, 0, -margin, 0, 1, -margin, 0, 0, 1);
+    cv::warpPerspective(grey, padded_patch_, image_from_patch_ * from_padded,
+                        size_ + cv::Size(2 * margin, 2 * margin),
                         cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
     patch_ = Blurred({});
   }
 
   const cv::Mat& patch() const { return patch_; }  ///< within the outline, grey as float
-  cv::Mat Blurred(const MotionBlur& blur) const { return blur.Apply(wide_, size_); }
-  /// Where it was taken: from the patch to that image.
-  const cv::Matx33d& taken() const { return taken_; }
-  double scale() const { return scale_; }        ///< inverse scale there
-  double variance() const { return variance_; }  ///< of scale, relative: of its square
+  cv::Mat Blurred(const MotionBlur& blur) const { return blur.Apply(padded_patch_, size_); }
+  /// Warp from the patch to the image from which it was taken.
+  const cv::Matx33d& image_from_patch() const { return image_from_patch_; }
+  double scale() const { return scale_; }        ///< inverse scale in that image
+  double variance() const { return variance_; }  ///< of scale, relative to its square
   Corners corners() const { return CornersOf(size_); }
-  /// From the patch to where its corners are in an image.
-  cv::Matx33d To(const Corners& outline) const {
+  /// Returns the warp from the patch to an outline in an image.
+  cv::Matx33d WarpTo(const Corners& outline) const {
     return cv::getPerspectiveTransform(corners().data(), outline.data());
   }
 
-  /// integral of |gradient|^2 / variance of the grey: less where it is blurred, and the same in any
-  /// light and at any size.
+  /// Returns integral of |gradient|^2 / variance of the grey. It is smaller for a blurred patch,
+  /// and independent of light and size.
   double Sharpness() const {
     cv::Mat right, down;
     cv::Sobel(patch_, right, CV_32F, 1, 0, 3, 0.125);
@@ -83,9 +85,9 @@ class TargetTemplate {
 
  private:
   cv::Size size_;
-  cv::Mat wide_;  ///< patch_ with a margin around it
+  cv::Mat padded_patch_;  ///< patch_ with a margin
   cv::Mat patch_;
-  cv::Matx33d taken_;
+  cv::Matx33d image_from_patch_;
   double scale_, variance_;
 };
 

@@ -19,309 +19,328 @@
 
 namespace alidade {
 
-/// How a target is followed.
+/// Options of the tracking of a target.
 struct TargetOptions {
   Warp warp;
   double min_similarity;      ///< of the target and its template, for a measurement
-  double max_relative_sigma;  ///< of the scale, relative, likewise
-  double refresh_similarity;  ///< below it the template is taken anew
-  double refresh_scale;       ///< likewise where the target is so many times larger or smaller
+  double max_relative_sigma;  ///< relative sigma of the scale, for a measurement
+  double refresh_similarity;  ///< a lower one requires a new template
+  double refresh_scale;       ///< a larger change of scale requires a new template
 
   explicit TargetOptions(Params& p)
       : warp(static_cast<Warp>(p.Choice(
             "warp", {"similarity", "affine", "homography"},
-            "how the target may change in the image: it moves, turns and grows; or is also "
-            "stretched and sheared; or is plane and tilts, which needs `camera` or "
+            "possible changes of the target in the image: it moves, turns and grows; or also "
+            "stretches and shears; or is a plane that tilts, which needs `camera` or "
             "`stereo`",
             0))),
         min_similarity(p.Number("min_similarity", "1",
-                                "the target is lost where it correlates less with its template",
+                                "the target is lost if it correlates less with its template",
                                 {-1.0, 1.0}, 0.7)),
         max_relative_sigma(p.Positive("max_relative_sigma", "1",
-                                      "standard deviation of the scale / scale, at most", 0.2)),
+                                      "maximum of standard deviation of the scale / scale", 0.2)),
         refresh_similarity(p.Number("refresh_similarity", "1",
-                                    "the template is taken anew where it correlates less; each "
-                                    "time adds its error to all that follows",
+                                    "a new template is recorded if it correlates less; each new "
+                                    "template adds its error to all later measurements",
                                     {-1.0, 1.0}, 0.8)),
         refresh_scale(p.Number("refresh_scale", "1",
-                               "likewise where the target has become so many times larger or "
-                               "smaller",
+                               "a new template is recorded if the target is larger or smaller by "
+                               "more than this factor",
                                {1.0, 1e3, true, false}, 1.7)) {}
 };
 
-/// Follows one target through the images of a camera, and measures its size.
+/// Tracker of one target in the images of a camera, which measures its size.
 ///
-/// A grid of its points is followed from the last image [Lucas1981], [Kalal2010], a similarity is
-/// put through them, and from there the target is aligned with a template, see Align(): errors do
-/// not add up from image to image. The first template is used as long as it fits well, then of it
-/// and others that were taken on the way the one that tells most of the size; each brings the error
-/// of its own.
+/// A grid of its points is tracked from the last image [Lucas1981], [Kalal2010], and a similarity
+/// is fitted to them. From there the target is aligned with a template, see Align(), so that errors
+/// do not accumulate from image to image. The first template is used as long as it fits well.
+/// Otherwise the tracker chooses, among it and templates recorded later, the template with the most
+/// precise size. Each template adds its own error.
 ///
-/// Where none fits, the target is looked for about there, see FindNear(), and aligned with the
-/// templates as the motion blurs them [Jin2005]. A blurred image tells the size less well, which
-/// its variance says; it gives no template, and no size to follow on from. What is not found either
-/// is followed on for some images; then it is lost, and looked for in the whole image.
+/// If no template fits, the target is searched for nearby, see FindNearby(), and aligned with the
+/// templates as the motion blurs them [Jin2005]. A blurred image determines the size less well,
+/// which is included in its variance; it provides neither a template nor a size for the next image.
+/// A target that is not found either is followed for some images. It is then lost, and the whole
+/// image is searched.
 class TargetTracker {
  public:
   using Corners = alidade::Corners;
 
-  /// Where the target is, and its size.
-  struct Seen {
-    cv::Point2d middle;    ///< px, of what was the middle in the first image
-    cv::Rect2d box;        ///< px, upright, about all of it
-    double inverse_scale;  ///< size in the first image / size now; of a plane: depth now / then
+  /// Position and size of the target.
+  struct TrackedTarget {
+    cv::Point2d middle;    ///< px, of the point that was the middle in the first image
+    cv::Rect2d box;        ///< px, upright, around the whole target
+    double inverse_scale;  ///< size in the first image / size; for a plane depth / first depth
     double variance;       ///< of inverse_scale
   };
 
-  /// `intrinsics`: the camera matrix, for a homography.
+  /// `intrinsics` is the camera matrix, which a homography needs.
   TargetTracker(const TargetOptions& options, const std::optional<cv::Matx33d>& intrinsics)
       : options_(options), intrinsics_(intrinsics) {}
 
-  /// The target in the next image; none where it is not measured. `corners`: where it is said to
-  /// be; without them there is none until a first image had them, and texture in them.
-  std::optional<Seen> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
-    std::optional<Seen> seen;
+  /// Measures the target in the next image. Returns nullopt if it cannot be measured. `corners` is
+  /// its known outline. The first image with `corners`, and texture inside, starts the tracking.
+  std::optional<TrackedTarget> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
+    std::optional<TrackedTarget> tracked;
     image.convertTo(grey_, CV_32F);
     if (corners) {
       const Corners inner = Inset(*corners);
       const bool first = templates_.empty();
-      if (first) TakeTemplate({grey_, inner, 1.0, 0.0}, inner);
-      seen = Keep(Measure(inner, options_.min_similarity, kGuessedArea));
-      lost_ = false;
-      if (!seen) outline_ = inner;
-      if (first && !seen) templates_.clear();  // without texture it is like nothing
+      if (first) AddTemplate({grey_, inner, 1.0, 0.0}, inner);
+      tracked = Accept(Measure(inner, options_.min_similarity, kBoxGrowth));
+      is_lost_ = false;
+      if (!tracked) outline_ = inner;
+      if (first && !tracked) templates_.clear();  // a template without texture fits nothing
     } else if (!templates_.empty()) {
-      if (!lost_) seen = FollowAndMeasure(image);
-      if (lost_) seen = SearchAndMeasure();
+      if (!is_lost_) tracked = FollowAndMeasure(image);
+      if (is_lost_) tracked = SearchAndMeasure();
     }
-    unseen_ = seen ? 0 : unseen_ + 1;
-    image.copyTo(before_);
-    return seen;
+    unmeasured_ = tracked ? 0 : unmeasured_ + 1;
+    image.copyTo(last_image_);
+    return tracked;
   }
 
-  /// Where it is in the last image, also where it was followed but not measured; none: it is lost.
+  /// Returns the outline in the last image, also if the target was followed but not measured, or
+  /// nullopt if it is lost.
   std::optional<Corners> outline() const {
-    if (lost_ || templates_.empty()) return std::nullopt;
+    if (is_lost_ || templates_.empty()) return std::nullopt;
     return outline_;
   }
 
  private:
-  static constexpr std::size_t kTemplates = 6;  ///< at most
-  static constexpr int kPatience = 10;  ///< images for which it is followed without being measured
-  static constexpr double kGuessedArea = 2.0;  ///< times that of a box, or less: as boxes are known
+  static constexpr std::size_t kTemplates = 6;  ///< maximum number
+  static constexpr int kMaxUnmeasured = 10;     ///< images without a measurement
+  static constexpr double kBoxGrowth = 2.0;     ///< maximum change of the area of a given box
 
-  /// The target where a template was aligned.
+  /// Target that was aligned with a template.
   struct Fit {
-    Seen seen;
+    TrackedTarget tracked;
     Corners outline;
-    std::size_t index;    ///< of the template
-    double most_similar;  ///< of those of all templates
-    bool blurred;
+    std::size_t index;      ///< of the template
+    double max_similarity;  ///< of all templates
+    bool is_blurred;
 
     double relative_variance() const {
-      return seen.variance / (seen.inverse_scale * seen.inverse_scale);
+      return tracked.variance / (tracked.inverse_scale * tracked.inverse_scale);
     }
   };
 
-  /// Leaves out the rim, which mixes with what is behind the target, and would pull the size.
+  /// Removes the rim, which mixes with the background of the target, and would bias the size.
   static Corners Inset(const Corners& corners) {
-    constexpr float kShare = 0.04F;
-    constexpr float kRest = 1.0F - kShare;
-    return Moved(FromUnit(corners),
-                 {cv::Point2f(kShare, kShare), {kRest, kShare}, {kRest, kRest}, {kShare, kRest}});
+    constexpr float kRim = 0.04F;
+    constexpr float kFarRim = 1.0F - kRim;
+    return ApplyToCorners(
+        FromUnit(corners),
+        {cv::Point2f(kRim, kRim), {kFarRim, kRim}, {kFarRim, kFarRim}, {kRim, kFarRim}});
   }
 
-  void TakeTemplate(TargetTemplate taken, const Corners& outline) {
+  void AddTemplate(TargetTemplate new_template, const Corners& outline) {
     if (templates_.size() == kTemplates) templates_.erase(templates_.begin() + 1);
-    templates_.push_back(std::move(taken));
+    templates_.push_back(std::move(new_template));
     last_ = templates_.size() - 1;
     misfits_ = 0;
     outline_ = outline;
   }
 
-  /// From where the target is followed to; where it cannot be followed, from where it was. It is
-  /// lost if it is not there, nor near.
-  std::optional<Seen> FollowAndMeasure(const cv::Mat& image) {
-    constexpr double kArea = 1.2, kNearArea = 1.5;
+  /// Measures the target from its followed position or, if it cannot be followed, from the last
+  /// one. The target is lost if it is neither there nor nearby.
+  std::optional<TrackedTarget> FollowAndMeasure(const cv::Mat& image) {
+    constexpr double kGrowth = 1.2, kNearbyGrowth = 1.5;
     const std::optional<Corners> followed = Follow(image);
     const Corners start = followed.value_or(outline_);
-    auto fit = Measure(start, options_.min_similarity, kArea);
+    auto fit = Measure(start, options_.min_similarity, kGrowth);
     if (!fit) {
-      std::vector<const TargetTemplate*> likely{&templates_[0]};
-      if (last_ > 0) likely.push_back(&templates_[last_]);
-      if (const auto near = FindNear(likely, grey_, start, outline_)) {
-        fit = Measure(near->outline, options_.min_similarity, kNearArea, near->blur);
+      std::vector<const TargetTemplate*> candidates{&templates_[0]};
+      if (last_ > 0) candidates.push_back(&templates_[last_]);
+      if (const auto match = FindNearby(candidates, grey_, start, outline_)) {
+        fit = Measure(match->outline, options_.min_similarity, kNearbyGrowth, match->blur);
       }
     }
-    lost_ = !fit && (!followed || unseen_ >= kPatience);
+    is_lost_ = !fit && (!followed || unmeasured_ >= kMaxUnmeasured);
     if (followed && !fit) outline_ = *followed;
-    return Keep(fit);
+    return Accept(fit);
   }
 
-  /// Anywhere in the image. It has to be more like the target than what is where it should be.
-  std::optional<Seen> SearchAndMeasure() {
+  /// Searches the whole image. A match must correlate more than at the expected position.
+  std::optional<TrackedTarget> SearchAndMeasure() {
     const auto guess = FindAnywhere(templates_, grey_, outline_, options_.min_similarity);
     if (!guess) return std::nullopt;
-    const auto fit = Measure(*guess, 0.5 * (1.0 + options_.min_similarity), kGuessedArea);
-    lost_ = !fit;
-    return Keep(fit);
+    const auto fit = Measure(*guess, 0.5 * (1.0 + options_.min_similarity), kBoxGrowth);
+    is_lost_ = !fit;
+    return Accept(fit);
   }
 
-  /// From there, with the template that tells most of the size; with the first one alone if it fits
-  /// well. Its area is at most `growth` times that of the guess, or as many times less.
-  std::optional<Fit> Measure(const Corners& guess, double least, double growth,
+  /// Measures the target from `guess`, with the template that has the most precise size, or with
+  /// the first template if it fits well. The area changes at most by the factor `growth`.
+  std::optional<Fit> Measure(const Corners& guess, double min_similarity, double growth,
                              const MotionBlur& blur = {}) const {
     std::optional<Fit> best;
-    double most_similar = -1.0;
+    double max_similarity = -1.0;
     for (std::size_t i = 0; i < templates_.size(); ++i) {
-      const TargetTemplate& one = templates_[i];
-      const auto found = AlignBlurred(one, one.To(guess), blur);
-      if (!found || found->similarity < least) continue;
-      const Corners outline = Moved(found->warp, one.corners());
+      const TargetTemplate& target_template = templates_[i];
+      const auto found = AlignBlurred(target_template, target_template.WarpTo(guess), blur);
+      if (!found || found->similarity < min_similarity) continue;
+      const Corners outline = ApplyToCorners(found->warp, target_template.corners());
       if (!IsSane(outline, guess, growth, grey_.size())) continue;
-      most_similar = std::max(most_similar, found->similarity);
-      const Fit fit{See(one, *found, outline), outline, i, 0.0, blur.length > 0.0};
+      max_similarity = std::max(max_similarity, found->similarity);
+      const Fit fit{ToTrackedTarget(target_template, *found, outline), outline, i, 0.0,
+                    blur.length > 0.0};
       const double sigma = std::sqrt(fit.relative_variance());
       if (!(sigma <= options_.max_relative_sigma)) continue;
       if (best && fit.relative_variance() >= best->relative_variance()) continue;
       best = fit;
       if (i == 0 && found->similarity >= options_.refresh_similarity) break;
     }
-    if (best) best->most_similar = most_similar;
+    if (best) best->max_similarity = max_similarity;
     return best;
   }
 
-  /// With that blur or one about as long, whichever is most alike.
-  std::optional<Alignment> AlignBlurred(const TargetTemplate& one, const cv::Matx33d& start,
-                                        const MotionBlur& blur) const {
+  /// Aligns with this blur or one of about its length, whichever is most similar.
+  std::optional<Alignment> AlignBlurred(const TargetTemplate& target_template,
+                                        const cv::Matx33d& start, const MotionBlur& blur) const {
     std::optional<Alignment> best;
-    for (const MotionBlur& like : blur.Neighbours()) {
-      const auto found = Align(one.Blurred(like), grey_, best ? best->warp : start, options_.warp);
+    for (const MotionBlur& candidate : blur.Neighbours()) {
+      const auto found = Align(target_template.Blurred(candidate), grey_, best ? best->warp : start,
+                               options_.warp);
       if (found && (!best || found->similarity > best->similarity)) best = found;
     }
     return best;
   }
 
-  /// The target is followed on from there. Of a blurred one only the place is kept.
-  std::optional<Seen> Keep(const std::optional<Fit>& fit) {
+  /// Continues the tracking from a fit. Only the position of a blurred target is used.
+  std::optional<TrackedTarget> Accept(const std::optional<Fit>& fit) {
     if (!fit) return std::nullopt;
-    if (fit->blurred) {
-      const cv::Point2f moved = MiddleOf(fit->outline) - MiddleOf(outline_);
-      for (cv::Point2f& corner : outline_) corner += moved;
+    if (fit->is_blurred) {
+      const cv::Point2f shift = MiddleOf(fit->outline) - MiddleOf(outline_);
+      for (cv::Point2f& corner : outline_) corner += shift;
     } else {
       last_ = fit->index;
       outline_ = fit->outline;
       Refresh(*fit);
     }
-    return fit->seen;
+    return fit->tracked;
   }
 
-  Seen See(const TargetTemplate& one, const Alignment& found, const Corners& outline) const {
-    const auto number = [&](const cv::Matx33d& warp) { return InverseScale(one, warp); };
-    const double scale = InverseScale(one, found.warp);
-    const double relative = found.Variance(one.patch(), number) / (scale * scale) + one.variance();
-    const double all = one.scale() * scale;
+  TrackedTarget ToTrackedTarget(const TargetTemplate& target_template, const Alignment& found,
+                                const Corners& outline) const {
+    const auto inverse_scale = [&](const cv::Matx33d& warp) {
+      return InverseScale(target_template, warp);
+    };
+    const double scale = InverseScale(target_template, found.warp);
+    const double relative =
+        found.Variance(target_template.patch(), inverse_scale) / (scale * scale) +
+        target_template.variance();
+    const double total_scale = target_template.scale() * scale;
     const cv::Rect2d box =
         cv::boundingRect(std::vector<cv::Point2f>(outline.begin(), outline.end()));
-    return {Apply(found.warp, Middle(one.patch())), box, all, all * all * relative};
+    return {Apply(found.warp, Middle(target_template.patch())), box, total_scale,
+            total_scale * total_scale * relative};
   }
 
-  /// Size of the target where the template was taken / size under `warp`. Of a plane under a
-  /// homography the depth of its middle x under `warp` / then: H = s (R + t n' / d) takes x, of
-  /// third element 1, to s Z / Z0 times its image, and s is the middle singular value of H
-  /// [Ma2004].
-  double InverseScale(const TargetTemplate& one, const cv::Matx33d& warp) const {
-    const cv::Point2d middle = Middle(one.patch());
+  /// Returns the size of the target when the template was recorded / its size under `warp`. For a
+  /// plane under a homography it is the depth of its middle x under `warp` / its depth then: H = s
+  /// (R + t n' / d) maps x, with third element 1, to s Z / Z0 times its image. s is the middle
+  /// singular value of H [Ma2004].
+  double InverseScale(const TargetTemplate& target_template, const cv::Matx33d& warp) const {
+    const cv::Point2d middle = Middle(target_template.patch());
     if (options_.warp != Warp::kHomography) {
-      return std::sqrt(AreaAt(one.taken(), middle) / AreaAt(warp, middle));
+      return std::sqrt(AreaScaleAt(target_template.image_from_patch(), middle) /
+                       AreaScaleAt(warp, middle));
     }
-    const cv::Matx33d in_rays = intrinsics_->inv() * warp * one.taken().inv() * *intrinsics_;
+    const cv::Matx33d in_rays =
+        intrinsics_->inv() * warp * target_template.image_from_patch().inv() * *intrinsics_;
     cv::Mat values;
     cv::SVD::compute(cv::Mat(in_rays), values, cv::SVD::NO_UV);
-    const cv::Point2d pixel = Apply(one.taken(), middle);
+    const cv::Point2d pixel = Apply(target_template.image_from_patch(), middle);
     const cv::Vec3d ray = intrinsics_->inv() * cv::Vec3d(pixel.x, pixel.y, 1.0);
     return std::abs((in_rays * (ray * (1.0 / ray[2])))[2]) / values.at<double>(1);
   }
 
-  /// Takes another template where none has fitted well for some images, or the target is far larger
-  /// or smaller than in the one that is used; none that is blurred.
+  /// Records a new template if none has fitted well for some images, or if the target is much
+  /// larger or smaller than in the current template. A blurred template is not used.
   void Refresh(const Fit& fit) {
     constexpr int kMisfits = 3;
     constexpr double kSharp = 0.4;
-    const TargetTemplate& used = templates_[last_];
-    const double scale = fit.seen.inverse_scale / used.scale();
+    const TargetTemplate& current = templates_[last_];
+    const double scale = fit.tracked.inverse_scale / current.scale();
     const bool other_size = scale > options_.refresh_scale || scale < 1.0 / options_.refresh_scale;
-    misfits_ = fit.most_similar < options_.refresh_similarity ? misfits_ + 1 : 0;
+    misfits_ = fit.max_similarity < options_.refresh_similarity ? misfits_ + 1 : 0;
     if (!other_size && misfits_ < kMisfits) return;
-    const cv::Rect2d whole(0.0, 0.0, grey_.cols, grey_.rows);
-    if ((fit.seen.box & whole).area() < fit.seen.box.area()) return;  // part of it is not seen
-    TargetTemplate taken(grey_, fit.outline, fit.seen.inverse_scale, fit.relative_variance());
-    if (taken.Sharpness() < kSharp * used.Sharpness()) return;
-    TakeTemplate(std::move(taken), fit.outline);
+    const cv::Rect2d image_area(0.0, 0.0, grey_.cols, grey_.rows);
+    if ((fit.tracked.box & image_area).area() < fit.tracked.box.area())
+      return;  // a part is not visible
+    TargetTemplate new_template(grey_, fit.outline, fit.tracked.inverse_scale,
+                                fit.relative_variance());
+    if (new_template.Sharpness() < kSharp * current.Sharpness()) return;
+    AddTemplate(std::move(new_template), fit.outline);
   }
 
-  /// Not turned inside out, about as large as guessed, its middle on the image.
+  /// Returns true if the outline is not inverted, about as large as guessed, and its middle is in
+  /// the image.
   static bool IsSane(const Corners& outline, const Corners& guess, double growth, cv::Size size) {
-    const double grown = AreaOf(outline) / AreaOf(guess);
+    const double area_ratio = AreaOf(outline) / AreaOf(guess);
     const std::vector<cv::Point2f> polygon(outline.begin(), outline.end());
     const cv::Point2f middle = 0.25F * (outline[0] + outline[1] + outline[2] + outline[3]);
-    return grown > 1.0 / growth && grown < growth && cv::isContourConvex(polygon) &&
+    return area_ratio > 1.0 / growth && area_ratio < growth && cv::isContourConvex(polygon) &&
            cv::contourArea(polygon, true) > 0.0 &&
            cv::Rect2f({0.0F, 0.0F}, cv::Size2f(size)).contains(middle);
   }
 
-  /// By a grid of its points from the image before, the better half of them by where they are
-  /// followed back to [Kalal2010], and the similarity that most agree on; none where too few do.
+  /// Follows a grid of points from the last image. It uses the better half of them, by the error
+  /// when they are followed back [Kalal2010], and the similarity with the most inliers. Returns
+  /// nullopt if too few agree.
   std::optional<Corners> Follow(const cv::Mat& image) const {
-    constexpr int kGrid = 12, kFewest = 8, kWindow = 15, kLevels = 4;
-    constexpr double kBack = 2.0, kAgree = 1.5;  // px
+    constexpr int kGrid = 12, kMinPoints = 8, kWindow = 15, kLevels = 4;
+    constexpr double kMaxReturnError = 2.0, kMaxResidual = 1.5;  // px
     const cv::Matx33d to_image = FromUnit(outline_);
-    std::vector<cv::Point2f> from, to, back;
+    std::vector<cv::Point2f> start, end, returned;
     for (int i = 0; i < kGrid * kGrid; ++i) {
       const int row = i / kGrid;
-      const cv::Point2d at((i % kGrid + 0.5) / kGrid, (row + 0.5) / kGrid);
-      from.emplace_back(Apply(to_image, at));
+      const cv::Point2d unit_point((i % kGrid + 0.5) / kGrid, (row + 0.5) / kGrid);
+      start.emplace_back(Apply(to_image, unit_point));
     }
-    std::vector<unsigned char> found, found_back, inlier;
+    std::vector<unsigned char> found, found_returned, inlier;
     std::vector<float> ignored;
     const cv::Size window(kWindow, kWindow);
-    cv::calcOpticalFlowPyrLK(before_, image, from, to, found, ignored, window, kLevels);
-    cv::calcOpticalFlowPyrLK(image, before_, to, back, found_back, ignored, window, kLevels);
+    cv::calcOpticalFlowPyrLK(last_image_, image, start, end, found, ignored, window, kLevels);
+    cv::calcOpticalFlowPyrLK(image, last_image_, end, returned, found_returned, ignored, window,
+                             kLevels);
     std::vector<std::pair<double, std::size_t>> by_error;
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      const double error = cv::norm(back[i] - from[i]);
-      if (found[i] != 0 && found_back[i] != 0 && error < kBack) by_error.emplace_back(error, i);
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      const double error = cv::norm(returned[i] - start[i]);
+      if (found[i] != 0 && found_returned[i] != 0 && error < kMaxReturnError)
+        by_error.emplace_back(error, i);
     }
     std::ranges::sort(by_error);
     by_error.resize((by_error.size() + 1) / 2);
-    if (std::ssize(by_error) < kFewest) return std::nullopt;
-    std::vector<cv::Point2f> good_from, good_to;
+    if (std::ssize(by_error) < kMinPoints) return std::nullopt;
+    std::vector<cv::Point2f> good_start, good_end;
     for (const auto& [error, i] : by_error) {
-      good_from.push_back(from[i]);
-      good_to.push_back(to[i]);
+      good_start.push_back(start[i]);
+      good_end.push_back(end[i]);
     }
     const cv::Mat similarity =
-        cv::estimateAffinePartial2D(good_from, good_to, inlier, cv::RANSAC, kAgree);
+        cv::estimateAffinePartial2D(good_start, good_end, inlier, cv::RANSAC, kMaxResidual);
     if (similarity.empty() || 2 * cv::countNonZero(inlier) < std::ssize(by_error)) {
       return std::nullopt;
     }
-    cv::Matx33d moved = cv::Matx33d::eye();
+    cv::Matx33d motion = cv::Matx33d::eye();
     for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j < 3; ++j) moved(i, j) = similarity.at<double>(i, j);
+      for (int j = 0; j < 3; ++j) motion(i, j) = similarity.at<double>(i, j);
     }
-    return Moved(moved, outline_);
+    return ApplyToCorners(motion, outline_);
   }
 
   TargetOptions options_;
   std::optional<cv::Matx33d> intrinsics_;
   std::vector<TargetTemplate> templates_;
-  std::size_t last_ = 0;  ///< the template that fitted the last image
-  int misfits_ = 0;       ///< images in which none fitted well
-  int unseen_ = 0;        ///< images since it was measured
-  bool lost_ = false;
-  Corners outline_{};  ///< of the target
-  cv::Mat grey_;       ///< the image at hand, as float
-  cv::Mat before_;     ///< the last image
+  std::size_t last_ = 0;  ///< template that fitted the last image
+  int misfits_ = 0;       ///< images in which no template fitted well
+  int unmeasured_ = 0;    ///< images since the last measurement
+  bool is_lost_ = false;
+  Corners outline_{};   ///< of the target
+  cv::Mat grey_;        ///< current image, as float
+  cv::Mat last_image_;  ///< the last image
 };
 
 }  // namespace alidade

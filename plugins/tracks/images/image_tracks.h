@@ -7,26 +7,31 @@
 
 namespace alidade {
 
-/// Features that are found in the images of one camera and followed through them.
+/// Creates a source of features that are found in the images of one camera and tracked through
+/// them.
 ///
-/// Beside the images, in their folder or that of the video, may be `timestamps.csv` (`frame,t_s`,
-/// frames counted from 0), or a table that ImageTimes::Beside knows, or else rate_hz gives image k
-/// the time k / rate; `groundtruth.tum` or `truth.tum` (world_from_cam), or the `groundtruth.txt`
-/// of TUM; and `calibration.yaml`, or the `sensor.yaml` of EuRoC, see
-/// ReadCalibrationFile(). Images of a camera have the times at which they came, from 0.
+/// These files are in the folder of the images or of the video:
+///
+///   times        `timestamps.csv` (`frame,t_s`, frames counted from 0), or a table that
+///                ImageTimes::FindNextTo() knows; else image k has the time k / rate_hz
+///   true poses   `groundtruth.tum` or `truth.tum` (world_from_cam), or TUM's `groundtruth.txt`
+///   calibration  `calibration.yaml`, or EuRoC's `sensor.yaml`, see ReadCalibrationFile()
+///
+/// The images of a live camera have the times of their capture, from 0.
 ///
 ///   stream   size  values       when
-///   tracks   2     u, v         a feature is followed; the landmark is its id
-///   known    3     u, v, depth  of the points of a table `known` in the first image, in place of
-///                               their first observation
+///   tracks   2     u, v         a feature is tracked; its id is the landmark
+///   known    3     u, v, depth  points of a table `known` in the first image, instead of their
+///                               first observation
 ///
-/// Under `guide` the features are looked for where that filter expects them, see FeatureTracker.
+/// With `guide`, features are searched for at the positions that this filter expects:
+/// FeatureTracker.
 ///
-/// With `estimate_noise` each measurement of `tracks` brings its covariance,
+/// With `estimate_noise` each measurement of `tracks` has its own covariance,
 ///
 ///   R = C + sigma^2 I
 ///
-/// with C that of FoundPatch, and sigma the config's sigma_systematic_px.
+/// with C from FoundPatch, and sigma the config's sigma_systematic_px.
 ///
 /// Keys         kImageTracksKeys in tracks_plugin.cc, those of TrackerOptions.
 /// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.

@@ -2,5 +2,5 @@
 #include "alidade/experiment/source_plugin.h"
 #include "image_tracks.h"
 
-// Opened by the source of that name in tracks_plugin.cc, which has the texts.
+// The source of this name in tracks_plugin.cc opens this plugin, and has its texts.
 ALIDADE_SOURCE_PLUGIN({"image_tracks", "", "", &alidade::CreateImageTracks})

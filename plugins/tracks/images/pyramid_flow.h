@@ -8,44 +8,44 @@
 
 namespace alidade {
 
-/// Where points of one image are in the next, by pyramids of patches [Lucas1981], to a fraction of
-/// a pixel. A pyramid is made where one is asked for, once for each image.
+/// Optical flow of points from one image to the next, by pyramids of patches [Lucas1981], to a
+/// fraction of a pixel. The pyramid of an image is built once, when it is first needed.
 class PyramidFlow {
  public:
-  /// `window_px` side of a patch; `levels` above the image itself.
+  /// `window_px` is the side of a patch, `levels` the number of levels above the image itself.
   PyramidFlow(int window_px, int levels) : window_(window_px, window_px), levels_(levels) {}
 
-  /// Takes the next image, 8 bit grey; the one before it becomes the last.
-  void Take(const cv::Mat& image) {
+  /// Sets the next image, 8 bit grey. The previous next image becomes the last image.
+  void SetNextImage(const cv::Mat& image) {
     std::swap(last_, next_);
     image.copyTo(next_.image);
     next_.is_built = false;
   }
 
-  /// Moves `to` from where the points `from` of the last image are looked for in the next to about
-  /// where they are, by the levels above the image itself where there are any. `found`: 0 where
-  /// they are lost.
-  void Forward(const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to,
-               std::vector<unsigned char>& found) {
+  /// Moves the points `end` from their expected to their approximate positions in the next image.
+  /// `start` are the same points in the last image. It uses only the levels above the image itself
+  /// if there are any. `found` is 0 for lost points. they are lost.
+  void TrackForward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
+                    std::vector<unsigned char>& found) {
     const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);
     const int skipped = last.size() > 1 ? 1 : 0;  // a small image has no levels above it
     const float scale = skipped > 0 ? 0.5F : 1.0F;
-    from_.clear();
-    for (const cv::Point2f& at : from) from_.push_back(scale * at);
-    for (cv::Point2f& at : to) at *= scale;
+    scaled_start_.clear();
+    for (const cv::Point2f& point : start) scaled_start_.push_back(scale * point);
+    for (cv::Point2f& point : end) point *= scale;
     cv::calcOpticalFlowPyrLK(std::vector(last.begin() + skipped, last.end()),
-                             std::vector(next.begin() + skipped, next.end()), from_, to, found,
-                             error_, window_, levels_ - skipped, kStop,
+                             std::vector(next.begin() + skipped, next.end()), scaled_start_, end,
+                             found, error_, window_, levels_ - skipped, kStop,
                              cv::OPTFLOW_USE_INITIAL_FLOW);
-    for (cv::Point2f& at : to) at /= scale;
+    for (cv::Point2f& point : end) point /= scale;
   }
 
-  /// Moves `to`, points of the last image, to where the points `from` of the next one were; what is
-  /// near needs no pyramid.
-  void Back(const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to,
-            std::vector<unsigned char>& found) {
-    cv::calcOpticalFlowPyrLK(Build(next_), Build(last_), from, to, found, error_, window_, 0, kStop,
-                             cv::OPTFLOW_USE_INITIAL_FLOW);
+  /// Moves `end`, points of the last image, to the positions there of the points `start` of the
+  /// next image. The expected positions must be near, because no pyramid is used.
+  void TrackBackward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
+                     std::vector<unsigned char>& found) {
+    cv::calcOpticalFlowPyrLK(Build(next_), Build(last_), start, end, found, error_, window_, 0,
+                             kStop, cv::OPTFLOW_USE_INITIAL_FLOW);
   }
 
  private:
@@ -55,7 +55,8 @@ class PyramidFlow {
     bool is_built = false;
   };
 
-  /// Derivatives that wait in memory are slower than those that are computed where they are used.
+  /// Builds the pyramid without derivatives: reading them from memory takes longer than computing
+  /// them.
   const std::vector<cv::Mat>& Build(Pyramid& pyramid) {
     if (!pyramid.is_built) {
       cv::buildOpticalFlowPyramid(pyramid.image, pyramid.levels, window_, levels_, false);
@@ -69,7 +70,7 @@ class PyramidFlow {
   cv::Size window_;
   int levels_;
   Pyramid last_, next_;
-  std::vector<cv::Point2f> from_;
+  std::vector<cv::Point2f> scaled_start_;
   std::vector<float> error_;
 };
 

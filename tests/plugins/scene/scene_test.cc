@@ -257,7 +257,7 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints, "trajectory: missing key, needed by scene");
   refused(kStill + ", points: {bix: 3}", "points.bix: unknown key; did you mean 'box'?");
   refused(kStill + ", points: {count: 3}",
-          "points: says nothing of its kind; expected one of list, box, room, shells");
+          "points: the kind is missing; expected one of list, box, room, shells");
   refused(kStill + ", points: {list: [[1, 2, 3]], count: 3}", "points.count: a list has its own");
   refused(kStill + ", points: {list: [[1, 2]]}", "points.list[0]");
   refused(kStill + ", points: {box: {min: [0, 0, 0], max: [1, 0, 1]}, count: 3}",
@@ -270,7 +270,7 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints +
               ", trajectory: {up: [0, 0, 1], random: {linear_acceleration: 1, "
               "angular_acceleration: 1}}",
-          "trajectory.up: without a use");
+          "trajectory.up: has no effect without 'look_at'");
   refused(kPoints +
               ", trajectory: {keyframes: [{position: [0, 0, 0], matrix: [[1, 0, 0], "
               "[0, 1, 0], [0, 0, -1]]}]}",
@@ -286,7 +286,7 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints +
               ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
-          "keyframes[1].t_s: not after the item before");
+          "keyframes[1].t_s: not later than in the item before");
   refused(kPoints +
               ", max_frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
               "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "

@@ -85,12 +85,12 @@ TEST_F(TracksTest, Fault34TruncatedLastLine) {
 TEST_F(TracksTest, Fault35SecondValue) {
   ExpectBadData(kGood + "# c\n0,3,0,1\n",
                 "DIR/tracks.csv:4: a second value of frame 0, feature 3, "
-                "dim 0; the first is in line 1; expected one");
+                "dim 0; the first is in line 1; expected one value");
 }
 
 TEST_F(TracksTest, Fault36FramesGoBackwards) {
   ExpectBadData("2,3,0,1\n2,3,1,2\n" + kGood,
-                "DIR/tracks.csv:3:1 frame: '0' is before that of "
+                "DIR/tracks.csv:3:1 frame: '0' is smaller than in "
                 "line 2; expected frames in order");
 }
 

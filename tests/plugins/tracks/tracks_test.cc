@@ -97,8 +97,8 @@ TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
     EXPECT_NEAR(frames[1].truth[1][i], turned[i], 1e-15);
   }
   ExpectError(ExitCode::kBadData,
-              "DIR/tracks.csv:3: the world is to be the camera of frame 0, which has no true "
-              "pose; expected one within truth_tolerance_s of it, or world: file",
+              "DIR/tracks.csv:3: frame 0 has no true pose, but its camera is the world; "
+              "expected a true pose within truth_tolerance_s, or world: file",
               [&] { Frames("rate_hz: 10, world: first_camera"); });
 }
 

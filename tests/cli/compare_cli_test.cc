@@ -32,7 +32,7 @@ TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
   }
   Write("out/ekf/estimates.csv", text);
   const std::string note = "out/ekf/estimates.csv': 3 of " + std::to_string(count) +
-                           " rows have values that are not finite; the comparison leaves these out";
+                           " rows have values that are not finite; the comparison ignores them";
   EXPECT_TRUE(Contains(Call({"compare", "out"}).out, note)) << Call({"compare", "out"}).out;
   EXPECT_TRUE(Contains(Call({"compare", "out", "--json"}).out, note));
 }
@@ -100,7 +100,7 @@ TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   EXPECT_TRUE(Contains(Read("broken/run.json"), "\"failed\""));
   const Outcome blind = compare("0,86,\n0.1,86,\n", "blind");
   EXPECT_EQ(blind.code, 2);
-  EXPECT_TRUE(Contains(blind.err, "--reference: no run has errors from truth")) << blind.err;
+  EXPECT_TRUE(Contains(blind.err, "--reference: no run has errors relative to truth")) << blind.err;
   EXPECT_TRUE(Contains(Read("blind/run.json"), "\"ok\""));
 }
 
@@ -147,14 +147,14 @@ TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   const Outcome compared = Call({"compare", "a", "b"});
   EXPECT_EQ(compared.code, 65);
   EXPECT_EQ(compared.out, "");
-  EXPECT_EQ(compared.err, "error: b: saw other measurements than 'a': " + hash("b") + " against " +
+  EXPECT_EQ(compared.err, "error: b: has other measurements than 'a': " + hash("b") + ", not " +
                               hash("a") +
-                              ", first at t = 0.500000000 s of the one, t = 0.500000000 s of the "
-                              "other; expected runs of the same source, seed and start\n");
+                              ", first difference: t = 0.500000000 s; expected runs of the same "
+                              "source, seed and start\n");
   Write("a/measurements.csv", "t_s,stereo\n0.1\n0.1\n");
   const Outcome damaged = Call({"compare", "a", "b"});
   EXPECT_EQ(damaged.code, 65);
-  EXPECT_TRUE(Contains(damaged.err, "b: saw other measurements than 'a'")) << damaged.err;
+  EXPECT_TRUE(Contains(damaged.err, "b: has other measurements than 'a'")) << damaged.err;
 }
 
 // FAULTS 86: the same numbers in another text are the same data.
@@ -174,7 +174,8 @@ TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
   ASSERT_EQ(Table("other.csv", "b").code, 0);
   const Outcome compared = Call({"compare", "a", "b"});
   EXPECT_EQ(compared.code, 65);
-  EXPECT_TRUE(Contains(compared.err, "first at t = 1.500000000 s of the one, its end of the other"))
+  EXPECT_TRUE(
+      Contains(compared.err, "first difference: the end of the file instead of t = 1.500000000 s"))
       << compared.err;
 }
 
@@ -277,7 +278,7 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   EXPECT_GT(estimators.At("ekf").At("values").At("rmsd.sigmas:target").Number(), 0.0);
   const Outcome truth = Call({"compare", "table.yaml", "-o", "two", "--reference", "truth"});
   EXPECT_EQ(truth.code, 2);
-  EXPECT_TRUE(Contains(truth.err, "--reference: the source knows no truth")) << truth.err;
+  EXPECT_TRUE(Contains(truth.err, "--reference: the source provides no truth")) << truth.err;
   EXPECT_FALSE(Exists("two"));
 }
 
@@ -298,7 +299,8 @@ TEST_F(CompareCli, TellsOfRejectionRecovery) {
   std::string text = Read("table.csv");
   for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
   Write("table.csv", text);
-  const std::string words = "'ekf' recovered from rejections: what that cost";
+  const std::string words =
+      "'ekf' recovered from rejections: its step to a batch or smoother includes the cost";
   const Outcome compared =
       Call({"compare", "table.yaml", "-o", "out", "--set",
             "estimators.ekf={type: ekf, gate: 0.99, rejection_recovery: {after: 2}}"});
@@ -417,8 +419,7 @@ TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
       Call({"compare", "config.yaml", "--runs", "5", "--first-seed", "11", "--jobs", "1",
             "--budget", "0.01", "--set", "source.duration_s=2", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
-  const std::string words =
-      "the budget of 0.01 s was enough for 1 of 5 runs; left out: seeds from 12 on";
+  const std::string words = "the budget of 0.01 s sufficed for 1 of 5 runs; not run: seeds from 12";
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   const Config json = Json("out/compare.json");
   EXPECT_EQ(json.root().At("runs").Number(), 1);
@@ -428,11 +429,12 @@ TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
 TEST_F(CompareCli, AddsNothingBeyondTheBudget) {
   const Outcome little = Call({"compare", "config.yaml", "--budget", "1e-9", "-o", "little"});
   EXPECT_EQ(little.code, 0) << little.err;
-  EXPECT_TRUE(Contains(little.out, "foretold from 10 of 152 frames: ")) << little.out;
+  EXPECT_TRUE(Contains(little.out, "predicted from 10 of 152 frames: ")) << little.out;
   EXPECT_TRUE(Contains(little.out, " s, the budget is 1e-09 s")) << little.out;
   EXPECT_FALSE(Contains(little.out, "added '")) << little.out;
   const std::string shown = little.out.substr(little.out.find("Error decomposition"));
-  EXPECT_TRUE(Contains(shown, "the budget of 1e-09 s left out what is named above")) << shown;
+  EXPECT_TRUE(Contains(shown, "the budget of 1e-09 s excludes the estimators named above"))
+      << shown;
   const Outcome much = Call({"compare", "config.yaml", "--budget", "1e6", "-o", "much"});
   ASSERT_EQ(much.code, 0) << much.err;
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "all"}).code, 0);
@@ -499,9 +501,10 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   const std::string whole = Read("a/ekf/estimates.csv");
   const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
   Write("a/ekf/estimates.csv", whole.substr(0, last));
-  fails({"compare", "a"}, 65, "estimates.csv: 151 rows, run.json has 152; expected a run folder");
+  fails({"compare", "a"}, 65,
+        "estimates.csv: has 151 rows, but run.json records 152; expected an unmodified run folder");
   Write("a/ekf/estimates.csv", whole.substr(0, whole.size() - 1));
-  fails({"compare", "a"}, 65, "estimates.csv:153: the last line is cut short");
+  fails({"compare", "a"}, 65, "estimates.csv:153: the last line is incomplete");
   for (const auto& [stamp, words] : {std::pair("", "t_s '' is not a number"),
                                      {"nan", "t_s 'nan' is not finite"},
                                      {"1e300", "t_s '1e300' is out of range"},
@@ -529,7 +532,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
     Write("a/run.json", std::regex_replace(json, std::regex(text), other));
   };
   with("\"data\"", "\"date\"");
-  fails({"compare", "a"}, 65, "does not say which data the run saw");
+  fails({"compare", "a"}, 65, "does not record the hashes of the data");
   with("\"frames\": 152", "\"frames\": \"many\"");
   fails({"compare", "a"}, 65, "a/run.json frames: \"many\"; expected a whole number from 0 to");
   with("\"rows\": 152", "\"rows\": -152");

@@ -169,7 +169,8 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   before_.clear();
   const Outcome piped = Call({"replay", "out"});
   EXPECT_EQ(piped.code, 66);
-  EXPECT_TRUE(Contains(piped.err, "its data came from '-', which can be read only once")) << piped.err;
+  EXPECT_TRUE(Contains(piped.err, "its data came from '-', which can be read only once"))
+      << piped.err;
   Make({"run", "config.yaml", "--no-figures", "--force"});
   std::string record = Read("out/run.json");
   record.replace(record.find("\"ok\""), 4, "\"stopped\"");
@@ -181,8 +182,7 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   Write("out/run.json", record);
   const Outcome unfinished = Call({"replay", "out"});
   EXPECT_EQ(unfinished.code, 65);
-  EXPECT_TRUE(Contains(unfinished.err, "error: out: is incomplete; expected "))
-      << unfinished.err;
+  EXPECT_TRUE(Contains(unfinished.err, "error: out: is incomplete; expected ")) << unfinished.err;
   Write("out/inputs.json", "[1, 2]");
   EXPECT_EQ(Call({"replay", "out"}).code, 65);
 }

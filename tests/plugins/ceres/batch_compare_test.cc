@@ -254,7 +254,7 @@ TEST(BuildComparedExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem)
   ASSERT_EQ(compared.notes.size(), 2u);
   EXPECT_TRUE(
       compared.notes[0].starts_with("left out the batch of all data; the full-information filter "
-                                    "over what the filter accepted; "))
+                                    "of the accepted measurements; "))
       << compared.notes[0];
   EXPECT_EQ(compared.notes[1],
             "left out the smoother of all data: estimator type 'rts' does not support "

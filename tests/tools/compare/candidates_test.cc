@@ -71,8 +71,8 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_EQ(Find(comparison, "stereo").ratios.at("final_error:p.x").value(), 2.0);
   EXPECT_EQ(Find(comparison, "scale").final_reference, "");
   EXPECT_FALSE(Find(comparison, "scale").values.contains("final_difference:p.x"));
-  EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' is compared with nothing: no "
-                                                        "batch has its sensors"}));
+  EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' has no reference: no batch "
+                                                        "uses its sensors"}));
   const std::string text = CompareReport(comparison, TableStyle::kText);
   EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
 }
@@ -115,7 +115,7 @@ TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
   EXPECT_EQ(CompareRuns({run}, {}).withheld, "");
   run.estimators[1].result.counts = {{"landmarks.deleted", 2}};
   EXPECT_EQ(CompareRuns({run}, {}).withheld,
-            "no estimator was given a measurement: what is compared is their start");
+            "no estimator received a measurement: only initial estimates are compared");
 }
 
 TEST(CompareRuns, TellsOfRejectionRecoveryOfTheFilter) {
@@ -123,10 +123,10 @@ TEST(CompareRuns, TellsOfRejectionRecoveryOfTheFilter) {
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
   run.estimators[0].had_rejection_recovery = true;
-  EXPECT_EQ(CompareRuns({run}, {}).notes,
-            std::vector<std::string>{
-                "'ekf' recovered from rejections: what that cost is in its step to a "
-                "batch or smoother"});
+  EXPECT_EQ(
+      CompareRuns({run}, {}).notes,
+      std::vector<std::string>{"'ekf' recovered from rejections: its step to a batch or smoother "
+                               "includes the cost"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {
@@ -235,24 +235,24 @@ TEST(CheckSameData, TellsTheFirstTimestampWhateverTheColumnsAndTheOrderOfStreams
   const std::string text =
       Refusal("t_s,stream,landmark,v0,v1\n0.1,a,,1,\n0.1,b,,2,3\n0.2,a,,4,\n0.3,a,,5,\n",
               "t_s,stream,landmark,v0,v1,v2\n0.1,b,,2,3,\n0.1,a,,1,,\n0.2,a,,4,,\n0.3,a,,6,,\n");
-  EXPECT_NE(text.find("first at t = 0.3 s of the one, t = 0.3 s of the other"), text.npos) << text;
+  EXPECT_NE(text.find("first difference: t = 0.3 s;"), text.npos) << text;
 }
 
 TEST(CheckSameData, TheOrderWithinAStreamIsData) {
   const std::string header = "t_s,stream,landmark,v0\n";
   const std::string text =
       Refusal(header + "0.1,a,,1\n0.2,a,,1\n0.2,a,,2\n", header + "0.1,a,,1\n0.2,a,,2\n0.2,a,,1\n");
-  EXPECT_NE(text.find("first at t = 0.2 s of the one, t = 0.2 s of the other"), text.npos) << text;
+  EXPECT_NE(text.find("first difference: t = 0.2 s;"), text.npos) << text;
 }
 
 TEST(CheckSameData, SaysWhereARunHasLessAndWhereTheFilesDoNotTell) {
   const std::string rows = "t_s,stream,landmark,v0\n0.1,a,,1\n";
   EXPECT_NE(Refusal(rows + "0.2,a,,1\n", rows)
-                .find("first at t = 0.2 s of the one, its end of the other"),
+                .find("first difference: the end of the file instead of t = 0.2 s"),
             std::string::npos);
-  EXPECT_NE(
-      Refusal(rows, rows).find("their own covariances or the timestamps of empty frames differ"),
-      std::string::npos);
+  EXPECT_NE(Refusal(rows, rows)
+                .find("the covariances of measurements or the timestamps of empty frames differ"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ Followed Follow(int frames) {
   RunOptions options;
   options.observers = {&shows};
   RunResult result = Run(experiment, options);
-  return {recorder.Take(), std::move(result)};
+  return {recorder.Finish(), std::move(result)};
 }
 
 // The fourth frame has no truth.
@@ -95,14 +95,14 @@ ErrorSeries FollowWithAllTruth(int frames, EstimatorKind kind = EstimatorKind::k
   RunOptions options;
   options.observers = {&shows};
   Run(experiment, options);
-  return recorder.Take();
+  return recorder.Finish();
 }
 
 TEST(ErrorRecorder, HasErrorsByTheirCramerRaoBound) {
   const ErrorSeries series = FollowWithAllTruth(60);
   ASSERT_EQ(series.blocks.size(), 3u);
   ASSERT_EQ(series.bounds.size(), series.squares.size());
-  EXPECT_EQ(series.no_bound, "");
+  EXPECT_EQ(series.no_bound_reason, "");
   for (std::size_t i = 0; i < 3; ++i) {
     double sum = 0.0;
     for (std::size_t k = 0; k < 60; ++k) {
@@ -122,9 +122,9 @@ TEST(ErrorRecorder, ThinsTheBoundWithTheRest) {
 }
 
 TEST(ErrorRecorder, HasNoBoundOfWhatKnowsLaterDataOrWhereTruthLacks) {
-  EXPECT_EQ(Follow(60).series.no_bound, "'target.depth_rate' has no truth");
+  EXPECT_EQ(Follow(60).series.no_bound_reason, "'target.depth_rate' has no truth");
   const ErrorSeries window = FollowWithAllTruth(60, EstimatorKind::kSlidingWindow);
-  EXPECT_TRUE(window.bounds.empty() && window.by_bound.empty() && window.no_bound.empty());
+  EXPECT_TRUE(window.bounds.empty() && window.by_bound.empty() && window.no_bound_reason.empty());
 }
 
 }  // namespace

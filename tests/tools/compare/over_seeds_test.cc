@@ -113,12 +113,12 @@ ErrorSeries SeriesOf(const std::vector<double>& errors, const std::vector<double
 OverTime Over(const std::vector<ErrorSeries>& runs) {
   std::vector<const ErrorSeries*> pointers;
   for (const ErrorSeries& run : runs) pointers.push_back(&run);
-  return OverRuns(pointers);
+  return ComputeOverTime(pointers);
 }
 
 // Tables of chi-square with 10 degrees of freedom: 3.247 at 0.025, 20.483 at 0.975
 // [BarShalom2001, table 1.5.4-1]. Five runs of two degrees of freedom have ten.
-TEST(OverRuns, AverageNeesHasTheBoundsOfChiSquare) {
+TEST(ComputeOverTime, AverageNeesHasTheBoundsOfChiSquare) {
   std::vector<ErrorSeries> runs;
   for (const double nees : {1.0, 2.0, 3.0, 4.0, 5.0}) {
     runs.push_back(SeriesOf({1.0, 1.0}, {nees, 2.0 * nees}));
@@ -133,7 +133,7 @@ TEST(OverRuns, AverageNeesHasTheBoundsOfChiSquare) {
 
 // Of 200 runs whose NEES is chi2(2), 95 % of 500 independent timestamps are inside; the share has a
 // standard deviation of sqrt(0.95 0.05 / 500) = 1 %.
-TEST(OverRuns, AverageNeesOfAConsistentFilterIsInside) {
+TEST(ComputeOverTime, AverageNeesOfAConsistentFilterIsInside) {
   Random random(5);
   std::vector<ErrorSeries> runs;
   for (int r = 0; r < 200; ++r) {
@@ -144,7 +144,7 @@ TEST(OverRuns, AverageNeesOfAConsistentFilterIsInside) {
   EXPECT_NEAR(Over(runs).nees.at("p").inside, 0.95, 0.03);
 }
 
-TEST(OverRuns, ErrorsHaveRmsAndQuantiles) {
+TEST(ComputeOverTime, ErrorsHaveRmsAndQuantiles) {
   std::vector<ErrorSeries> runs;
   for (int r = 0; r <= 100; ++r) runs.push_back(SeriesOf({0.01 * r}, {1.0}));
   const OverTime::Error error = Over(runs).errors.at("p.x");
@@ -154,7 +154,7 @@ TEST(OverRuns, ErrorsHaveRmsAndQuantiles) {
   EXPECT_NEAR(error.high[0], 0.84, 1e-12);
 }
 
-TEST(OverRuns, BoundsAreRmsAndThereWhereAllRunsHaveThem) {
+TEST(ComputeOverTime, BoundsAreRmsAndThereWhereAllRunsHaveThem) {
   ErrorSeries one = SeriesOf({1.0, 1.0}, {1.0, 1.0}), two = one, three = one;
   one.bounds = {1.0, 4.0};
   two.bounds = {3.0, 8.0};
@@ -163,7 +163,7 @@ TEST(OverRuns, BoundsAreRmsAndThereWhereAllRunsHaveThem) {
   EXPECT_TRUE(Over({one, two, three}).errors.at("p.x").bound.empty());
 }
 
-TEST(OverRuns, TimestampsOfOneRunAloneAndWhatIsNoNumberAreLeftOut) {
+TEST(ComputeOverTime, TimestampsOfOneRunAloneAndWhatIsNoNumberAreLeftOut) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const OverTime over =
       Over({SeriesOf({nan, 1.0, 5.0}, {nan, 2.0, 2.0}), SeriesOf({2.0, 3.0}, {1.0, 4.0})});

@@ -9,21 +9,21 @@ double RunBudget::elapsed_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
-void RunBudget::Note(double run_s) {
+void RunBudget::RecordRun(double run_s) {
   double longest = longest_s_.load();
   while (run_s > longest && !longest_s_.compare_exchange_weak(longest, run_s)) continue;
 }
 
-bool RunBudget::spent() const {
+bool RunBudget::is_spent() const {
   const double longest = longest_s_.load();
   return limit_s_ && longest > 0.0 && elapsed_s() + longest > *limit_s_;
 }
 
-std::optional<ForetoldTime> ForetellTime(Experiment& experiment) {
+std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment) {
   constexpr std::int64_t kFrames = 10;
-  ForetoldTime foretold;
-  foretold.all_frames = experiment.source->size();
-  if (foretold.all_frames <= 0) return std::nullopt;
+  PredictedCpuTime prediction;
+  prediction.total_frames = experiment.source->size();
+  if (prediction.total_frames <= 0) return std::nullopt;
   std::vector<std::shared_ptr<CpuTime>> times;
   std::vector<bool> solves_each_frame;
   for (EstimatorSpec& spec : experiment.estimators) {
@@ -31,20 +31,23 @@ std::optional<ForetoldTime> ForetellTime(Experiment& experiment) {
     times.push_back(std::make_shared<CpuTime>());
     spec.estimator = WithCpuClock(std::move(spec.estimator), times.back());
   }
-  bool asked = false;  // what is stopped are the frames, not the smoothing
+  bool stop_requested = false;  // stop only once: it must end the frames, not the smoothing
   RunOptions options;
-  options.progress = [&](std::int64_t done, std::int64_t) { foretold.frames = done; };
-  options.stop = [&] { return foretold.frames >= kFrames && !std::exchange(asked, true); };
+  options.progress = [&](std::int64_t done, std::int64_t) { prediction.frames = done; };
+  options.stop = [&] {
+    return prediction.frames >= kFrames && !std::exchange(stop_requested, true);
+  };
   const RunResult result = Run(experiment, options);
   if (result.frames == 0 || result.status == RunStatus::kFailed) return std::nullopt;
-  foretold.frames = result.frames;
-  const double more =
-      static_cast<double>(foretold.all_frames) / static_cast<double>(foretold.frames);
+  prediction.frames = result.frames;
+  const double growth =
+      static_cast<double>(prediction.total_frames) / static_cast<double>(prediction.frames);
   for (std::size_t e = 0; e < times.size(); ++e) {
-    const double each = solves_each_frame[e] ? more : 1.0;
-    foretold.of.push_back(more * (each * times[e]->frames_s + times[e]->smoothing_s));
+    const double solve_growth = solves_each_frame[e] ? growth : 1.0;
+    prediction.cpu_s.push_back(growth *
+                               (solve_growth * times[e]->frames_s + times[e]->smoothing_s));
   }
-  return foretold;
+  return prediction;
 }
 
 }  // namespace alidade::internal

@@ -9,18 +9,18 @@
 
 namespace alidade::internal {
 
-/// Time of the wall clock that several runs may take together; of several threads at once.
+/// Wall-clock budget of a series of runs. Several threads may use it at the same time.
 class RunBudget {
  public:
-  /// It begins now; none: there is no limit.
+  /// Starts the clock. nullopt: no limit.
   explicit RunBudget(std::optional<double> limit_s) : limit_s_(limit_s) {}
 
   double elapsed_s() const;
-  /// Takes how long a run was.
-  void Note(double run_s);
-  /// Whether one more run, as long as the longest one, would end too late; false before the first
-  /// run is done.
-  bool spent() const;
+  /// Records the duration of a finished run.
+  void RecordRun(double run_s);
+  /// Reports whether a further run, as long as the longest one so far, would exceed the limit.
+  /// False until the first run is recorded.
+  bool is_spent() const;
 
  private:
   std::optional<double> limit_s_;
@@ -28,15 +28,17 @@ class RunBudget {
   std::atomic<double> longest_s_{0.0};
 };
 
-/// CPU time of estimators over all frames, foretold from the first ones, s.
-struct ForetoldTime {
-  std::vector<double> of;  ///< by estimator
-  std::int64_t frames = 0, all_frames = 0;
+/// CPU time of each estimator over all frames, predicted from the first frames.
+struct PredictedCpuTime {
+  std::vector<double> cpu_s;  ///< by estimator
+  std::int64_t frames = 0;    ///< number of frames that were measured
+  std::int64_t total_frames = 0;
 };
 
-/// Runs the experiment, which is then of no more use, over its first ten frames. A solve of all
-/// data is taken to grow with their number N, one at every frame with N^2. None where the source
-/// does not know N, or the run failed.
-std::optional<ForetoldTime> ForetellTime(Experiment& experiment);
+/// Predicts the CPU time from the first ten frames. The experiment cannot be used afterwards. The
+/// prediction assumes that the cost of one solve of all data is proportional to the number of
+/// frames N, and that of a solve at every frame to N^2. Returns nullopt if the source does not
+/// report N or the run failed.
+std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment);
 
 }  // namespace alidade::internal

@@ -12,114 +12,119 @@
 #include "alidade/experiment/run.h"
 #include "alidade/sweep/sweep.h"
 
-/// Estimators over the same data, compared, and where their difference comes from
-/// (docs/compare.md). What a filter makes of the past is never compared with what a smoother makes
-/// of all data: each is compared with the batch of the data that it had.
+/// Comparison of estimators over the same data, and decomposition of their differences
+/// (docs/compare.md). A filter, which uses past data only, is never compared with a smoother, which
+/// uses all data: the reference of each estimator is a batch of the same data.
 namespace alidade {
 
 struct CompareOptions {
-  /// What errors are taken from: `truth`, or an estimator. "": truth where it is known, else the
-  /// batch.
+  /// Reference of the errors: `truth`, or the name of an estimator. "": truth if it is known, else
+  /// the batch.
   std::string reference;
-  std::string filter;     ///< the one whose error is decomposed; "": the first
-  bool decompose = true;  ///< else no error decomposition, and nothing is added to a config for it
-  bool over_seeds = false;  ///< the source is read for each of several seeds
-  /// What a comparison may take, s. Over seeds no run is begun that would end later by the wall
-  /// clock; but for the first. Of one run nothing is added whose CPU time, foretold from its first
-  /// frames, would be too much with that of the others.
+  std::string filter;  ///< the filter whose error is decomposed; "": the first one
+  /// Compute the error decomposition, and add the estimators that it needs to a config.
+  bool decompose = true;
+  /// The comparison is over several seeds, each of which reads the source.
+  bool over_seeds = false;
+  /// Time budget, s. Over seeds, no run except the first is started if it would end after the
+  /// budget (wall clock). For a single run, an estimator is not added if its CPU time, predicted
+  /// from the first frames, would exceed the budget together with the others.
   std::optional<double> budget_s = {};
 };
 
-/// One estimator of a comparison. Values are those of run.json by their keys, where these are
-/// errors from truth, and
+/// One estimator of a comparison. Its values are the metrics of run.json by their keys, if these
+/// are relative to truth, and
 ///
 ///   rmsd:BLOCK                     sqrt(mean |d|^2), d = x (-) x_ref      unit of the block
 ///   final_difference:BLOCK         |d| at the last timestamp
 ///   rmsd.sigmas:OWNER              sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
 ///   final_difference.sigmas:OWNER  the same at the last timestamp
-///   trajectory.sim3.rmsd           RMSD of the trajectory after the similarity that fits best, m
-///   map.rmsd                       rms of the places of landmarks at the end, m
-///   map.sim3.rmsd                  likewise after that similarity of the map, m
+///   trajectory.sim3.rmsd           RMSD of the trajectory after alignment by a similarity, m
+///   map.rmsd                       RMSD of the landmark positions at the end, m
+///   map.sim3.rmsd                  the same after alignment of the map by a similarity, m
 ///   time_us                        wall clock for each measurement
-///   cpu_us                         CPU time for each frame, of a batch without
-///   cpu_us.start                   that of the filter that it starts from; as it is run alone
+///   cpu_us                         CPU time for each frame; for a batch, without cpu_us.start
+///   cpu_us.start                   CPU time of the filter from which a batch starts
 struct ComparedEstimator {
   std::string name, type;
-  bool smoothed = false;        ///< its estimates rest on later data too
-  std::string reference;        ///< of its estimates along the run; "": there is none
+  bool smoothed = false;        ///< its estimates also use later data
+  std::string reference;        ///< of its estimates along the run; "": no reference
   std::string final_reference;  ///< of the last estimate and the map
-  std::int64_t reference_runs = 0, final_reference_runs = 0;  ///< of `used`, those with one
+  /// Number of used runs in which the reference exists.
+  std::int64_t reference_runs = 0, final_reference_runs = 0;
   std::map<std::string, Spread> values;
-  /// By KEY, to the reference: of rmse, final_error, map; and over seeds `mse_by_bound:BLOCK`, mean
-  /// |e|^2 / tr P, P the Cramer-Rao bound, of those that know the past alone.
+  /// Ratios to the reference by KEY: of rmse, final_error and map. Over seeds also
+  /// `mse_by_bound:BLOCK` of an online estimator, the mean of |e|^2 / tr P, P the Cramer-Rao bound.
   std::map<std::string, Ratio> ratios;
   std::map<std::string, std::string> units;  ///< of blocks
-  std::int64_t used = 0;                     ///< runs that values are taken over
-  std::int64_t diverged = 0;                 ///< runs in which it did
-  ErrorSeries series;                        ///< of one run of several
-  OverTime over_time;                        ///< of several runs
-  /// Where the mean over several runs lies with probability 0.95, by KEY: of errors.
+  std::int64_t used = 0;                     ///< number of runs that the values use
+  std::int64_t diverged = 0;                 ///< number of runs in which it diverged
+  ErrorSeries series;                        ///< of one run of several seeds
+  OverTime over_time;                        ///< over several runs
+  /// Interval that contains the mean error over several runs with probability 0.95, by KEY.
   std::map<std::string, Interval> mean_intervals = {};
 };
 
-/// Where a part of the difference between a filter and the batch of all data comes from.
+/// Cause of a part of the difference between a filter and the batch of all data.
 enum class DecompositionKind {
-  kLinearisation,  ///< the filter, compared with the full-information filter over what it accepted
-  kSmoothing,      ///< the filter against a smoother of the same models: what later data add
-  kRejected,       ///< the batch of what the filter accepted against the batch of all data
+  kLinearisation,  ///< filter compared with the full-information filter of the accepted data
+  kSmoothing,      ///< filter compared with a smoother of the same models: gain from later data
+  kRejected,       ///< batch of the accepted data compared with the batch of all data
 };
-/// `linearisation`, `smoothing`, `rejected measurements`.
+/// Returns `linearisation`, `smoothing` or `rejected_measurements`.
 const char* ToString(DecompositionKind kind);
 
-/// One step of the way from the filter to the batch. Values: `rmsd:BLOCK` and `rmsd.sigmas:OWNER`
-/// between the two; `rmse.from:BLOCK`, `rmse.to:BLOCK`, the RMSE from truth; `measurements` and
-/// `rejected` of kRejected. At the end they are of the last frame alone, and of BLOCK `map` and
-/// `map.sim3` too.
+/// One step from the filter to the batch. Values: `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the
+/// two estimators; `rmse.from:BLOCK` and `rmse.to:BLOCK`, their RMSE relative to truth;
+/// `measurements` and `rejected`, of kRejected only. With `at_end` the values are those of the last
+/// frame, and BLOCK may also be `map` or `map.sim3`.
 struct DecompositionStep {
   DecompositionKind kind = DecompositionKind::kLinearisation;
-  std::string from, to;
-  bool at_end = false;  ///< taken at the last frame, for want of a full-information filter
+  std::string from, to;  ///< names of the two estimators
+  bool at_end = false;   ///< at the last frame, because there is no full-information filter
   std::map<std::string, Spread> values;
-  std::map<std::string, Ratio> ratios;  ///< by `rmse:BLOCK`, of `from` to `to`
+  std::map<std::string, Ratio> ratios;  ///< by `rmse:BLOCK`, of `from` relative to `to`
   std::string withheld;                 ///< why there are no values, or ""
 };
 
 struct Comparison {
-  std::int64_t runs = 1;  ///< seeds; values are spread over them
+  std::int64_t runs = 1;  ///< number of seeds, over which the values are spread
   std::int64_t frames = 0;
-  RunStatus status = RunStatus::kOk;  ///< the worst of the runs'; of seeds kOk or kStopped
-  std::string reference;              ///< `truth`, or the first estimator that one is compared with
-  std::string withheld;               ///< why there is no reference, or nothing to compare; or ""
-  std::string measurements_sha256;    ///< of the data; "": of several seeds
+  RunStatus status = RunStatus::kOk;  ///< worst status of the runs; over seeds kOk or kStopped
+  std::string reference;              ///< `truth`, or the first estimator that is a reference
+  std::string withheld;               ///< reason for a missing reference or comparison, or ""
+  std::string measurements_sha256;    ///< of the data; "": several seeds
   std::vector<ComparedEstimator> estimators;
-  std::string decomposed;  ///< the filter whose error it is
+  std::string decomposed;  ///< the filter whose error is decomposed
   std::vector<DecompositionStep> decomposition;
-  std::vector<std::string> notes;  ///< what a reader has to know, a line each
+  std::vector<std::string> notes;  ///< notes for the reader, one line each
 };
 
-/// An experiment with the estimators that decompose the error of a filter.
+/// An experiment with the additional estimators for the error decomposition of a filter.
 struct ComparedExperiment {
-  Config config;  ///< with those that were added
+  Config config;  ///< including the added estimators
   Experiment experiment;
-  std::string filter;              ///< whose error it is; "": there is no filter
-  std::vector<std::string> added;  ///< names
-  std::vector<std::string> notes;  ///< what was added and what could not be, with the reason
-  std::string beyond_budget = {};  ///< of steps of the decomposition that lack it; "": nothing was
+  std::string filter;              ///< whose error is decomposed; "": there is no filter
+  std::vector<std::string> added;  ///< names of the added estimators
+  std::vector<std::string> notes;  ///< added estimators, and missing ones with the reason
+  /// Note for steps that lack an estimator because of the budget; "": the budget excludes none.
+  std::string beyond_budget = {};
 };
 
-/// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
-/// the data up to each frame, of what the filter accepted, and the smoother, each with the filter's
-/// sensors, overrides and steps. What does not support the problem is left out, and of one run what
-/// the budget does not allow for. Errors: those of BuildExperiment; kUsage where `options` names an
-/// estimator that is not there, or one that is no filter as that whose error is decomposed.
+/// Builds the experiment of a config and adds the estimators that its comparison lacks: the batch
+/// of all data, the full-information filter, the batch of the accepted measurements, and the
+/// smoother, each with the sensors, overrides and steps of the filter. An estimator that does not
+/// support the problem is not added, nor, for a single run, one that exceeds the budget. Errors:
+/// those of BuildExperiment; kUsage if `options` names an estimator that does not exist, or if
+/// its filter is not an online filter.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
                                            const CompareOptions& options);
 
-/// Compares the estimators of a run while it runs.
+/// Observer that compares the estimators of a run.
 class RunComparer : public RunObserver {
  public:
-  /// Puts a clock on each estimator of the experiment. `over_seeds`: the run is one of several,
-  /// whose errors are wanted timestamp by timestamp.
+  /// Adds a CPU clock to each estimator of the experiment. `over_seeds`: the run is one of several
+  /// seeds, and its errors are recorded at each timestamp.
   explicit RunComparer(Experiment& experiment, bool over_seeds = false);
   ~RunComparer() override;
   RunComparer(const RunComparer&) = delete;
@@ -128,7 +133,8 @@ class RunComparer : public RunObserver {
   void OnFrame(const SourceFrame& frame) override;
   void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
-  /// Once, after the run. Errors: kUsage where `options` names an estimator that is not there.
+  /// Returns the comparison. Called once, after the run. Errors: kUsage if `options` names an
+  /// estimator that does not exist.
   Comparison Finish(const RunResult& result, const CompareOptions& options);
 
  private:
@@ -136,47 +142,46 @@ class RunComparer : public RunObserver {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Compares the estimators of finished runs, by their folders; names are `FOLDER/NAME` where there
-/// are several. Errors: kUsage where a folder is given twice, kInputMissing, kBadData where they
-/// did not see the same measurements, those of RunComparer.
+/// Compares the estimators of finished runs, read from their folders. With several folders the
+/// names are `FOLDER/NAME`. Errors: kUsage if a folder is given twice; kInputMissing; kBadData if
+/// the runs have different measurements; those of RunComparer.
 Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
                           const CompareOptions& options);
 
-/// A comparison over seeds, and the sweep that it is of.
+/// A comparison over seeds with its sweep.
 struct ComparedSeeds {
   Comparison comparison;
   SweepResult sweep;
-  std::int64_t beyond_budget = 0;  ///< runs that were not begun for want of time
+  std::int64_t beyond_budget = 0;  ///< number of runs that the budget excludes
 };
-/// Runs and compares a config once for each seed; the runs in which an estimator diverged count for
-/// none of its values. Errors: those of Sweep and of RunComparer.
+/// Runs and compares a config once for each seed. The values of an estimator exclude the runs in
+/// which it diverged. Errors: those of Sweep and of RunComparer.
 ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options);
 
-/// The values of comparisons of the same estimators, at least one, as mean and quantiles over them,
-/// and what they tell together.
+/// Summarises comparisons of the same estimators, at least one: mean and quantiles of each value,
+/// and the statistics over all runs.
 Comparison Summarise(const std::vector<Comparison>& comparisons);
 
-/// What the folder of a comparison over several seeds shows besides its tables: report.html, the
-/// figures of errors, average NEES and cost over the seeds, and the csv files that they are drawn
-/// from (docs/compare.md). Returns why figures are missing, or "". `stop` ends the drawing. Errors:
-/// kCannotCreate, kIo.
+/// Writes report.html of a comparison over several seeds, the figures of errors, average NEES and
+/// cost, and their csv files (docs/compare.md). Returns the reason if figures are missing, else "".
+/// `stop` ends the drawing. Errors: kCannotCreate, kIo.
 std::string WriteSeedReport(const internal::OutputFolder& folder, const Comparison& comparison,
                             const Config& config, const std::function<bool()>& stop);
 
-/// How a comparison is written for people.
+/// Format of a report.
 enum class TableStyle { kText, kMarkdown, kLatex, kHtml };
-/// Which rows its tables have: all, or those that a person reads first, errors, their ratios, NEES
-/// and the wall clock (without truth differences), with the number of those left out.
+/// Rows of the tables: all rows, or the main ones with the number of omitted rows. The main rows
+/// are errors, their ratios, NEES and the wall clock; without truth, differences instead of errors.
 enum class ReportRows { kAll, kMain };
-/// Its tables and the error decomposition.
+/// Formats the tables and the error decomposition.
 std::string CompareReport(const Comparison& comparison, TableStyle style,
                           ReportRows rows = ReportRows::kAll);
-/// All values, for other programs (docs/compare.md).
+/// Formats all values as JSON (docs/compare.md).
 std::string CompareJson(const Comparison& comparison);
 
-/// A new folder with compare.json, compare.md and compare.tex. Errors: kCannotCreate where it
-/// exists without `force`, kIo.
+/// Writes compare.json, compare.md and compare.tex into a new folder. Errors: kCannotCreate if the
+/// folder exists and `force` is false, kIo.
 void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder, bool force);
 
 }  // namespace alidade

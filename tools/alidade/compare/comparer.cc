@@ -18,19 +18,20 @@ struct RunComparer::Impl {
   ComparedRun run;
   internal::DataHash data;
   std::vector<std::shared_ptr<internal::CpuTime>> clocks = {};
-  std::vector<internal::ErrorRecorder> errors = {};  ///< empty: they are not wanted
+  std::vector<internal::ErrorRecorder> errors =
+      {};  ///< empty if the run is not one of several seeds
 };
 
 RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
     : impl_(std::make_unique<Impl>(Impl{
           {}, internal::DataHash(experiment.source->streams(), experiment.source->truths())})) {
   for (EstimatorSpec& spec : experiment.estimators) {
-    Candidate& one = impl_->run.estimators.emplace_back();
+    Candidate& candidate = impl_->run.estimators.emplace_back();
     impl_->clocks.push_back(std::make_shared<internal::CpuTime>());
     spec.estimator = internal::WithCpuClock(std::move(spec.estimator), impl_->clocks.back());
     if (over_seeds) impl_->errors.emplace_back(spec, experiment);
-    one.series.blocks = internal::SeriesBlocksOf(spec.problem);
-    one.series.joint = one.series.tangent() <= internal::Series::kMostJoint;
+    candidate.series.blocks = internal::SeriesBlocksOf(spec.problem);
+    candidate.series.joint = candidate.series.tangent() <= internal::Series::kMostJoint;
   }
 }
 
@@ -58,7 +59,7 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     run.estimators[e].result = result.estimators[e];
     run.estimators[e].cpu = *impl_->clocks[e];
-    if (!impl_->errors.empty()) run.estimators[e].errors = impl_->errors[e].Take();
+    if (!impl_->errors.empty()) run.estimators[e].errors = impl_->errors[e].Finish();
     run.estimators[e].had_rejection_recovery =
         std::ranges::count(result.estimators[e].events, "rejection_recovery", &Event::kind) > 0;
     run.estimators[e].result.events.clear();
@@ -82,12 +83,12 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
   for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
   std::vector<std::string> notes = internal::CheckSameData(runs);
   for (const ComparedRun& run : runs) {
-    for (const Candidate& one : run.estimators) {
-      if (one.not_finite == 0) continue;
-      notes.push_back("'" + (run.folder / one.result.name / "estimates.csv").string() +
-                      "': " + std::to_string(one.not_finite) + " of " +
-                      std::to_string(one.series.timestamps.size()) +
-                      " rows have values that are not finite; the comparison leaves these out");
+    for (const Candidate& candidate : run.estimators) {
+      if (candidate.not_finite_rows == 0) continue;
+      notes.push_back("'" + (run.folder / candidate.result.name / "estimates.csv").string() +
+                      "': " + std::to_string(candidate.not_finite_rows) + " of " +
+                      std::to_string(candidate.series.timestamps.size()) +
+                      " rows have values that are not finite; the comparison ignores them");
     }
     if (run.status == RunStatus::kOk) continue;
     notes.push_back("'" + run.folder.string() + "' " + ToString(run.status) + ": " + run.reason);
@@ -103,39 +104,39 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
   std::map<std::uint64_t, Comparison> by_seed;
   internal::RunBudget budget(options.budget_s);
   const auto stopped = [&] { return sweep.stop && sweep.stop(); };
-  SweepOptions with = sweep;
-  with.stop = [&] { return stopped() || budget.spent(); };
-  with.run = [&](Experiment& experiment, const RunOptions& given) {
+  SweepOptions sweep_options = sweep;
+  sweep_options.stop = [&] { return stopped() || budget.is_spent(); };
+  sweep_options.run = [&](Experiment& experiment, const RunOptions& original) {
     RunComparer comparer(experiment, true);
-    RunOptions observed = given;
+    RunOptions observed = original;
     observed.observers.push_back(&comparer);
-    observed.stop = stopped;  // a run that has begun ends within the budget, about
-    const double begun_s = budget.elapsed_s();
+    observed.stop = stopped;  // a started run is finished, because the budget allows for it
+    const double start_s = budget.elapsed_s();
     RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);
-    budget.Note(budget.elapsed_s() - begun_s);
-    const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
-    if (!whole) return result;
-    CompareOptions of_run = options;
-    of_run.filter = compared.filter;
-    Comparison comparison = comparer.Finish(result, of_run);
+    budget.RecordRun(budget.elapsed_s() - start_s);
+    const bool is_finished = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
+    if (!is_finished) return result;
+    CompareOptions run_options = options;
+    run_options.filter = compared.filter;
+    Comparison comparison = comparer.Finish(result, run_options);
     const std::lock_guard lock(mutex);
     by_seed.emplace(experiment.seed, std::move(comparison));
     return result;
   };
-  ComparedSeeds seeds{{}, Sweep(compared.config, host, with)};
-  const std::int64_t done = std::ssize(seeds.sweep.done);
+  ComparedSeeds seeds{{}, Sweep(compared.config, host, sweep_options)};
+  const std::int64_t finished = std::ssize(seeds.sweep.done);
   std::vector<Comparison> comparisons;
   for (auto& [seed, comparison] : by_seed) comparisons.push_back(std::move(comparison));
   if (!comparisons.empty()) seeds.comparison = Summarise(comparisons);
   if (seeds.sweep.stopped && stopped()) {
     seeds.comparison.status = RunStatus::kStopped;
   } else if (seeds.sweep.stopped) {
-    seeds.beyond_budget = seeds.sweep.runs - done;
+    seeds.beyond_budget = seeds.sweep.runs - finished;
     seeds.comparison.notes.push_back(
-        "the budget of " + internal::RoundedText(*options.budget_s, 3) + " s was enough for " +
-        std::to_string(done) + " of " + std::to_string(seeds.sweep.runs) +
-        " runs; left out: seeds from " +
-        std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(done)) + " on");
+        "the budget of " + internal::RoundedText(*options.budget_s, 3) + " s sufficed for " +
+        std::to_string(finished) + " of " + std::to_string(seeds.sweep.runs) +
+        " runs; not run: seeds from " +
+        std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(finished)));
   }
   return seeds;
 }

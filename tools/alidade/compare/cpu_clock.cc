@@ -9,38 +9,38 @@
 namespace alidade::internal {
 namespace {
 
-/// What two readings in a row are apart at least, s.
+/// Returns the minimum time between two consecutive readings of the clock, s.
 double ReadingSeconds() {
-  double least = 1.0;
+  double minimum_s = 1.0;
   for (int i = 0; i < 50; ++i) {
     const double first = ThreadCpuSeconds();
-    least = std::min(least, ThreadCpuSeconds() - first);
+    minimum_s = std::min(minimum_s, ThreadCpuSeconds() - first);
   }
-  return least;
+  return minimum_s;
 }
 
-class ClockedEstimator : public Estimator {
+class EstimatorWithCpuClock : public Estimator {
  public:
-  ClockedEstimator(std::unique_ptr<Estimator> estimator, std::shared_ptr<CpuTime> time)
+  EstimatorWithCpuClock(std::unique_ptr<Estimator> estimator, std::shared_ptr<CpuTime> time)
       : estimator_(std::move(estimator)), time_(std::move(time)), reading_s_(ReadingSeconds()) {}
 
   void Start(Timestamp timestamp) override { estimator_->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override {
-    const double started = ThreadCpuSeconds();
+    const double start = ThreadCpuSeconds();
     const UpdateReport& report = estimator_->Process(frame);
-    time_->frames_s += Since(started);
+    time_->frames_s += SecondsSince(start);
     return report;
   }
   bool offline() const override { return estimator_->offline(); }
   void Smooth(const Emit& emit) override {
-    double works_since = ThreadCpuSeconds();
-    const auto take = [&](std::size_t index, const State& state, const UpdateReport& report) {
-      time_->smoothing_s += Since(works_since);
+    double segment_start = ThreadCpuSeconds();
+    const auto forward = [&](std::size_t index, const State& state, const UpdateReport& report) {
+      time_->smoothing_s += SecondsSince(segment_start);
       emit(index, state, report);
-      works_since = ThreadCpuSeconds();
+      segment_start = ThreadCpuSeconds();
     };
-    estimator_->Smooth(take);
-    time_->smoothing_s += Since(works_since);
+    estimator_->Smooth(forward);
+    time_->smoothing_s += SecondsSince(segment_start);
   }
   void StopWhen(const std::function<bool()>& stop) override { estimator_->StopWhen(stop); }
   std::unique_ptr<Estimator> Clone() const override { return estimator_->Clone(); }
@@ -51,8 +51,8 @@ class ClockedEstimator : public Estimator {
   bool failed() const override { return estimator_->failed(); }
 
  private:
-  double Since(double started) const {
-    return std::max(0.0, ThreadCpuSeconds() - started - reading_s_);
+  double SecondsSince(double start) const {
+    return std::max(0.0, ThreadCpuSeconds() - start - reading_s_);
   }
 
   std::unique_ptr<Estimator> estimator_;
@@ -70,7 +70,7 @@ double ThreadCpuSeconds() {
 
 std::unique_ptr<Estimator> WithCpuClock(std::unique_ptr<Estimator> estimator,
                                         std::shared_ptr<CpuTime> time) {
-  return std::make_unique<ClockedEstimator>(std::move(estimator), std::move(time));
+  return std::make_unique<EstimatorWithCpuClock>(std::move(estimator), std::move(time));
 }
 
 }  // namespace alidade::internal

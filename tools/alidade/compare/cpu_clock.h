@@ -7,16 +7,17 @@
 
 namespace alidade::internal {
 
-/// CPU time of the calling thread, s, since some time before.
+/// Returns the CPU time of the calling thread since an arbitrary origin, s.
 double ThreadCpuSeconds();
 
-/// CPU time of the thread of an estimator, without what it takes to read the clock.
+/// CPU time of an estimator, without the time for reading the clock.
 struct CpuTime {
-  double frames_s = 0.0;     ///< in its frames
-  double smoothing_s = 0.0;  ///< after the last frame, without what takes its estimates
+  double frames_s = 0.0;     ///< processing of the frames
+  double smoothing_s = 0.0;  ///< after the last frame, without the receiver of the estimates
 };
 
-/// `estimator` with a clock that adds to `time`; it works as before. A copy has no clock.
+/// Returns `estimator` with a clock that adds to `time`. Its results do not change. A clone has no
+/// clock.
 std::unique_ptr<Estimator> WithCpuClock(std::unique_ptr<Estimator> estimator,
                                         std::shared_ptr<CpuTime> time);
 

@@ -8,158 +8,170 @@
 namespace alidade::internal {
 namespace {
 
-/// The estimators that the steps are taken between; null: not there.
-struct Partners {
+/// The estimators between which the steps are computed; null if one is missing.
+struct StepEstimators {
   const Candidate* full_information = nullptr;  ///< the full-information filter
-  const Candidate* smoother = nullptr;  ///< of the same models, linearised where the filter was
-  const Candidate* accepted = nullptr;  ///< the batch of all that the filter accepted
+  const Candidate* smoother =
+      nullptr;  ///< of the same models, with the linearisation of the filter
+  const Candidate* accepted = nullptr;  ///< the batch of the accepted measurements
   const Candidate* all = nullptr;       ///< the batch of all data
 };
 
-Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candidates) {
-  Partners found;
-  const auto keep = [](const Candidate*& place, const Candidate& one) {
-    const bool better = place != nullptr && !place->usable() && one.usable();
-    if (place == nullptr || better) place = &one;
+StepEstimators FindStepEstimators(const Candidate& filter,
+                                  const std::vector<Candidate>& candidates) {
+  StepEstimators found;
+  const auto select = [](const Candidate*& selected, const Candidate& candidate) {
+    const bool is_better = selected != nullptr && !selected->is_usable() && candidate.is_usable();
+    if (selected == nullptr || is_better) selected = &candidate;
   };
-  for (const Candidate& one : candidates) {
-    const EstimatorResult& result = one.result;
-    if (!SameSystem(result, filter.result)) continue;
-    const bool by_filter = one.run == filter.run && result.accepted_by == filter.result.name;
+  for (const Candidate& candidate : candidates) {
+    const EstimatorResult& result = candidate.result;
+    if (!HaveSameProblem(result, filter.result)) continue;
+    const bool by_filter = candidate.run == filter.run && result.accepted_by == filter.result.name;
     if (!result.accepted_by.empty() && !by_filter) continue;
-    if (!one.batch() && SmoothsAllData(result) && !by_filter) keep(found.smoother, one);
-    if (!one.batch()) continue;
-    if (result.smoothed) keep(by_filter ? found.accepted : found.all, one);
-    // What the filter did not accept is another step's.
-    const bool better = by_filter && one.usable() && found.full_information != nullptr &&
-                        found.full_information->result.accepted_by.empty();
-    if (!result.smoothed && better) found.full_information = &one;
-    if (!result.smoothed) keep(found.full_information, one);
+    if (!candidate.is_batch() && SmoothsAllData(result) && !by_filter) {
+      select(found.smoother, candidate);
+    }
+    if (!candidate.is_batch()) continue;
+    if (result.smoothed) select(by_filter ? found.accepted : found.all, candidate);
+    // A full-information filter of the accepted measurements is preferred, because another step
+    // covers the rejected ones.
+    const bool is_better = by_filter && candidate.is_usable() &&
+                           found.full_information != nullptr &&
+                           found.full_information->result.accepted_by.empty();
+    if (!result.smoothed && is_better) found.full_information = &candidate;
+    if (!result.smoothed) select(found.full_information, candidate);
   }
   return found;
 }
 
-/// What an error is of, BLOCK of `rmse:BLOCK`, at the end of `final_error:BLOCK`, or `map`; "": it
-/// is not one that a step compares.
+/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`; at the end, BLOCK of
+/// `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step does not compare the metric.
 std::string SubjectOf(const std::string& metric, bool at_end) {
   if (at_end && metric == "map.rmse") return "map";
   if (at_end && metric == "map.sim3.rmse") return "map.sim3";
   const std::string kind = at_end ? "final_error:" : "rmse:";
-  const bool whole = metric.starts_with(kind) && metric.find('@') == metric.npos;
-  return whole ? metric.substr(kind.size()) : "";
+  const bool is_error = metric.starts_with(kind) && metric.find('@') == metric.npos;
+  return is_error ? metric.substr(kind.size()) : "";
 }
 
-void AddErrors(const EstimatorResult& from, const EstimatorResult& to, DecompositionStep& step) {
-  for (const auto& [key, error] : from.metrics) {
+void AddErrors(const EstimatorResult& start, const EstimatorResult& end, DecompositionStep& step) {
+  for (const auto& [key, error] : start.metrics) {
     const std::string subject = SubjectOf(key, step.at_end);
-    const auto other = to.metrics.find(key);
-    if (subject.empty() || other == to.metrics.end()) continue;
-    step.values["rmse.from:" + subject] = Single(error);
-    step.values["rmse.to:" + subject] = Single(other->second);
-    if (other->second > 0.0 && std::isfinite(other->second)) {
-      step.ratios["rmse:" + subject] = {error, other->second};
+    const auto end_error = end.metrics.find(key);
+    if (subject.empty() || end_error == end.metrics.end()) continue;
+    step.values["rmse.from:" + subject] = SingleValue(error);
+    step.values["rmse.to:" + subject] = SingleValue(end_error->second);
+    if (end_error->second > 0.0 && std::isfinite(end_error->second)) {
+      step.ratios["rmse:" + subject] = {error, end_error->second};
     }
   }
 }
 
-/// The step between two; `missing` says what there is to be for it.
-DecompositionStep Between(DecompositionKind kind, const Candidate* from, const Candidate* to,
-                          bool with_truth, const char* missing, bool at_end = false) {
+/// Computes the step between two estimators. `missing_reason` is the reason for a withheld step if
+/// an estimator is null.
+DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, const Candidate* end,
+                              bool with_truth, const char* missing_reason, bool at_end = false) {
   DecompositionStep step;
   step.kind = kind;
   step.at_end = at_end;
-  if (from != nullptr) step.from = from->name;
-  if (to != nullptr) step.to = to->name;
-  if (from == nullptr || to == nullptr) {
-    step.withheld = missing;
+  if (start != nullptr) step.from = start->name;
+  if (end != nullptr) step.to = end->name;
+  if (start == nullptr || end == nullptr) {
+    step.withheld = missing_reason;
     return step;
   }
-  for (const Candidate* const one : {from, to}) {
-    if (!one->usable()) step.withheld = "'" + one->name + "' failed";
+  for (const Candidate* const candidate : {start, end}) {
+    if (!candidate->is_usable()) step.withheld = "'" + candidate->name + "' failed";
   }
   if (!step.withheld.empty()) return step;
-  const Distance distance = DistanceBetween(from->series, to->series);
+  const Distance distance = DistanceBetween(start->series, end->series);
   for (const auto& [block, d] : at_end ? distance.final : distance.rms) {
-    step.values["rmsd:" + block] = Single(d);
+    step.values["rmsd:" + block] = SingleValue(d);
   }
   for (const auto& [owner, sigmas] : at_end ? distance.final_sigmas : distance.sigmas) {
-    step.values["rmsd.sigmas:" + owner] = Single(sigmas);
+    step.values["rmsd.sigmas:" + owner] = SingleValue(sigmas);
   }
   if (at_end) {
-    for (const auto& [map, d] : DistanceBetweenMaps(from->result, to->result)) {
-      step.values["rmsd:" + map] = Single(d);
+    for (const auto& [map, d] : DistanceBetweenMaps(start->result, end->result)) {
+      step.values["rmsd:" + map] = SingleValue(d);
     }
   }
-  const bool truth = from->run->reference == "truth" && to->run->reference == "truth";
-  if (with_truth && truth) AddErrors(from->result, to->result, step);
+  const bool has_truth = start->run->reference == "truth" && end->run->reference == "truth";
+  if (with_truth && has_truth) AddErrors(start->result, end->result, step);
   return step;
 }
 
-/// The filter against the full-information filter. Where there is none, as with landmarks, at the
-/// last frame against a batch of all data: there the two are the same.
-DecompositionStep Linearisation(const Candidate& filter, const Partners& partners,
-                                bool with_truth) {
-  const bool accepted = partners.accepted != nullptr && partners.accepted->usable();
-  const Candidate* const of_end = accepted ? partners.accepted : partners.all;
-  const bool at_end = partners.full_information == nullptr && of_end != nullptr;
-  return Between(DecompositionKind::kLinearisation, &filter,
-                 at_end ? of_end : partners.full_information, with_truth,
-                 "there is no full-information filter, {type: BATCH, mode: filtering}", at_end);
+/// Compares the filter with the full-information filter. Without one, as with landmarks, compares
+/// the filter at the last frame with a batch of all data, which equals the full-information filter
+/// there.
+DecompositionStep LinearisationStep(const Candidate& filter, const StepEstimators& estimators,
+                                    bool with_truth) {
+  const bool has_accepted = estimators.accepted != nullptr && estimators.accepted->is_usable();
+  const Candidate* const batch = has_accepted ? estimators.accepted : estimators.all;
+  const bool at_end = estimators.full_information == nullptr && batch != nullptr;
+  return ComputeStep(DecompositionKind::kLinearisation, &filter,
+                     at_end ? batch : estimators.full_information, with_truth,
+                     "there is no full-information filter, {type: BATCH, mode: filtering}", at_end);
 }
 
 }  // namespace
 
-bool SameSensors(const EstimatorResult& a, const EstimatorResult& b) {
+bool HaveSameSensors(const EstimatorResult& a, const EstimatorResult& b) {
   return std::ranges::is_permutation(a.sensors, b.sensors);
 }
 
-bool SameSystem(const EstimatorResult& a, const EstimatorResult& b) {
-  return a.overrides == b.overrides && SameSensors(a, b);
+bool HaveSameProblem(const EstimatorResult& a, const EstimatorResult& b) {
+  return a.overrides == b.overrides && HaveSameSensors(a, b);
 }
 
 std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
                                                   const EstimatorResult& reference) {
   if (!map.landmarks || !reference.landmarks) return {};
-  Eigen::Matrix3Xd points(3, std::ssize(*map.landmarks)), onto = points;
+  Eigen::Matrix3Xd points(3, std::ssize(*map.landmarks)), reference_points = points;
   Eigen::Index count = 0;
-  for (const LandmarkEstimate& one : *map.landmarks) {
-    for (const LandmarkEstimate& other : *reference.landmarks) {
-      const bool same = one.id == other.id && one.generation == other.generation;
-      if (!same || !one.position.allFinite() || !other.position.allFinite()) continue;
-      points.col(count) = one.position;
-      onto.col(count++) = other.position;
+  for (const LandmarkEstimate& landmark : *map.landmarks) {
+    for (const LandmarkEstimate& candidate : *reference.landmarks) {
+      const bool is_same =
+          landmark.id == candidate.id && landmark.generation == candidate.generation;
+      if (!is_same || !landmark.position.allFinite() || !candidate.position.allFinite()) continue;
+      points.col(count) = landmark.position;
+      reference_points.col(count++) = candidate.position;
       break;
     }
   }
   if (count == 0) return {};
   points.conservativeResize(Eigen::NoChange, count);
-  onto.conservativeResize(Eigen::NoChange, count);
+  reference_points.conservativeResize(Eigen::NoChange, count);
   std::map<std::string, double> distances;
-  distances["map"] = std::sqrt((points - onto).squaredNorm() / static_cast<double>(count));
-  if (const auto aligned = AlignBySimilarity(points, onto)) distances["map.sim3"] = aligned->rmse;
+  distances["map"] =
+      std::sqrt((points - reference_points).squaredNorm() / static_cast<double>(count));
+  if (const auto aligned = AlignBySimilarity(points, reference_points))
+    distances["map.sim3"] = aligned->rmse;
   return distances;
 }
 
 std::vector<DecompositionStep> Decompose(const Candidate& filter,
                                          const std::vector<Candidate>& candidates,
                                          bool with_truth) {
-  const Partners partners = PartnersOf(filter, candidates);
-  std::vector<DecompositionStep> steps = {Linearisation(filter, partners, with_truth)};
-  const bool smoother = partners.smoother != nullptr && partners.smoother->usable();
+  const StepEstimators estimators = FindStepEstimators(filter, candidates);
+  std::vector<DecompositionStep> steps = {LinearisationStep(filter, estimators, with_truth)};
+  const bool has_smoother = estimators.smoother != nullptr && estimators.smoother->is_usable();
+  steps.push_back(ComputeStep(
+      DecompositionKind::kSmoothing, has_smoother ? &filter : estimators.full_information,
+      has_smoother                     ? estimators.smoother
+      : estimators.accepted != nullptr ? estimators.accepted
+                                       : estimators.all,
+      with_truth,
+      "there is neither a smoother, {type: rts}, nor a batch of all data with a "
+      "full-information filter"));
   steps.push_back(
-      Between(DecompositionKind::kSmoothing, smoother ? &filter : partners.full_information,
-              smoother                       ? partners.smoother
-              : partners.accepted != nullptr ? partners.accepted
-                                             : partners.all,
-              with_truth,
-              "there is neither a smoother, {type: rts}, nor a batch of all data with a "
-              "full-information filter"));
-  steps.push_back(Between(DecompositionKind::kRejected, partners.accepted, partners.all, with_truth,
-                          "there are no two batches, of all data and of what it accepted, {type: "
-                          "BATCH, use: {accepted_by: FILTER}}"));
-  const std::int64_t all = filter.measurements(), used = filter.used();
-  steps.back().values["measurements"] = Single(static_cast<double>(all));
-  steps.back().values["rejected"] = Single(static_cast<double>(all - used));
+      ComputeStep(DecompositionKind::kRejected, estimators.accepted, estimators.all, with_truth,
+                  "the batch of all data or that of the accepted measurements is missing, "
+                  "{type: BATCH, use: {accepted_by: FILTER}}"));
+  const std::int64_t count = filter.measurements(), used = filter.used();
+  steps.back().values["measurements"] = SingleValue(static_cast<double>(count));
+  steps.back().values["rejected"] = SingleValue(static_cast<double>(count - used));
   return steps;
 }
 

@@ -12,33 +12,35 @@
 namespace alidade::internal {
 namespace {
 
-/// A block that both series have: where it is in each, by ambient and tangent elements.
-struct Shared {
+/// A block of both series with its offsets in their rows.
+struct SharedBlock {
   const SeriesBlock* block;
-  int value, reference_value, reference_tangent;
-  bool reference_constant;
+  int offset;                    ///< of its ambient elements
+  int reference_offset;          ///< of its ambient elements in the reference
+  int reference_tangent_offset;  ///< of its tangent elements in the reference
+  bool reference_is_constant;
 };
 
-/// Without those that are constant in both.
-std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) {
-  std::vector<Shared> shared;
-  int value = 0;
+/// Finds the blocks of both series, except those that are constant in both.
+std::vector<SharedBlock> FindSharedBlocks(const Series& series, const Series& reference) {
+  std::vector<SharedBlock> shared;
+  int offset = 0;
   for (const SeriesBlock& block : series.blocks) {
-    int reference_value = 0, tangent = 0;
-    for (const SeriesBlock& other : reference.blocks) {
-      const bool same = other.name == block.name && other.geometry == block.geometry;
-      if (same && !(block.constant && other.constant)) {
-        shared.push_back({&block, value, reference_value, tangent, other.constant});
+    int reference_offset = 0, tangent_offset = 0;
+    for (const SeriesBlock& candidate : reference.blocks) {
+      const bool is_same = candidate.name == block.name && candidate.geometry == block.geometry;
+      if (is_same && !(block.constant && candidate.constant)) {
+        shared.push_back({&block, offset, reference_offset, tangent_offset, candidate.constant});
       }
-      reference_value += other.geometry.ambient;
-      tangent += other.geometry.tangent;
+      reference_offset += candidate.geometry.ambient;
+      tangent_offset += candidate.geometry.tangent;
     }
-    value += block.geometry.ambient;
+    offset += block.geometry.ambient;
   }
   return shared;
 }
 
-/// Rows of both series that have the same timestamp, in the order of time.
+/// Returns the pairs of rows with equal timestamps, in the order of time.
 std::vector<std::pair<std::size_t, std::size_t>> SharedRows(const Series& a, const Series& b) {
   std::vector<std::pair<std::size_t, std::size_t>> rows;
   for (std::size_t i = 0, j = 0; i < a.timestamps.size() && j < b.timestamps.size();) {
@@ -57,95 +59,97 @@ const double* RowOf(const Series& series, std::size_t row, int offset) {
   return series.values.data() + row * static_cast<std::size_t>(series.ambient()) + offset;
 }
 
-/// The blocks of one owner that the reference is uncertain of, jointly.
-struct Joint {
+/// The blocks of one owner with a joint covariance in the reference.
+struct OwnerBlocks {
   std::string owner;
-  std::vector<const Shared*> blocks;
-  double sum = 0.0, last = -1.0;
-  std::int64_t count = 0;
+  std::vector<const SharedBlock*> blocks;
+  double sum = 0.0;        ///< of d' P_ref^-1 d / dof
+  double last = -1.0;      ///< its square root at the last timestamp; -1: P_ref is singular
+  std::int64_t count = 0;  ///< number of timestamps in the sum
 };
 
-std::vector<Joint> JointsOf(const std::vector<Shared>& shared) {
-  std::vector<Joint> joints;
-  for (const Shared& one : shared) {
-    if (one.reference_constant) continue;
-    const std::string owner = one.block->owner();
-    auto joint = std::ranges::find(joints, owner, &Joint::owner);
-    if (joint == joints.end()) joint = joints.insert(joint, {owner, {}});
-    joint->blocks.push_back(&one);
+std::vector<OwnerBlocks> GroupByOwner(const std::vector<SharedBlock>& shared) {
+  std::vector<OwnerBlocks> groups;
+  for (const SharedBlock& block : shared) {
+    if (block.reference_is_constant) continue;
+    const std::string owner = block.block->owner();
+    auto group = std::ranges::find(groups, owner, &OwnerBlocks::owner);
+    if (group == groups.end()) group = groups.insert(group, {owner, {}});
+    group->blocks.push_back(&block);
   }
-  return joints;
+  return groups;
 }
 
-/// P of the reference of the blocks of a joint.
-Eigen::MatrixXd CovarianceOf(const Joint& joint, const Series& reference, std::size_t row) {
-  const Eigen::MatrixXd all = reference.Covariance(row, 0, reference.tangent());
+/// Returns P_ref of the blocks of one owner.
+Eigen::MatrixXd CovarianceOf(const OwnerBlocks& group, const Series& reference, std::size_t row) {
+  const Eigen::MatrixXd covariance = reference.Covariance(row, 0, reference.tangent());
   std::vector<int> elements;
-  for (const Shared* const one : joint.blocks) {
-    for (int i = 0; i < one->block->geometry.tangent; ++i) {
-      elements.push_back(one->reference_tangent + i);
+  for (const SharedBlock* const block : group.blocks) {
+    for (int i = 0; i < block->block->geometry.tangent; ++i) {
+      elements.push_back(block->reference_tangent_offset + i);
     }
   }
-  return all(elements, elements);
+  return covariance(elements, elements);
 }
 
 }  // namespace
 
 Distance DistanceBetween(const Series& series, const Series& reference) {
-  const std::vector<Shared> shared = SharedBlocks(series, reference);
-  std::vector<Joint> joints = JointsOf(shared);
+  const std::vector<SharedBlock> shared = FindSharedBlocks(series, reference);
+  std::vector<OwnerBlocks> groups = GroupByOwner(shared);
   std::map<std::string, std::pair<double, std::int64_t>> squares;
   Distance distance;
-  std::map<const Shared*, Eigen::VectorXd> d;
+  std::map<const SharedBlock*, Eigen::VectorXd> d;
   for (const auto& [row, reference_row] : SharedRows(series, reference)) {
-    for (const Shared& one : shared) {
-      const Geometry& geometry = one.block->geometry;
-      Eigen::VectorXd& error = d[&one];
+    for (const SharedBlock& block : shared) {
+      const Geometry& geometry = block.block->geometry;
+      const std::string& name = block.block->name;
+      Eigen::VectorXd& error = d[&block];
       error.resize(geometry.tangent);
-      geometry.Minus(RowOf(series, row, one.value),
-                     RowOf(reference, reference_row, one.reference_value), error.data());
+      geometry.Minus(RowOf(series, row, block.offset),
+                     RowOf(reference, reference_row, block.reference_offset), error.data());
       if (!error.allFinite()) continue;
-      squares[one.block->name].first += error.squaredNorm();
-      ++squares[one.block->name].second;
-      distance.final[one.block->name] = error.norm();
+      squares[name].first += error.squaredNorm();
+      ++squares[name].second;
+      distance.final[name] = error.norm();
     }
-    for (Joint& joint : joints) {
-      const Eigen::MatrixXd p = CovarianceOf(joint, reference, reference_row);
+    for (OwnerBlocks& group : groups) {
+      const Eigen::MatrixXd p = CovarianceOf(group, reference, reference_row);
       Eigen::VectorXd error(p.rows());
-      Eigen::Index at = 0;
-      for (const Shared* const one : joint.blocks) {
-        error.segment(at, d[one].size()) = d[one];
-        at += d[one].size();
+      Eigen::Index offset = 0;
+      for (const SharedBlock* const block : group.blocks) {
+        error.segment(offset, d[block].size()) = d[block];
+        offset += d[block].size();
       }
       const double square = SquaredMahalanobis(p, error);
-      joint.last =
+      group.last =
           std::isnan(square) ? -1.0 : std::sqrt(square / static_cast<double>(error.size()));
       if (std::isnan(square)) continue;
-      joint.sum += square / static_cast<double>(error.size());
-      ++joint.count;
+      group.sum += square / static_cast<double>(error.size());
+      ++group.count;
     }
   }
   for (const auto& [name, sum] : squares) {
     distance.rms[name] = std::sqrt(sum.first / static_cast<double>(sum.second));
   }
-  for (const Joint& joint : joints) {
-    if (joint.count == 0) continue;
-    distance.sigmas[joint.owner] = std::sqrt(joint.sum / static_cast<double>(joint.count));
-    if (joint.last >= 0.0) distance.final_sigmas[joint.owner] = joint.last;
+  for (const OwnerBlocks& group : groups) {
+    if (group.count == 0) continue;
+    distance.sigmas[group.owner] = std::sqrt(group.sum / static_cast<double>(group.count));
+    if (group.last >= 0.0) distance.final_sigmas[group.owner] = group.last;
   }
   return distance;
 }
 
 std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
                                                const std::string& block) {
-  for (const Shared& one : SharedBlocks(series, reference)) {
-    if (one.block->name != block || one.block->geometry != Geometry::Vector(3)) continue;
+  for (const SharedBlock& shared : FindSharedBlocks(series, reference)) {
+    if (shared.block->name != block || shared.block->geometry != Geometry::Vector(3)) continue;
     TrajectoryAlignment alignment;
     for (const auto& [row, reference_row] : SharedRows(series, reference)) {
-      const Eigen::Map<const Eigen::Vector3d> point(RowOf(series, row, one.value));
-      const Eigen::Map<const Eigen::Vector3d> onto(
-          RowOf(reference, reference_row, one.reference_value));
-      if (point.allFinite() && onto.allFinite()) alignment.Add(point, onto);
+      const Eigen::Map<const Eigen::Vector3d> point(RowOf(series, row, shared.offset));
+      const Eigen::Map<const Eigen::Vector3d> reference_point(
+          RowOf(reference, reference_row, shared.reference_offset));
+      if (point.allFinite() && reference_point.allFinite()) alignment.Add(point, reference_point);
     }
     return alignment.Result();
   }

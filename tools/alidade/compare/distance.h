@@ -10,21 +10,22 @@
 
 namespace alidade::internal {
 
-/// How far the estimates of one series are from those of a reference, over the timestamps of both.
-/// With d = x (-) x_ref in the tangent at the reference:
+/// Distance of the estimates of one series from those of a reference, over their common timestamps,
+/// with d = x (-) x_ref in the tangent space at the reference.
 struct Distance {
   std::map<std::string, double> rms;    ///< by block: sqrt(mean |d|^2)
   std::map<std::string, double> final;  ///< by block: |d| at the last timestamp
-  /// By owner: sqrt(mean d' P_ref^-1 d / dof), in standard deviations of the reference; where P_ref
-  /// is singular a timestamp is left out.
+  /// By owner: sqrt(mean d' P_ref^-1 d / dof), in standard deviations of the reference. Timestamps
+  /// with a singular P_ref are skipped.
   std::map<std::string, double> sigmas;
   std::map<std::string, double> final_sigmas;  ///< by owner, at the last timestamp
 };
 
-/// Blocks are the same where name and geometry are.
+/// Computes the distance of two series. Blocks correspond if their name and geometry are equal.
 Distance DistanceBetween(const Series& series, const Series& reference);
 
-/// Of the trajectories that two series have of a vector block of three elements.
+/// Aligns the trajectories of a vector block of three elements in two series. Returns nullopt if
+/// there is no such block, or the points do not determine a similarity.
 std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
                                                const std::string& block);
 

@@ -14,13 +14,13 @@ namespace {
 
 constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 
-/// The even rows of a table with so many columns.
-void KeepEvenRows(std::size_t columns, std::vector<double>& cells) {
-  std::size_t kept = 0;
+/// Removes the odd rows of a table with that number of columns.
+void RemoveOddRowsOf(std::size_t columns, std::vector<double>& cells) {
+  std::size_t count = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (i / columns % 2 == 0) cells[kept++] = cells[i];
+    if (i / columns % 2 == 0) cells[count++] = cells[i];
   }
-  cells.resize(kept);
+  cells.resize(count);
 }
 
 }  // namespace
@@ -31,36 +31,37 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
   const StateLayout& layout = spec.problem.layout;
   const std::vector<int> match = MatchTruths(layout, truths);
   for (BlockId id = 0; id < std::ssize(match); ++id) {
-    const int of = match[static_cast<std::size_t>(id)];
-    if (of < 0) continue;
-    const auto truth = static_cast<std::size_t>(of);
+    const int truth_index = match[static_cast<std::size_t>(id)];
+    if (truth_index < 0) continue;
+    const auto truth = static_cast<std::size_t>(truth_index);
     const double sigma =
         experiment.truth_sigmas.empty() ? truths[truth].sigma : experiment.truth_sigmas.at(truth);
     const std::string& owner = layout[id].owner;
-    const auto place = std::ranges::find(series_.owners, owner);
-    tracked_.push_back(
-        {id, truth, static_cast<std::size_t>(place - series_.owners.begin()), sigma * sigma});
-    tracked_.back().error.resize(layout[id].geometry().tangent);
-    if (place == series_.owners.end()) series_.owners.push_back(owner);
+    const auto position = std::ranges::find(series_.owners, owner);
+    blocks_.push_back(
+        {id, truth, static_cast<std::size_t>(position - series_.owners.begin()), sigma * sigma});
+    blocks_.back().error.resize(layout[id].geometry().tangent);
+    if (position == series_.owners.end()) series_.owners.push_back(owner);
     series_.blocks.push_back(layout[id].name);
     const std::vector<bool> angles = AreAngles(layout[id].geometry());
     series_.angles.push_back(std::ranges::find(angles, false) == angles.end());
   }
   const bool online = spec.kind == EstimatorKind::kFilter ||
                       (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
-  if (!online || tracked_.empty()) return;
-  series_.no_bound = CramerRaoBound::WhyUnavailable(spec.problem, truths);
-  if (!series_.no_bound.empty()) return;
+  if (!online || blocks_.empty()) return;
+  series_.no_bound_reason = CramerRaoBound::WhyUnavailable(spec.problem, truths);
+  if (!series_.no_bound_reason.empty()) return;
   const Source* source = experiment.source.get();
   bound_.emplace(spec.problem, experiment.source->streams(), truths,
                  [source](std::int64_t id) { return source->TrueLandmark(id); });
 }
 
-ErrorSeries ErrorRecorder::Take() {
-  for (std::size_t i = 0; bound_ && i < tracked_.size(); ++i) {
-    const Tracked& one = tracked_[i];
-    if (one.with_bound == 0) continue;
-    series_.by_bound[series_.blocks[i]] = one.sum_by_bound / static_cast<double>(one.with_bound);
+ErrorSeries ErrorRecorder::Finish() {
+  for (std::size_t i = 0; bound_ && i < blocks_.size(); ++i) {
+    const TrackedBlock& tracked = blocks_[i];
+    if (tracked.bound_count == 0) continue;
+    series_.by_bound[series_.blocks[i]] =
+        tracked.sum_by_bound / static_cast<double>(tracked.bound_count);
   }
   return std::move(series_);
 }
@@ -68,65 +69,67 @@ ErrorSeries ErrorRecorder::Take() {
 bool ErrorRecorder::AddBound(const SourceFrame& frame) {
   if (!bound_->Add(frame)) return false;
   const State& state = bound_->state();
-  for (Tracked& one : tracked_) {
-    const Block& block = state.layout()[one.id];
-    one.bound = 0.0;
+  for (TrackedBlock& tracked : blocks_) {
+    const Block& block = state.layout()[tracked.id];
+    tracked.bound = 0.0;
     for (int i = 0; block.present && i < block.geometry().tangent; ++i) {
-      one.bound += state.sigma(one.id, i) * state.sigma(one.id, i);
+      tracked.bound += state.sigma(tracked.id, i) * state.sigma(tracked.id, i);
     }
-    if (!one.known || !(one.bound > 0.0)) continue;
-    one.sum_by_bound += one.error.squaredNorm() / one.bound;
-    ++one.with_bound;
+    if (!tracked.has_error || !(tracked.bound > 0.0)) continue;
+    tracked.sum_by_bound += tracked.error.squaredNorm() / tracked.bound;
+    ++tracked.bound_count;
   }
   return true;
 }
 
 void ErrorRecorder::Add(const SourceFrame& frame, const State& state) {
-  if (tracked_.empty()) return;
-  for (Tracked& one : tracked_) {
-    one.known = one.truth < frame.truth.size() && !frame.truth[one.truth].empty() &&
-                state.layout()[one.id].present;
-    if (!one.known) continue;
-    state.layout()[one.id].geometry().Minus(frame.truth[one.truth].data(), state.value(one.id),
-                                            one.error.data());
+  if (blocks_.empty()) return;
+  for (TrackedBlock& tracked : blocks_) {
+    const Block& block = state.layout()[tracked.id];
+    tracked.has_error =
+        tracked.truth < frame.truth.size() && !frame.truth[tracked.truth].empty() && block.present;
+    if (!tracked.has_error) continue;
+    block.geometry().Minus(frame.truth[tracked.truth].data(), state.value(tracked.id),
+                           tracked.error.data());
   }
   if (bound_ && !AddBound(frame)) {
     bound_.reset();
     series_.bounds.clear();
-    series_.no_bound =
-        "truth is not known of all blocks and landmarks at all timestamps, or a model is not "
-        "defined there";
+    series_.no_bound_reason =
+        "the truth of a block or landmark is missing at a timestamp, or a model is not defined "
+        "there";
   }
-  if (count_++ % stride_ == 0) Keep(frame.timestamp, state);
+  if (count_++ % stride_ == 0) AppendTimestamp(frame.timestamp, state);
 }
 
-void ErrorRecorder::Keep(Timestamp timestamp, const State& state) {
+void ErrorRecorder::AppendTimestamp(Timestamp timestamp, const State& state) {
   series_.timestamps.push_back(timestamp);
-  for (const Tracked& one : tracked_) {
-    series_.squares.push_back(one.known ? one.error.squaredNorm() : kNoError);
-    if (bound_) series_.bounds.push_back(one.bound);
+  for (const TrackedBlock& tracked : blocks_) {
+    series_.squares.push_back(tracked.has_error ? tracked.error.squaredNorm() : kNoError);
+    if (bound_) series_.bounds.push_back(tracked.bound);
   }
   for (std::size_t owner = 0; owner < series_.owners.size(); ++owner) {
     std::vector<BlockError> errors;
-    for (const Tracked& one : tracked_) {
-      if (one.known && one.owner == owner) {
-        errors.push_back({one.id, &one.error, one.truth_variance});
+    for (const TrackedBlock& tracked : blocks_) {
+      if (tracked.has_error && tracked.owner == owner) {
+        errors.push_back({tracked.id, &tracked.error, tracked.truth_variance});
       }
     }
     const Nees nees = JointNees(state, errors);
     series_.nees.push_back(nees.dof > 0 ? nees.value : kNoError);
     series_.dofs.push_back(nees.dof);
   }
-  if (series_.timestamps.size() == kMost) Thin();
+  if (series_.timestamps.size() == kMaxTimestamps) RemoveOddRows();
 }
 
-void ErrorRecorder::Thin() {
-  for (std::size_t i = 0; 2 * i < kMost; ++i) series_.timestamps[i] = series_.timestamps[2 * i];
-  series_.timestamps.resize(kMost / 2);
-  KeepEvenRows(series_.blocks.size(), series_.squares);
-  KeepEvenRows(series_.blocks.size(), series_.bounds);
-  KeepEvenRows(series_.owners.size(), series_.nees);
-  KeepEvenRows(series_.owners.size(), series_.dofs);
+void ErrorRecorder::RemoveOddRows() {
+  for (std::size_t i = 0; 2 * i < kMaxTimestamps; ++i)
+    series_.timestamps[i] = series_.timestamps[2 * i];
+  series_.timestamps.resize(kMaxTimestamps / 2);
+  RemoveOddRowsOf(series_.blocks.size(), series_.squares);
+  RemoveOddRowsOf(series_.blocks.size(), series_.bounds);
+  RemoveOddRowsOf(series_.owners.size(), series_.nees);
+  RemoveOddRowsOf(series_.owners.size(), series_.dofs);
   stride_ *= 2;
 }
 

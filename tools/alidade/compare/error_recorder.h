@@ -12,39 +12,40 @@
 
 namespace alidade::internal {
 
-/// Follows the errors of one estimator of a run, and of one that knows the past alone the bound
-/// that no such estimator is below: CramerRaoBound. Of a long run every n-th timestamp is kept, n a
-/// power of two, so that memory does not grow with it.
+/// Records the errors of one estimator during a run. For an online estimator it also records the
+/// CramerRaoBound, which no online estimator can fall below. In a long run it retains every n-th
+/// timestamp, n a power of two, so that the memory is bounded.
 class ErrorRecorder {
  public:
-  static constexpr std::size_t kMost = 2048;  ///< timestamps
+  static constexpr std::size_t kMaxTimestamps = 2048;
 
   ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment);
   void Add(const SourceFrame& frame, const State& state);
-  ErrorSeries Take();
+  /// Returns the recorded errors with the mean ratios to the bound. Called once, after the run.
+  ErrorSeries Finish();
 
  private:
-  /// A block with truth; its error at the timestamp at hand.
-  struct Tracked {
+  /// A block with truth and its error at the current timestamp.
+  struct TrackedBlock {
     BlockId id;
     std::size_t truth, owner;
     double truth_variance;
     Eigen::VectorXd error = {};
-    bool known = false;
-    double bound = 0.0;           ///< tr P of it
-    double sum_by_bound = 0.0;    ///< of |e|^2 / tr P over the timestamps that have both
-    std::int64_t with_bound = 0;  ///< these
+    bool has_error = false;
+    double bound = 0.0;            ///< tr P of the bound
+    double sum_by_bound = 0.0;     ///< sum of |e|^2 / tr P over the timestamps that have both
+    std::int64_t bound_count = 0;  ///< number of these timestamps
   };
 
-  /// False: there is no bound, and will be none.
+  /// Updates the bound. Returns false if the bound is undefined from this frame on.
   bool AddBound(const SourceFrame& frame);
-  /// Appends the timestamp at hand to the series.
-  void Keep(Timestamp timestamp, const State& state);
-  /// Leaves out every other row.
-  void Thin();
+  /// Appends the current timestamp to the series.
+  void AppendTimestamp(Timestamp timestamp, const State& state);
+  /// Removes every second row of the series.
+  void RemoveOddRows();
 
   ErrorSeries series_;
-  std::vector<Tracked> tracked_;
+  std::vector<TrackedBlock> blocks_;
   std::optional<CramerRaoBound> bound_;
   std::size_t count_ = 0, stride_ = 1;
 };

@@ -21,17 +21,17 @@ namespace fs = std::filesystem;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-[[noreturn]] void FailFile(const fs::path& file, int line, const std::string& what) {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string(), line}, {}, what,
-                                            "a run folder as alidade wrote it; run it again"));
+[[noreturn]] void FailFile(const fs::path& file, int line, const std::string& message) {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string(), line}, {}, message,
+                                            "an unmodified run folder; repeat the run"));
 }
 
 [[noreturn]] void FailOpen(const fs::path& file) {
   throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read",
-                                                 "the folder of a run that came to its end"));
+                                                 "the folder of a finished run"));
 }
 
-/// Refuses a folder, a device, a pipe that would be waited for.
+/// Refuses a folder, a device, and a pipe, which would block the program.
 void RequireFile(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) FailOpen(file);
@@ -46,11 +46,11 @@ std::ifstream Open(const fs::path& file) {
 }
 
 Json ReadJson(const fs::path& file) {
-  constexpr std::uintmax_t kMost = 1 << 28;  // bytes
+  constexpr std::uintmax_t kMaxBytes = 1 << 28;
   RequireFile(file);
-  if (fs::file_size(file) > kMost) FailFile(file, 0, "is larger than 256 MiB");
+  if (fs::file_size(file) > kMaxBytes) FailFile(file, 0, "is larger than 256 MiB");
   const std::string text = ReadFile(
-      file, [&](ExitCode, int) { FailOpen(file); }, kMost);
+      file, [&](ExitCode, int) { FailOpen(file); }, kMaxBytes);
   return ParseJson(text, file.string());
 }
 
@@ -59,17 +59,18 @@ std::string TextOf(const JsonNode& map, const char* key) {
   return node ? node->Text() : "";
 }
 
-/// Cells of a row without quotes; an empty one is NaN.
+/// Parses the cells of a row without quotes. An empty cell is NaN.
 std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int line) {
   std::vector<double> numbers;
-  for (std::size_t at = 0; at <= row.size();) {
-    const std::size_t end = std::min(row.find(',', at), row.size());
+  for (std::size_t begin = 0; begin <= row.size();) {
+    const std::size_t end = std::min(row.find(',', begin), row.size());
     double value = kNan;
     const char* const last = row.data() + end;
-    const auto [rest, error] = std::from_chars(row.data() + at, last, value);
-    if (end > at && (error != std::errc() || rest != last)) FailFile(file, line, "not a number");
+    const auto [parsed_end, error] = std::from_chars(row.data() + begin, last, value);
+    if (end > begin && (error != std::errc() || parsed_end != last))
+      FailFile(file, line, "not a number");
     numbers.push_back(value);
-    at = end + 1;
+    begin = end + 1;
   }
   return numbers;
 }
@@ -84,23 +85,21 @@ Timestamp TimestampOf(std::string_view row, const fs::path& file, int line) {
   return cell::ParseTimestamp(text, value, 9);
 }
 
-/// A row of estimates.csv behind its timestamp: for each block its values, then its sigmas.
+/// Appends the cells after the timestamp of a row of estimates.csv: for each block its values, then
+/// its sigmas.
 void AppendRow(Series& series, const std::vector<double>& row) {
-  std::size_t at = 1;
-  const auto take = [&](int count) {
-    at += static_cast<std::size_t>(count);
-    return row.begin() + static_cast<std::ptrdiff_t>(at) - count;
-  };
+  auto cell = row.begin() + 1;
   for (const SeriesBlock& block : series.blocks) {
     const int values = block.geometry.ambient, sigmas = block.geometry.tangent;
-    const auto value = take(values);
-    series.values.insert(series.values.end(), value, value + values);
-    const auto sigma = take(sigmas);
-    for (int i = 0; i < sigmas; ++i) series.covariances.push_back(sigma[i] * sigma[i]);
+    series.values.insert(series.values.end(), cell, cell + values);
+    cell += values;
+    for (int i = 0; i < sigmas; ++i) series.covariances.push_back(cell[i] * cell[i]);
+    cell += sigmas;
   }
 }
 
-/// Returns how many rows have cells that are not finite; an empty cell says that there is no value.
+/// Reads estimates.csv. Returns the number of rows with cells that are not finite; empty cells,
+/// which represent missing values, do not count.
 std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
   std::int64_t not_finite = 0;
   std::ifstream stream = Open(file);
@@ -109,21 +108,22 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
   const auto columns = 1 + static_cast<std::size_t>(series.ambient() + series.tangent());
   for (int number = 2; std::getline(stream, line); ++number) {
     const std::vector<double> row = NumbersOf(line, file, number);
-    if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");
-    if (stream.eof()) FailFile(file, number, "the last line is cut short");
+    if (row.size() != columns)
+      FailFile(file, number, "the number of columns differs from run.json");
+    if (stream.eof()) FailFile(file, number, "the last line is incomplete");
     series.timestamps.push_back(TimestampOf(line, file, number));
     AppendRow(series, row);
     not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
   }
   if (std::ssize(series.timestamps) != rows) {
-    FailFile(
-        file, 0,
-        std::to_string(series.timestamps.size()) + " rows, run.json has " + std::to_string(rows));
+    FailFile(file, 0,
+             "has " + std::to_string(series.timestamps.size()) + " rows, but run.json records " +
+                 std::to_string(rows));
   }
   return not_finite;
 }
 
-/// P in place of its diagonal, where the file is there and P is not too large.
+/// Reads P and replaces its diagonal by it, if the file exists and P is not too large.
 void ReadCovariances(const fs::path& file, Series& series) {
   if (series.tangent() > Series::kMostJoint || !fs::exists(file)) return;
   series.joint = true;
@@ -131,7 +131,7 @@ void ReadCovariances(const fs::path& file, Series& series) {
   std::vector<double> cells(series.cells() * series.timestamps.size());
   const auto bytes = static_cast<std::streamsize>(8 * cells.size());
   if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
-    FailFile(file, 0, "not as long as estimates.csv has rows");
+    FailFile(file, 0, "the size does not match the rows of estimates.csv");
   }
   Open(file).read(reinterpret_cast<char*>(cells.data()), bytes);
   series.covariances = std::move(cells);
@@ -139,12 +139,12 @@ void ReadCovariances(const fs::path& file, Series& series) {
 
 Geometry GeometryOf(const JsonNode& block) {
   const int size = static_cast<int>(block.At("size").Count(1'000'000));
-  const Geometry all[] = {Geometry::Vector(size), Geometry::Angle(), Geometry::UnitQuaternion(),
-                          Geometry::UnitVector()};
+  const Geometry choices[] = {Geometry::Vector(size), Geometry::Angle(), Geometry::UnitQuaternion(),
+                              Geometry::UnitVector()};
   const auto kind = block.At("geometry")
-                        .Choice({ToString(all[0].kind), ToString(all[1].kind),
-                                 ToString(all[2].kind), ToString(all[3].kind)});
-  return all[kind];
+                        .Choice({ToString(choices[0].kind), ToString(choices[1].kind),
+                                 ToString(choices[2].kind), ToString(choices[3].kind)});
+  return choices[kind];
 }
 
 std::vector<SeriesBlock> ReadBlocks(const JsonNode& entry) {
@@ -187,9 +187,9 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   return result;
 }
 
-/// The landmarks of the state at the end, without those removed before.
+/// Reads the landmarks of the final state, without those that were removed earlier.
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
-  constexpr std::size_t kPlace = 3;  // the columns x, y, z, behind id, generation and form
+  constexpr std::size_t kPosition = 3;  // columns x, y, z, after id, generation, representation
   constexpr std::size_t kStatus = 21;
   constexpr const char* kAxes[] = {"x", "y", "z"};
   RequireFile(file);
@@ -197,15 +197,16 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   NumberRows rows(file, Place{file.string()}, {});
   rows.Next();  // the header
   while (rows.Next()) {
-    if (rows.size() < kPlace + 3) FailFile(file, rows.line(), "too few columns");
+    if (rows.size() < kPosition + 3) FailFile(file, rows.line(), "too few columns");
     if (rows.size() > kStatus && rows.text(kStatus) == "removed") continue;
-    LandmarkEstimate& one = map.emplace_back();
-    one.id = rows.Index(0, "id");
-    one.generation = static_cast<int>(rows.Index(1, "generation"));
+    LandmarkEstimate& landmark = map.emplace_back();
+    landmark.id = rows.Index(0, "id");
+    landmark.generation = static_cast<int>(rows.Index(1, "generation"));
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::size_t cell = kPlace + i;
-      const bool none = rows.text(cell).empty();
-      one.position[static_cast<Eigen::Index>(i)] = none ? kNan : rows.Number(cell, kAxes[i]);
+      const std::size_t cell = kPosition + i;
+      const bool is_empty = rows.text(cell).empty();
+      landmark.position[static_cast<Eigen::Index>(i)] =
+          is_empty ? kNan : rows.Number(cell, kAxes[i]);
     }
   }
   return map;
@@ -242,8 +243,8 @@ ComparedRun ReadRun(const fs::path& folder) {
   const Json run_json = ReadJson(run_file);
   const JsonNode root(run_json, run_file.string());
   if (root.At("status").Text() == "running") {
-    throw Error(ExitCode::kBadData, ErrorLine(Place{folder.string()}, {},
-                                              "is incomplete", "a finished run"));
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {}, "is incomplete", "a finished run"));
   }
   const Json timing_json = ReadJson(timing_file);
   const JsonNode timing(timing_json, timing_file.string());
@@ -252,21 +253,21 @@ ComparedRun ReadRun(const fs::path& folder) {
   run.reference = root.At("reference").Text();
   run.frames = root.At("frames").Count();
   const auto data = root.Find("data");
-  if (!data) FailFile(run_file, 0, "does not say which data the run saw");
+  if (!data) FailFile(run_file, 0, "does not record the hashes of the data");
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
   for (const auto& [name, entry] : root.At("estimators").Entries()) {
-    Candidate& one = run.estimators.emplace_back();
-    one.result = ReadResult(name, entry);
-    one.result.wall_s = timing.At("estimators").At(name).At("wall_s").Number();
-    one.series.blocks = ReadBlocks(entry);
-    one.series.joint = false;
-    one.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
-    one.not_finite =
-        ReadEstimates(folder / name / "estimates.csv", entry.At("rows").Count(), one.series);
-    ReadCovariances(folder / name / "covariance.bin", one.series);
+    Candidate& candidate = run.estimators.emplace_back();
+    candidate.result = ReadResult(name, entry);
+    candidate.result.wall_s = timing.At("estimators").At(name).At("wall_s").Number();
+    candidate.series.blocks = ReadBlocks(entry);
+    candidate.series.joint = false;
+    candidate.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
+    candidate.not_finite_rows =
+        ReadEstimates(folder / name / "estimates.csv", entry.At("rows").Count(), candidate.series);
+    ReadCovariances(folder / name / "covariance.bin", candidate.series);
     const fs::path map = folder / name / "landmarks.csv";
-    if (fs::exists(map)) one.result.landmarks = ReadMap(map);
+    if (fs::exists(map)) candidate.result.landmarks = ReadMap(map);
   }
   return run;
 }

@@ -11,46 +11,48 @@
 #include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
 
-/// Runs as far as they are compared, from memory or from their folders.
+/// The data of runs that a comparison uses, from memory or from run folders.
 namespace alidade::internal {
 
 struct ComparedRun;
 
-/// One estimator of a comparison.
+/// An estimator of a comparison.
 struct Candidate {
-  std::string name;                  ///< as the comparison has it
-  const ComparedRun* run = nullptr;  ///< of which it is one
+  std::string name;                  ///< its name in the comparison
+  const ComparedRun* run = nullptr;  ///< the run that contains it
   EstimatorResult result;            ///< without events
   Series series;
-  CpuTime cpu;                          ///< as far as it is known
-  ErrorSeries errors;                   ///< if they are wanted
-  std::int64_t not_finite = 0;          ///< rows of estimates.csv with a cell that is not finite
-  bool had_rejection_recovery = false;  ///< event `rejection_recovery`
+  CpuTime cpu;                          ///< zero if unknown
+  ErrorSeries errors;                   ///< of a run over seeds; else empty
+  std::int64_t not_finite_rows = 0;     ///< rows of estimates.csv with a value that is not finite
+  bool had_rejection_recovery = false;  ///< it reported the event `rejection_recovery`
 
-  bool batch() const { return result.kind == EstimatorKind::kBatch; }
-  /// Whether its estimates are of use to compare with.
-  bool usable() const { return !result.failed && !series.timestamps.empty(); }
-  /// Measurements that it was given, and those of them that it used.
+  bool is_batch() const { return result.kind == EstimatorKind::kBatch; }
+  /// Reports whether it can be a reference: it did not fail and has estimates.
+  bool is_usable() const { return !result.failed && !series.timestamps.empty(); }
+  /// Returns the number of measurements that it received.
   std::int64_t measurements() const;
+  /// Returns the number of measurements that it used.
   std::int64_t used() const;
 };
 
+/// A run with its estimators.
 struct ComparedRun {
-  std::filesystem::path folder;  ///< "": it has none
+  std::filesystem::path folder;  ///< "": it has no folder
   RunStatus status = RunStatus::kOk;
   std::string reason;
-  std::string reference = "truth";  ///< what its metrics compare with
+  std::string reference = "truth";  ///< the reference of its metrics
   std::string measurements_sha256, truth_sha256;
   std::int64_t frames = 0;
   std::vector<Candidate> estimators;
 };
 
-/// A run folder. Errors: kInputMissing where it is none, kBadData where its files do not fit
-/// together.
+/// Reads a run folder. Errors: kInputMissing if a file is missing, kBadData if a file is invalid or
+/// the files do not match.
 ComparedRun ReadRun(const std::filesystem::path& folder);
 
-/// Refuses runs whose measurements differ, by their hashes; what else differs between them, their
-/// truth or the settings that all their estimators share, is told. Errors: kBadData with both
+/// Refuses runs with different measurements, by their hashes. Returns notes on other differences:
+/// of their truth, or of the settings that all their estimators share. Errors: kBadData with both
 /// folders, both hashes and the first timestamp that differs.
 std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs);
 

@@ -10,8 +10,8 @@
 
 namespace alidade::internal {
 
-void JsonNode::Fail(const std::string& what, const std::string& expected) const {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{file_}, path_, what, expected));
+void JsonNode::Fail(const std::string& message, const std::string& expected) const {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{file_}, path_, message, expected));
 }
 
 void JsonNode::FailKind(const std::string& expected) const {
@@ -20,7 +20,7 @@ void JsonNode::FailKind(const std::string& expected) const {
   Fail(text.size() > kShown ? json_->type_name() : text, expected);
 }
 
-JsonNode JsonNode::Below(const Json& json, const std::string& path) const {
+JsonNode JsonNode::Child(const Json& json, const std::string& path) const {
   JsonNode node(json, file_);
   node.path_ = path_ + path;
   if (node.path_.starts_with('.')) node.path_.erase(0, 1);
@@ -31,19 +31,19 @@ std::optional<JsonNode> JsonNode::Find(const std::string& key) const {
   if (!json_->is_object()) FailKind("an object");
   const auto found = json_->find(key);
   if (found == json_->end()) return std::nullopt;
-  return Below(*found, '.' + key);
+  return Child(*found, '.' + key);
 }
 
 JsonNode JsonNode::At(const std::string& key) const {
   if (auto node = Find(key)) return *std::move(node);
-  Fail("the key '" + key + "' is missing", "a run folder as alidade wrote it");
+  Fail("the key '" + key + "' is missing", "an unmodified run folder");
 }
 
 std::vector<JsonNode> JsonNode::Items() const {
   if (!json_->is_array()) FailKind("a list");
   std::vector<JsonNode> items;
   for (const Json& item : *json_) {
-    items.push_back(Below(item, '[' + std::to_string(items.size()) + ']'));
+    items.push_back(Child(item, '[' + std::to_string(items.size()) + ']'));
   }
   return items;
 }
@@ -52,7 +52,7 @@ std::vector<std::pair<std::string, JsonNode>> JsonNode::Entries() const {
   if (!json_->is_object()) FailKind("an object");
   std::vector<std::pair<std::string, JsonNode>> entries;
   for (const auto& [key, value] : json_->items()) {
-    entries.emplace_back(key, Below(value, '.' + key));
+    entries.emplace_back(key, Child(value, '.' + key));
   }
   return entries;
 }
@@ -73,12 +73,12 @@ bool JsonNode::Flag() const {
   return json_->get<bool>();
 }
 
-std::int64_t JsonNode::Count(std::int64_t most) const {
-  // The parser makes a whole number of 0 or more unsigned, but a value of a program may be signed.
-  const bool whole = json_->is_number_unsigned() ||
-                     (json_->is_number_integer() && json_->get<std::int64_t>() >= 0);
-  if (!whole || json_->get<std::uint64_t>() > static_cast<std::uint64_t>(most)) {
-    FailKind("a whole number from 0 to " + std::to_string(most));
+std::int64_t JsonNode::Count(std::int64_t maximum) const {
+  // The parser stores a whole number of 0 or more as unsigned; a program may store it as signed.
+  const bool is_count = json_->is_number_unsigned() ||
+                        (json_->is_number_integer() && json_->get<std::int64_t>() >= 0);
+  if (!is_count || json_->get<std::uint64_t>() > static_cast<std::uint64_t>(maximum)) {
+    FailKind("a whole number from 0 to " + std::to_string(maximum));
   }
   return json_->get<std::int64_t>();
 }

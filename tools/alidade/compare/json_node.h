@@ -11,8 +11,9 @@
 
 namespace alidade::internal {
 
-/// A value of a JSON file that knows its file and key path, for messages: the counterpart of Node.
-/// It lives as long as the value. Errors: kBadData with file, key path and what is expected.
+/// A value of a JSON file with its file name and key path for messages; the counterpart of Node. It
+/// refers to the parsed value, which must outlive it. Errors: kBadData with the file, the key path
+/// and the expected value.
 class JsonNode {
  public:
   JsonNode(const Json& json, std::string file) : json_(&json), file_(std::move(file)) {}
@@ -25,16 +26,16 @@ class JsonNode {
   std::string Text() const;
   std::vector<std::string> Texts() const;
   bool Flag() const;
-  /// A whole number from 0 to `most`.
-  std::int64_t Count(std::int64_t most = INT64_MAX) const;
-  /// NaN for null, which stands for a number that is not finite.
+  /// Returns a whole number from 0 to `maximum`.
+  std::int64_t Count(std::int64_t maximum = INT64_MAX) const;
+  /// Returns a number; NaN for null, which represents a number that is not finite.
   double Number() const;
-  /// The place of the text among `choices`.
+  /// Returns the index of the text in `choices`.
   std::size_t Choice(const std::vector<std::string>& choices) const;
 
  private:
-  JsonNode Below(const Json& json, const std::string& path) const;
-  [[noreturn]] void Fail(const std::string& what, const std::string& expected) const;
+  JsonNode Child(const Json& json, const std::string& path) const;
+  [[noreturn]] void Fail(const std::string& message, const std::string& expected) const;
   [[noreturn]] void FailKind(const std::string& expected) const;
 
   const Json* json_;

@@ -10,77 +10,79 @@
 #include "alidade/base/statistics.h"
 #include "alidade/base/timestamp.h"
 
-/// What runs of several seeds tell together (docs/compare.md).
+/// Statistics over the runs of several seeds (docs/compare.md).
 namespace alidade {
 
-/// An error and that of the reference, means over the same runs; of one run the two themselves.
+/// Mean error and mean error of the reference over the same runs, or both errors of a single run.
 struct Ratio {
   double error = 0.0, reference_error = 0.0;
   std::int64_t runs = 1;
-  /// Where the ratio lies with probability 0.95, by a paired bootstrap over the runs; none where
-  /// there is one run alone.
+  /// Interval that contains the ratio with probability 0.95, by a paired bootstrap over the runs;
+  /// nullopt for a single run.
   std::optional<Interval> interval = {};
 
   double value() const { return error / reference_error; }
-  /// Whether the interval includes 1: the runs do not show which of the two is better.
+  /// Reports whether the interval includes 1: the runs do not show which error is smaller.
   bool undecided() const { return interval && interval->low <= 1.0 && interval->high >= 1.0; }
 };
 
-/// The ratio of means of ratios of one run each, at least one, with its interval
+/// Computes the ratio of mean errors from the ratios of at least one run, with its interval
 ///
 ///   [q(0.025), q(0.975)] of mean(e_i) / mean(r_i),   i drawn n times of 1 .. n with replacement
 ///
-/// e error, r that of the reference in the same run [Efron1993, ch. 13]: what makes a run hard for
-/// both cancels. The same for the same runs in the same order. Of few runs, below some 20, it is
-/// too narrow, by about sqrt((n - 1) / n) and more where errors are skewed.
+/// e error, r error of the reference in the same run [Efron1993, ch. 13]. The difficulty of a run,
+/// which affects both errors, cancels. Equal runs in equal order have equal intervals. With fewer
+/// than about 20 runs the interval is too narrow by a factor of about sqrt((n - 1) / n), and by
+/// more if the errors are skewed.
 Ratio RatioOfMeans(const std::vector<Ratio>& runs);
 
-/// The mean of values of one run each, at least one, with its interval likewise.
+/// Computes the bootstrap interval of the mean of values, one for each run, at least one.
 Interval IntervalOfMean(const std::vector<double>& values);
 
-/// Errors of one estimator in one run, timestamp by timestamp.
+/// Errors of one estimator in one run at each timestamp.
 struct ErrorSeries {
-  std::vector<std::string> blocks, owners;  ///< those with truth
+  std::vector<std::string> blocks, owners;  ///< with truth
   std::vector<bool> angles;                 ///< blocks with errors in rad
   std::vector<Timestamp> timestamps;
-  std::vector<double> squares;  ///< |e|^2, by timestamp and block; NaN where there is none
-  std::vector<double> nees;     ///< e' C^-1 e, by timestamp and owner; NaN where there is none
-  std::vector<double> dofs;     ///< of that
-  /// tr P of the Cramer-Rao bound, by timestamp and block; empty: there is none.
+  std::vector<double> squares;  ///< |e|^2, by timestamp and block; NaN if unknown
+  std::vector<double> nees;     ///< e' C^-1 e, by timestamp and owner; NaN if unknown
+  std::vector<double> dofs;     ///< degrees of freedom of each NEES
+  /// tr P of the Cramer-Rao bound, by timestamp and block; empty if there is no bound.
   std::vector<double> bounds = {};
-  /// mean |e|^2 / tr P of a run, over all its timestamps, by block.
+  /// Mean of |e|^2 / tr P over all timestamps of the run, by block.
   std::map<std::string, double> by_bound = {};
-  std::string no_bound = {};  ///< why there is no bound
+  std::string no_bound_reason = {};  ///< why there is no bound; "" if there is one
 };
 
-/// Errors of one estimator over N runs, timestamp by timestamp. N may differ from one to the other,
-/// and is at least two.
+/// Errors of one estimator over N runs at each timestamp. N is at least two and may differ between
+/// timestamps.
 struct OverTime {
-  /// Of a block.
+  /// Error of one block at each timestamp.
   struct Error {
     std::vector<double> rms;        ///< sqrt(mean |e|^2) over the runs
     std::vector<double> low, high;  ///< 16 and 84 % quantiles of |e|
-    std::vector<double> bound;      ///< sqrt(mean tr P) of the Cramer-Rao bound; empty: none
-    bool is_angle = false;          ///< in rad
+    std::vector<double> bound;      ///< sqrt(mean tr P), Cramer-Rao bound; empty if unknown
+    bool is_angle = false;          ///< unit is rad
   };
-  /// Of an owner: the average NEES [BarShalom2001, sec. 5.4.2]. Of a consistent filter
+  /// Average NEES of one owner [BarShalom2001, sec. 5.4.2]. For a consistent filter
   ///
   ///   sum of e' C^-1 e over the runs ~ chi2(sum of n),   n = dof of a run
   ///
-  /// and all three are divided by sum of n, so that 1 is right whatever n is.
+  /// Mean and bounds are divided by sum of n. The expected value is therefore 1 for every n.
   struct AverageNees {
     std::vector<double> mean;       ///< sum of e' C^-1 e / sum of n
-    std::vector<double> low, high;  ///< its bounds of probability 0.95, chi2(N n) / (N n)
-    std::int64_t timestamps = 0;    ///< with a NEES
-    double inside = 0.0;            ///< share of them at which it is within the bounds
+    std::vector<double> low, high;  ///< bounds with probability 0.95, chi2(N n) / (N n)
+    std::int64_t timestamps = 0;    ///< number of timestamps with a NEES
+    double inside = 0.0;            ///< fraction of them at which the mean is within bounds
   };
 
   std::vector<Timestamp> timestamps;
-  std::map<std::string, Error> errors;      ///< by block; NaN where there is none
-  std::map<std::string, AverageNees> nees;  ///< by owner; NaN where there is none
+  std::map<std::string, Error> errors;      ///< by block; NaN if unknown
+  std::map<std::string, AverageNees> nees;  ///< by owner; NaN if unknown
 };
 
-/// Of runs with the same blocks; those timestamps that at least two of them have.
-OverTime OverRuns(const std::vector<const ErrorSeries*>& runs);
+/// Computes the statistics of runs with the same blocks. Uses the timestamps that at least two runs
+/// have.
+OverTime ComputeOverTime(const std::vector<const ErrorSeries*>& runs);
 
 }  // namespace alidade

@@ -18,14 +18,14 @@ namespace {
 
 constexpr const char* kOrigin = "alidade compare";
 
-/// An estimator that a comparison may lack.
+/// An estimator that a comparison adds if the config lacks it.
 struct Variant {
   const char* name;
   EstimatorKind kind;
-  bool full_information;          ///< the full-information filter
-  bool accepted;                  ///< of what the filter accepted
-  std::vector<const char*> keys;  ///< of the filter's entry, taken over where it has them
-  const char* what;
+  bool full_information;          ///< it is the full-information filter
+  bool accepted;                  ///< it uses the measurements that the filter accepted
+  std::vector<const char*> keys;  ///< keys that are copied from the entry of the filter
+  const char* description;
 };
 
 const std::vector<Variant>& Variants() {
@@ -47,39 +47,42 @@ const std::vector<Variant>& Variants() {
        true,
        true,
        {"sensors", "overrides", "max_dt_s"},
-       "the full-information filter over what the filter accepted"},
+       "the full-information filter of the accepted measurements"},
       {"batch_accepted",
        EstimatorKind::kBatch,
        false,
        true,
        {"sensors", "overrides", "max_dt_s"},
-       "the batch of all that the filter accepted"},
+       "the batch of the accepted measurements"},
   };
   return variants;
 }
 
-/// Whether `spec` is what the variant would be. A full-information filter does for one of the
-/// data that a filter accepted: another line tells what these two differ by.
-bool IsThere(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
+/// Reports whether `spec` serves as the variant. A full-information filter of all data also serves
+/// as that of the accepted measurements; another row reports the difference between these two.
+bool Matches(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
              int filter_index) {
   const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
   if (spec.kind != variant.kind || full_information != variant.full_information) return false;
-  const bool same_sensors = std::ranges::is_permutation(
+  const bool has_same_sensors = std::ranges::is_permutation(
       spec.problem.sensors, filter.problem.sensors, {}, &SensorBinding::name, &SensorBinding::name);
-  if (spec.overrides != filter.overrides || !same_sensors) return false;
+  if (spec.overrides != filter.overrides || !has_same_sensors) return false;
   if (spec.accepted_by >= 0) return variant.accepted && spec.accepted_by == filter_index;
   return variant.full_information || !variant.accepted;
 }
 
-/// A name that no estimator has.
-std::string FreeName(const std::string& name, const std::vector<EstimatorSpec>& taken) {
-  const std::vector<std::string> names = internal::NamesOf(taken);
-  std::string free = name;
-  for (int i = 2; std::ranges::count(names, free) > 0; ++i) free = name + '_' + std::to_string(i);
-  return free;
+/// Returns a name that no estimator has, derived from `name`.
+std::string UniqueName(const std::string& name, const std::vector<EstimatorSpec>& estimators) {
+  const std::vector<std::string> names = internal::NamesOf(estimators);
+  std::string unique = name;
+  for (int i = 2; std::ranges::count(names, unique) > 0; ++i) {
+    unique = name + '_' + std::to_string(i);
+  }
+  return unique;
 }
 
-/// The first type of that kind, those of core before those of plugins; "": there is none.
+/// Returns the first estimator type of that kind, first from core, then from plugins; "" if not
+/// found.
 std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
   for (const internal::EstimatorType& type : internal::EstimatorTypes()) {
     if (type.kind == kind) return type.name;
@@ -90,24 +93,24 @@ std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
   return "";
 }
 
-/// The config with the variant's entry.
+/// Returns the config with the entry of the variant.
 Config WithVariant(const Config& config, const Variant& variant, const std::string& type,
                    const std::string& name, const std::string& filter) {
-  Config with = config.Copy();
+  Config extended = config.Copy();
   const std::string entry = "estimators." + name;
-  with.Set(entry + ".type", type, kOrigin);
-  if (variant.full_information) with.Set(entry + ".mode", "filtering", kOrigin);
-  if (variant.accepted) with.Set(entry + ".use.accepted_by", filter, kOrigin);
+  extended.Set(entry + ".type", type, kOrigin);
+  if (variant.full_information) extended.Set(entry + ".mode", "filtering", kOrigin);
+  if (variant.accepted) extended.Set(entry + ".use.accepted_by", filter, kOrigin);
   for (const char* const key : variant.keys) {
-    const auto value = with.root().At("estimators").At(filter).Find(key);
+    const auto value = extended.root().At("estimators").At(filter).Find(key);
     if (!value) continue;
     const std::string text = value->ToYaml();
-    with.Set(entry + '.' + key, text, kOrigin);
+    extended.Set(entry + '.' + key, text, kOrigin);
   }
-  return with;
+  return extended;
 }
 
-/// What an error says, without its place and what it would have expected.
+/// Returns the message of an error without its place and the expected value.
 std::string ReasonOf(const Error& error) {
   std::string reason = error.what();
   reason = reason.substr(0, reason.find('\n'));
@@ -116,64 +119,68 @@ std::string ReasonOf(const Error& error) {
   return place == reason.npos ? reason : reason.substr(place + 2);
 }
 
-/// Adds the variant, or puts what it is below the reason why it cannot be.
+/// Adds the variant. If that is impossible, adds its description to `left_out`, by the reason.
 void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperiment& compared,
                 std::map<std::string, std::vector<std::string>>& left_out) {
-  const std::string name = FreeName(variant.name, compared.experiment.estimators);
+  const std::string name = UniqueName(variant.name, compared.experiment.estimators);
   const std::string type = TypeOf(variant.kind, host);
   if (type.empty()) {
-    left_out[std::string("no plugin offers an estimator of the kind ") + ToString(variant.kind)]
-        .emplace_back(variant.what);
+    left_out[std::string("no plugin provides an estimator of kind ") + ToString(variant.kind)]
+        .emplace_back(variant.description);
     return;
   }
   try {
-    const Config with = WithVariant(compared.config, variant, type, name, compared.filter);
-    internal::AddEstimator(internal::WithCalibration(with, *compared.experiment.source), host, name,
-                           compared.experiment);
-    compared.config = with;
+    const Config extended = WithVariant(compared.config, variant, type, name, compared.filter);
+    internal::AddEstimator(internal::WithCalibration(extended, *compared.experiment.source), host,
+                           name, compared.experiment);
+    compared.config = extended;
     compared.added.push_back(name);
-    compared.notes.push_back("added '" + name + "': " + variant.what);
+    compared.notes.push_back("added '" + name + "': " + variant.description);
   } catch (const Error& error) {
-    left_out[ReasonOf(error)].emplace_back(variant.what);
+    left_out[ReasonOf(error)].emplace_back(variant.description);
   }
 }
 
-/// Refuses a reference that no estimator is, and truth where the source knows none. Error: kUsage.
+/// Refuses a reference that is neither the name of an estimator nor an available truth. Error:
+/// kUsage.
 void CheckReference(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> names = internal::NamesOf(experiment.estimators);
-  const bool truth = name == "truth" && !experiment.source->truths().empty();
-  if (name.empty() || truth || std::ranges::count(names, name) > 0) return;
+  const bool is_known_truth = name == "truth" && !experiment.source->truths().empty();
+  if (name.empty() || is_known_truth || std::ranges::count(names, name) > 0) return;
   if (!experiment.source->truths().empty()) names.emplace_back("truth");
   internal::RefuseOption(
-      "--reference", name == "truth" ? "the source knows no truth" : "no estimator '" + name + "'",
-      name, names);
+      "--reference",
+      name == "truth" ? "the source provides no truth" : "no estimator '" + name + "'", name,
+      names);
 }
 
-/// Index of the filter whose error is to be decomposed; -1: there is none. Error: kUsage.
+/// Returns the index of the filter whose error is decomposed; -1 if there is no filter. Error:
+/// kUsage.
 int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
-    const EstimatorSpec& one = experiment.estimators[e];
-    if (one.kind != EstimatorKind::kFilter) continue;
-    if (name.empty() ? one.accepted_by < 0 : one.name == name) return static_cast<int>(e);
-    filters.push_back(one.name);
+    const EstimatorSpec& spec = experiment.estimators[e];
+    if (spec.kind != EstimatorKind::kFilter) continue;
+    if (name.empty() ? spec.accepted_by < 0 : spec.name == name) return static_cast<int>(e);
+    filters.push_back(spec.name);
   }
   if (name.empty()) return -1;
-  const bool known = std::ranges::count(internal::NamesOf(experiment.estimators), name) > 0;
-  internal::RefuseFilter(name, known, filters);
+  const bool is_estimator = std::ranges::count(internal::NamesOf(experiment.estimators), name) > 0;
+  internal::RefuseFilter(name, is_estimator, filters);
 }
 
-/// Without the variants of those names, each for its reason.
+/// Builds the experiment and adds the missing variants, except those in `excluded`, which maps
+/// names to reasons.
 ComparedExperiment Build(const Config& config, const PluginHost& host,
                          const CompareOptions& options,
-                         const std::map<std::string, std::string>& without) {
-  // Errors are taken from truth: what a config compares with besides is done here.
-  Config own = config.Copy();
-  if (own.root().is_map() && own.root().Find("reference")) {
-    own.Set("reference", "truth", kOrigin);
-    own = own.Copy();
+                         const std::map<std::string, std::string>& excluded) {
+  // The run computes errors relative to truth; the comparison handles any other reference itself.
+  Config base = config.Copy();
+  if (base.root().is_map() && base.root().Find("reference")) {
+    base.Set("reference", "truth", kOrigin);
+    base = base.Copy();
   }
-  ComparedExperiment compared{own, BuildExperiment(own, host), "", {}, {}};
+  ComparedExperiment compared{base, BuildExperiment(base, host), "", {}, {}};
   const int filter = FindFilter(compared.experiment, options.filter);
   if (filter < 0 || !options.decompose) CheckReference(compared.experiment, options.reference);
   if (filter < 0) return compared;
@@ -181,58 +188,63 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
   if (!options.decompose) return compared;
   std::map<std::string, std::vector<std::string>> left_out;  // by reason
   for (const Variant& variant : Variants()) {
-    const std::vector<EstimatorSpec>& all = compared.experiment.estimators;
-    const EstimatorSpec& of = all[static_cast<std::size_t>(filter)];
-    const bool there = std::ranges::any_of(
-        all, [&](const EstimatorSpec& one) { return IsThere(variant, one, of, filter); });
-    if (there) continue;
-    if (const auto found = without.find(FreeName(variant.name, all)); found != without.end()) {
-      left_out[found->second].emplace_back(variant.what);
+    const std::vector<EstimatorSpec>& estimators = compared.experiment.estimators;
+    const EstimatorSpec& filter_spec = estimators[static_cast<std::size_t>(filter)];
+    const bool exists = std::ranges::any_of(estimators, [&](const EstimatorSpec& spec) {
+      return Matches(variant, spec, filter_spec, filter);
+    });
+    if (exists) continue;
+    const auto found = excluded.find(UniqueName(variant.name, estimators));
+    if (found != excluded.end()) {
+      left_out[found->second].emplace_back(variant.description);
       continue;
     }
     const bool may_be_long = !options.budget_s || options.over_seeds;
-    if (variant.full_information && of.problem.landmarks && may_be_long) {
+    if (variant.full_information && filter_spec.problem.landmarks && may_be_long) {
       left_out
-          ["with landmarks a solve at every frame takes long; of one run --budget SECONDS adds "
-           "it where it can be done in time, and the config may have it"]
-              .emplace_back(variant.what);
+          ["with landmarks, a solve at every frame takes long; for a single run, --budget SECONDS "
+           "adds it if time suffices, or the config can contain it"]
+              .emplace_back(variant.description);
       continue;
     }
     AddVariant(variant, host, compared, left_out);
   }
-  for (const auto& [reason, what] : left_out) {
-    compared.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);
+  for (const auto& [reason, descriptions] : left_out) {
+    compared.notes.push_back("left out " + internal::Join(descriptions, "; ") + ": " + reason);
   }
   CheckReference(compared.experiment, options.reference);
   return compared;
 }
 
-/// Which of those that were added take too long, and why; `note` tells what was foretold.
-std::map<std::string, std::string> BeyondBudget(ComparedExperiment& compared, double budget_s,
-                                                std::string& note) {
+/// Returns the added estimators that exceed the budget, with the reason. Sets `note` to a note on
+/// the prediction.
+std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared, double budget_s,
+                                                    std::string& note) {
   std::map<std::string, std::string> beyond;
-  const std::optional<internal::ForetoldTime> time = internal::ForetellTime(compared.experiment);
-  if (!time) {
-    note = "how long it takes cannot be foretold: nothing is left out for the budget";
+  const std::optional<internal::PredictedCpuTime> prediction =
+      internal::PredictCpuTime(compared.experiment);
+  if (!prediction) {
+    note = "the CPU time cannot be predicted: the budget excludes no estimator";
     return beyond;
   }
   const auto seconds = [](double s) { return internal::RoundedText(s, 2) + " s"; };
   double sum_s = 0.0;
-  for (std::size_t e = 0; e < time->of.size(); ++e) {
+  for (std::size_t e = 0; e < prediction->cpu_s.size(); ++e) {
     const std::string& name = compared.experiment.estimators[e].name;
-    if (std::ranges::count(compared.added, name) == 0) sum_s += time->of[e];
+    if (std::ranges::count(compared.added, name) == 0) sum_s += prediction->cpu_s[e];
   }
-  for (std::size_t e = 0; e < time->of.size(); ++e) {
+  for (std::size_t e = 0; e < prediction->cpu_s.size(); ++e) {
     const std::string& name = compared.experiment.estimators[e].name;
     if (std::ranges::count(compared.added, name) == 0) continue;
-    if (sum_s + time->of[e] <= budget_s) {
-      sum_s += time->of[e];
+    if (sum_s + prediction->cpu_s[e] <= budget_s) {
+      sum_s += prediction->cpu_s[e];
     } else {
-      beyond[name] = "it may take " + seconds(time->of[e]) + ", the budget is " + seconds(budget_s);
+      beyond[name] =
+          "it may take " + seconds(prediction->cpu_s[e]) + ", the budget is " + seconds(budget_s);
     }
   }
-  note = "foretold from " + std::to_string(time->frames) + " of " +
-         std::to_string(time->all_frames) + " frames: " + seconds(sum_s) + " of CPU time";
+  note = "predicted from " + std::to_string(prediction->frames) + " of " +
+         std::to_string(prediction->total_frames) + " frames: " + seconds(sum_s) + " of CPU time";
   return beyond;
 }
 
@@ -244,12 +256,13 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
   ComparedExperiment compared = Build(config, host, options, {});
   if (options.over_seeds || !options.budget_s || compared.added.empty()) return compared;
   std::string note;
-  const auto beyond = BeyondBudget(compared, *options.budget_s, note);
-  compared = Build(config, host, options, beyond);  // the source has been read
+  const auto beyond = FindBeyondBudget(compared, *options.budget_s, note);
+  compared =
+      Build(config, host, options, beyond);  // again, because the prediction has read the source
   compared.notes.push_back(note);
   if (!beyond.empty()) {
     compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +
-                             " s left out what is named above";
+                             " s excludes the estimators named above";
   }
   return compared;
 }

@@ -11,64 +11,68 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of measurements.csv that follow each other with one timestamp.
+/// Consecutive rows of measurements.csv with equal timestamps.
 struct TimestampRows {
-  std::string t_s;                ///< "": the file is at its end
-  std::vector<std::string> rows;  ///< by the name of their stream, as they are hashed
+  std::string t_s;                ///< "": the end of the file
+  std::vector<std::string> rows;  ///< sorted by stream name, the order in which they are hashed
 };
 
+/// Reader of a measurements.csv that groups its rows by timestamp.
 class MeasurementsFile {
  public:
   explicit MeasurementsFile(const fs::path& folder) : stream_(folder / "measurements.csv") {
-    Advance();  // to the header
-    Advance();
+    ReadRow();  // header
+    ReadRow();
   }
-  bool good() const { return stream_.is_open(); }
+  bool is_open() const { return stream_.is_open(); }
 
   TimestampRows Next() {
-    const auto cell = [](const std::string& row, std::size_t at) {
-      const std::size_t from = std::min(at, row.size());
-      return row.substr(from, row.find(',', from) - from);
+    const auto cell_at = [](const std::string& row, std::size_t offset) {
+      const std::size_t begin = std::min(offset, row.size());
+      return row.substr(begin, row.find(',', begin) - begin);
     };
-    TimestampRows next{cell(row_, 0), {}};
-    for (; !row_.empty() && cell(row_, 0) == next.t_s; Advance()) next.rows.push_back(row_);
+    TimestampRows next{cell_at(row_, 0), {}};
+    for (; !row_.empty() && cell_at(row_, 0) == next.t_s; ReadRow()) next.rows.push_back(row_);
     std::ranges::stable_sort(
-        next.rows, {}, [&](const std::string& row) { return cell(row, next.t_s.size() + 1); });
+        next.rows, {}, [&](const std::string& row) { return cell_at(row, next.t_s.size() + 1); });
     return next;
   }
 
  private:
-  /// To the next row, without the empty cells that wider streams leave.
-  void Advance() {
+  /// Reads the next row. Removes trailing empty cells, which belong to wider streams.
+  void ReadRow() {
     row_.clear();
     if (!std::getline(stream_, row_)) return;
     row_.resize(row_.find_last_not_of(',') + 1);
   }
 
   std::ifstream stream_;
-  std::string row_;  ///< the next one
+  std::string row_;  ///< the next row
 };
 
-/// The timestamp of rows, for people.
+/// Returns the timestamp of rows as text for messages.
 std::string TimestampOf(const TimestampRows& rows) {
-  return rows.t_s.empty() ? "its end" : "t = " + rows.t_s + " s";
+  return rows.t_s.empty() ? "the end of the file" : "t = " + rows.t_s + " s";
 }
 
-/// Where measurements.csv of two folders begin to differ, in words.
-std::string FirstDifference(const fs::path& a, const fs::path& b) {
-  MeasurementsFile first(a), second(b);
-  if (!first.good() || !second.good()) return "measurements.csv cannot be read";
+/// Describes the first difference of the measurements.csv of `folder` from that of `reference`.
+std::string FirstDifference(const fs::path& folder, const fs::path& reference) {
+  MeasurementsFile file(folder), reference_file(reference);
+  if (!file.is_open() || !reference_file.is_open()) return "measurements.csv cannot be read";
   for (;;) {
-    const TimestampRows one = first.Next(), other = second.Next();
-    if (one.rows != other.rows) {
-      return "first at " + TimestampOf(one) + " of the one, " + TimestampOf(other) +
-             " of the other";
+    const TimestampRows rows = file.Next(), reference_rows = reference_file.Next();
+    if (rows.rows != reference_rows.rows) {
+      const std::string text = "first difference: " + TimestampOf(rows);
+      const bool is_same_time = rows.t_s == reference_rows.t_s;
+      return is_same_time ? text : text + " instead of " + TimestampOf(reference_rows);
     }
-    if (one.t_s.empty()) return "their own covariances or the timestamps of empty frames differ";
+    if (rows.t_s.empty()) {
+      return "the covariances of measurements or the timestamps of empty frames differ";
+    }
   }
 }
 
-/// Every scalar below a node by its path.
+/// Collects every scalar at or below a node by its path.
 void Flatten(const Node& node, std::map<std::string, std::string>& values) {
   if (node.is_map()) {
     for (const auto& [key, value] : node.Entries()) Flatten(value, values);
@@ -88,28 +92,28 @@ std::map<std::string, std::string> SharedSettings(const fs::path& folder) {
   return values;
 }
 
-/// Up to three settings that two runs do not have alike; "": none.
-std::string SettingsThatDiffer(const fs::path& a, const fs::path& b) {
+/// Lists up to three settings that differ between two runs; "" if no setting differs.
+std::string DifferingSettings(const fs::path& a, const fs::path& b) {
   constexpr std::size_t kShown = 3;
-  const std::map<std::string, std::string> one = SharedSettings(a);
-  std::map<std::string, std::string> other = SharedSettings(b);
+  const std::map<std::string, std::string> first = SharedSettings(a);
+  std::map<std::string, std::string> second = SharedSettings(b);
   std::vector<std::string> texts;
   const auto add = [&](const std::string& key, const std::string& x, const std::string& y) {
     texts.push_back(key + " (" + x + ", " + y + ')');
   };
-  for (const auto& [key, value] : one) {
-    const auto found = other.find(key);
-    if (found == other.end()) {
+  for (const auto& [key, value] : first) {
+    const auto found = second.find(key);
+    if (found == second.end()) {
       add(key, value, "none");
     } else if (found->second != value) {
       add(key, value, found->second);
     }
-    if (found != other.end()) other.erase(found);
+    if (found != second.end()) second.erase(found);
   }
-  for (const auto& [key, value] : other) add(key, "none", value);
-  const std::size_t more = texts.size() - std::min(kShown, texts.size());
-  texts.resize(texts.size() - more);
-  return Join(texts) + (more > 0 ? " and " + std::to_string(more) + " more" : "");
+  for (const auto& [key, value] : second) add(key, "none", value);
+  const std::size_t omitted = texts.size() - std::min(kShown, texts.size());
+  texts.resize(texts.size() - omitted);
+  return Join(texts) + (omitted > 0 ? " and " + std::to_string(omitted) + " more" : "");
 }
 
 }  // namespace
@@ -118,25 +122,24 @@ std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
   std::vector<std::string> notes;
   const ComparedRun& first = runs.front();
   for (std::size_t r = 1; r < runs.size(); ++r) {
-    const ComparedRun& other = runs[r];
-    const std::string both = "'" + first.folder.string() + "' and '" + other.folder.string() + "'";
-    if (first.measurements_sha256 != other.measurements_sha256) {
+    const ComparedRun& run = runs[r];
+    const std::string both = "'" + first.folder.string() + "' and '" + run.folder.string() + "'";
+    if (first.measurements_sha256 != run.measurements_sha256) {
       throw Error(ExitCode::kBadData,
-                  ErrorLine(Place{other.folder.string()}, {},
-                            "saw other measurements than '" + first.folder.string() +
-                                "': " + other.measurements_sha256 + " against " +
-                                first.measurements_sha256 + ", " +
-                                FirstDifference(first.folder, other.folder),
+                  ErrorLine(Place{run.folder.string()}, {},
+                            "has other measurements than '" + first.folder.string() + "': " +
+                                run.measurements_sha256 + ", not " + first.measurements_sha256 +
+                                ", " + FirstDifference(run.folder, first.folder),
                             "runs of the same source, seed and start"));
     }
-    if (first.truth_sha256 != other.truth_sha256) {
+    if (first.truth_sha256 != run.truth_sha256) {
       notes.push_back("the truths of " + both +
-                      " differ: errors against truth of the one are not those of the other");
+                      " differ: their errors relative to truth are not comparable");
     }
-    const std::string settings = SettingsThatDiffer(first.folder, other.folder);
+    const std::string settings = DifferingSettings(first.folder, run.folder);
     if (!settings.empty()) {
       notes.push_back("the settings of " + both + " differ: " + settings +
-                      ": what differs is not the estimator alone");
+                      ": the estimator is not the only difference");
     }
   }
   return notes;

@@ -17,11 +17,11 @@ std::string TitleOf(const Config& config) {
   return title ? title->Text() : fs::path(config.name()).stem().string();
 }
 
-/// An svg file as an element of a page: without its XML prolog.
+/// Returns an svg file as an element of a page, without its XML prolog.
 std::string SvgOf(const fs::path& file) {
   const std::string svg = internal::ReadFile(file, [](ExitCode, int) {});
-  const std::size_t at = svg.find("<svg");
-  return at == svg.npos ? "" : svg.substr(at);
+  const std::size_t start = svg.find("<svg");
+  return start == svg.npos ? "" : svg.substr(start);
 }
 
 }  // namespace

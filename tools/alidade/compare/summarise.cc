@@ -8,20 +8,20 @@
 namespace alidade {
 namespace {
 
-/// Gathers values of one thing over several comparisons.
-class Gathered {
+/// Collector of values over several comparisons, by key.
+class ValueCollector {
  public:
   void Add(const std::map<std::string, Spread>& values) {
     for (const auto& [key, spread] : values) values_[key].push_back(spread.mean);
   }
-  /// Of the mean of each error.
+  /// Computes the interval of the mean of each error metric.
   std::map<std::string, Interval> MeanIntervals() const {
     std::map<std::string, Interval> intervals;
     for (const auto& [key, list] : values_) {
       const bool is_error = key.starts_with("rmse:") || key.starts_with("final_error:") ||
                             key == "map.rmse" || key == "map.sim3.rmse";
-      const bool known = std::ranges::none_of(list, [](double v) { return std::isnan(v); });
-      if (is_error && known && list.size() > 1) intervals[key] = IntervalOfMean(list);
+      const bool has_nan = std::ranges::any_of(list, [](double v) { return std::isnan(v); });
+      if (is_error && !has_nan && list.size() > 1) intervals[key] = IntervalOfMean(list);
     }
     return intervals;
   }
@@ -35,18 +35,18 @@ class Gathered {
   std::map<std::string, std::vector<double>> values_;
 };
 
-/// Gathers ratios likewise.
-class GatheredRatios {
+/// Collector of ratios over several comparisons, by key.
+class RatioCollector {
  public:
   void Add(const std::map<std::string, Ratio>& ratios) {
     for (const auto& [key, ratio] : ratios) {
       if (!std::isnan(ratio.value())) ratios_[key].push_back(ratio);
     }
   }
-  std::map<std::string, Ratio> OfMeans() const {
-    std::map<std::string, Ratio> of_means;
-    for (const auto& [key, list] : ratios_) of_means[key] = RatioOfMeans(list);
-    return of_means;
+  std::map<std::string, Ratio> RatiosOfMeans() const {
+    std::map<std::string, Ratio> ratios;
+    for (const auto& [key, list] : ratios_) ratios[key] = RatioOfMeans(list);
+    return ratios;
   }
 
  private:
@@ -58,100 +58,102 @@ bool Diverged(const Comparison& comparison, const std::string& name) {
   return found != comparison.estimators.end() && found->diverged > 0;
 }
 
-/// Appends `name` to those before it, where it is new.
+/// Appends `name` if it is not empty and not in the list yet.
 void AddName(const std::string& name, std::vector<std::string>& names) {
   if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
 }
 
 ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons, std::size_t e) {
-  ComparedEstimator all = comparisons.front().estimators.at(e);
-  all.used = all.diverged = all.reference_runs = all.final_reference_runs = 0;
+  ComparedEstimator summary = comparisons.front().estimators.at(e);
+  summary.used = summary.diverged = summary.reference_runs = summary.final_reference_runs = 0;
   std::vector<std::string> references, final_references;
-  Gathered gathered;
-  GatheredRatios ratios;
+  ValueCollector values;
+  RatioCollector ratios;
   std::vector<const ErrorSeries*> series;
-  for (const Comparison& one : comparisons) {
-    const ComparedEstimator& of_run = one.estimators.at(e);
-    all.diverged += of_run.diverged;
-    if (of_run.diverged > 0) continue;
-    all.used += 1;
-    all.reference_runs += of_run.reference_runs;
-    all.final_reference_runs += of_run.final_reference_runs;
-    AddName(of_run.reference, references);
-    AddName(of_run.final_reference, final_references);
-    gathered.Add(of_run.values);
-    ratios.Add(of_run.ratios);
-    series.push_back(&of_run.series);
+  for (const Comparison& comparison : comparisons) {
+    const ComparedEstimator& estimator = comparison.estimators.at(e);
+    summary.diverged += estimator.diverged;
+    if (estimator.diverged > 0) continue;
+    summary.used += 1;
+    summary.reference_runs += estimator.reference_runs;
+    summary.final_reference_runs += estimator.final_reference_runs;
+    AddName(estimator.reference, references);
+    AddName(estimator.final_reference, final_references);
+    values.Add(estimator.values);
+    ratios.Add(estimator.ratios);
+    series.push_back(&estimator.series);
   }
-  all.reference = internal::Join(references);
-  all.final_reference = internal::Join(final_references);
-  all.mean_intervals = gathered.MeanIntervals();
-  all.values = std::move(gathered).Spreads();
-  all.ratios = ratios.OfMeans();
-  all.over_time = OverRuns(series);
-  all.series = {};
-  return all;
+  summary.reference = internal::Join(references);
+  summary.final_reference = internal::Join(final_references);
+  summary.mean_intervals = values.MeanIntervals();
+  summary.values = std::move(values).Spreads();
+  summary.ratios = ratios.RatiosOfMeans();
+  summary.over_time = ComputeOverTime(series);
+  summary.series = {};
+  return summary;
 }
 
-std::string OfRuns(std::int64_t some, std::int64_t all) {
-  return std::to_string(some) + " of " + std::to_string(all) + " runs";
+std::string RunCountText(std::int64_t count, std::int64_t total) {
+  return std::to_string(count) + " of " + std::to_string(total) + " runs";
 }
 
-/// Of the runs in which the filter did not diverge, those that have the step between the same two.
+/// Summarises a step. Uses the runs in which the filter did not diverge and the step is between the
+/// same two estimators.
 DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
-  const DecompositionStep* known = &comparisons.front().decomposition.at(s);
-  for (const Comparison& one : comparisons) {
-    if (known->withheld.empty()) break;
-    known = &one.decomposition.at(s);
+  const DecompositionStep* first_known = &comparisons.front().decomposition.at(s);
+  for (const Comparison& comparison : comparisons) {
+    if (first_known->withheld.empty()) break;
+    first_known = &comparison.decomposition.at(s);
   }
-  DecompositionStep all = *known;
-  Gathered gathered;
-  GatheredRatios ratios;
-  for (const Comparison& one : comparisons) {
-    const DecompositionStep& of_run = one.decomposition.at(s);
-    const bool same = of_run.from == all.from && of_run.to == all.to;
-    if (!same || Diverged(one, one.decomposed)) continue;
-    gathered.Add(of_run.values);
-    ratios.Add(of_run.ratios);
+  DecompositionStep summary = *first_known;
+  ValueCollector values;
+  RatioCollector ratios;
+  for (const Comparison& comparison : comparisons) {
+    const DecompositionStep& step = comparison.decomposition.at(s);
+    const bool is_same = step.from == summary.from && step.to == summary.to;
+    if (!is_same || Diverged(comparison, comparison.decomposed)) continue;
+    values.Add(step.values);
+    ratios.Add(step.ratios);
   }
-  all.values = std::move(gathered).Spreads();
-  all.ratios = ratios.OfMeans();
-  return all;
+  summary.values = std::move(values).Spreads();
+  summary.ratios = ratios.RatiosOfMeans();
+  return summary;
 }
 
 }  // namespace
 
 Comparison Summarise(const std::vector<Comparison>& comparisons) {
   ALIDADE_EXPECTS(!comparisons.empty());
-  Comparison all = comparisons.front();
-  all.runs = std::ssize(comparisons);
-  all.status = RunStatus::kOk;  // what failed in a run is told of its estimators
-  if (all.runs > 1) all.measurements_sha256.clear();
-  all.notes.clear();
-  std::int64_t withheld = 0;
-  std::map<std::string, std::int64_t> with_note;
-  for (const Comparison& one : comparisons) {
-    for (const std::string& note : one.notes) {
-      if (++with_note[note] == 1) all.notes.push_back(note);
+  Comparison summary = comparisons.front();
+  summary.runs = std::ssize(comparisons);
+  summary.status = RunStatus::kOk;  // the entries of the estimators report failures in single runs
+  if (summary.runs > 1) summary.measurements_sha256.clear();
+  summary.notes.clear();
+  std::int64_t withheld_runs = 0;
+  std::map<std::string, std::int64_t> runs_by_note;
+  for (const Comparison& comparison : comparisons) {
+    for (const std::string& note : comparison.notes) {
+      if (++runs_by_note[note] == 1) summary.notes.push_back(note);
     }
-    if (all.reference.empty()) all.reference = one.reference;
-    if (one.withheld.empty()) continue;
-    all.withheld = one.withheld;
-    ++withheld;
+    if (summary.reference.empty()) summary.reference = comparison.reference;
+    if (comparison.withheld.empty()) continue;
+    summary.withheld = comparison.withheld;
+    ++withheld_runs;
   }
-  if (withheld > 0 && all.runs > 1) {
-    all.withheld += " (" + OfRuns(withheld, all.runs) + ')';
+  if (withheld_runs > 0 && summary.runs > 1) {
+    summary.withheld += " (" + RunCountText(withheld_runs, summary.runs) + ')';
   }
-  for (std::string& note : all.notes) {
-    const std::int64_t runs = with_note[note];
-    if (runs < all.runs) note += " (" + OfRuns(runs, all.runs) + ')';
+  for (std::string& note : summary.notes) {
+    const std::int64_t runs = runs_by_note[note];
+    if (runs < summary.runs) note += " (" + RunCountText(runs, summary.runs) + ')';
   }
-  for (std::size_t e = 0; e < all.estimators.size(); ++e) {
-    all.estimators[e] = SummariseEstimator(comparisons, e);
+  for (std::size_t e = 0; e < summary.estimators.size(); ++e) {
+    summary.estimators[e] = SummariseEstimator(comparisons, e);
   }
-  for (std::size_t i = 0; i < all.decomposition.size(); ++i)
-    all.decomposition[i] = SummariseStep(comparisons, i);
-  return all;
+  for (std::size_t i = 0; i < summary.decomposition.size(); ++i) {
+    summary.decomposition[i] = SummariseStep(comparisons, i);
+  }
+  return summary;
 }
 
 }  // namespace alidade

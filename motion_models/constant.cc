@@ -3,5 +3,5 @@
 
 #include "alidade/model/plugin.h"
 
-ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::Constant<>, "constant",
-                              "a value that stays, or a random walk", "[Ekf2017] sec. 1.2"))
+ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::Constant<>, "constant", "a constant value, or a random walk",
+                              "[Ekf2017] sec. 1.2"))

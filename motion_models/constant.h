@@ -5,9 +5,9 @@
 
 namespace alidade {
 
-/// A value that stays, or a random walk.
+/// Constant value, or a random walk.
 ///
-///   model      x' = x + w,   w ~ N(0, q^2 dt I)        q = 0: constant, no noise input
+///   model      x' = x + w,   w ~ N(0, q^2 dt I)        q = 0: constant, without noise input
 ///   Jacobian   F = I, G = I                            n x n
 ///
 ///   symbol     shape  unit        meaning
@@ -21,7 +21,7 @@ template <int N = kDynamic>
 struct Constant : Motion<N, Vec<N>> {
   static constexpr std::array kBlocks{Quantity{"value", "", "the value"}};
 
-  int size;  ///< where N is kDynamic
+  int size;  ///< used if N is kDynamic
   double walk;
 
   explicit Constant(int n, double random_walk = 0.0) : size(n), walk(random_walk) {}

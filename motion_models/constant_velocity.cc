@@ -16,7 +16,7 @@ void Make(int dimensions, alidade::Params& p, AlidadeInstance* instance) {
 void MakeConstantVelocity(alidade::Params& p, AlidadeInstance* instance) {
   const int dimensions = p.Integer("dimensions", "number of axes", 1, 3, 1);
   const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
-                            "white acceleration that adds up, or one held between updates", 0);
+                            "white acceleration, or an acceleration constant between updates", 0);
   if (kind == 0) {
     Make<true>(dimensions, p, instance);
   } else {
@@ -27,5 +27,5 @@ void MakeConstantVelocity(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_MOTION_BY(MakeConstantVelocity, "constant_velocity",
-                                 "a point with constant velocity but for a random acceleration",
+                                 "a point with constant velocity and a random acceleration",
                                  "[Ekf2017] sec. 4.1; [BarShalom2001] sec. 6"))

@@ -5,15 +5,15 @@
 
 namespace alidade {
 
-/// A point that moves with constant velocity but for a random acceleration, in D dimensions.
+/// Point with constant velocity and a random acceleration, in D dimensions.
 ///
 ///   model      p' = p + v dt + g_p(w),  v' = v + g_v(w)
-///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2, w ~ N(0, I)
-///              of the Cholesky factor of Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] per
-///              axis; adds up: Q does not depend on how dt is split
-///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), held over the interval between two
-///              updates: g_p = a dt^2/2, g_v = a dt; rank 1 per axis. In a second n intervals add
-///              sigma^2 / n to Var(v): it depends on the rate of the measurements
+///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2. Per axis
+///              Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt], with its Cholesky factor times
+///              w ~ N(0, I). Q does not depend on how dt is split into steps
+///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), constant between two updates:
+///              g_p = a dt^2/2, g_v = a dt; rank 1 per axis. n intervals in a second add
+///              sigma^2 / n to Var(v), which depends on the rate of the measurements
 ///   Jacobian   F = [I  dt I; 0  I]                     2D x 2D
 ///
 ///   symbol     shape  unit                     frame  meaning

@@ -4,4 +4,4 @@
 #include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::OdometryPose, "odometry_pose",
-                              "a camera on a vehicle whose velocities are measured", ""))
+                              "a camera on a vehicle with measured velocities", ""))

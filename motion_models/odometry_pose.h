@@ -10,16 +10,16 @@ namespace alidade {
 /// Pose of a camera on a vehicle whose linear and angular velocity are measured.
 ///
 ///   model      world_from_vehicle' = world_from_vehicle exp((v, omega) dt)
-///              with world_from_vehicle = world_from_cam cam_from_vehicle; of the camera
+///              with world_from_vehicle = world_from_cam cam_from_vehicle; for the camera
 ///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) nu dt + Exp(phi) t - t)
 ///              nu = (1 + e) v + w_v,  phi = (omega + w_omega) dt
 ///              V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
 ///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are model parameter states,
-///              0, I and 0, known, where the config gives them no initial value
-///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2) / dt) where continuous:
-///              white velocities, position and orientation are random walks; adds up over steps
-///              w ~ N(0, diag(sigma_v^2, sigma_omega^2)) where discrete: held over the interval
-///              between two updates, so that a walk depends on the rate of the measurements
+///              known to be 0, I and 0 unless the config defines an initial value
+///   noise      continuous: w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2) / dt), white
+///              velocities; position and orientation are random walks
+///              discrete: w ~ N(0, diag(sigma_v^2, sigma_omega^2)), constant between two updates,
+///              so that the walk depends on the rate of the measurements
 ///   Jacobian   automatic differentiation               13 x 13; exact at omega = 0
 ///
 ///   symbol       shape  unit      frame    meaning
@@ -27,14 +27,16 @@ namespace alidade {
 ///   v, omega     3      m/s       vehicle  control input: measured velocities, constant over dt;
 ///                       rad/s              v of the vehicle's origin
 ///   sigma_v      3      m/s^0.5   vehicle  noise of v, per axis, >= 0: root of its spectral
-///                                          density; m/s where discrete: standard deviation
-///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega likewise; rad/s where discrete
-///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
+///                                          density; discrete: standard deviation, m/s
+///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega, like sigma_v; discrete: rad/s
+///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: position and orientation of the
+///                                          camera
 ///   dt_m, R_m    3, 4   m, -      vehicle  extrinsics, relative to t_0 and R_0
 ///   e            1      -         -        relative error of v: true speed / measured - 1
 ///
-/// Defined everywhere. Additive in dt without noise; continuous noise is, but for dt^3 of the way
-/// that a turn takes sideways. docs/noise_models.md compares the kinds and converts sigma.
+/// Defined everywhere. Additive in dt without noise. Continuous noise is additive up to an error of
+/// order dt^3 in the lateral displacement of a turn. docs/noise_models.md compares the kinds and
+/// converts sigma.
 /// Source       [Sola2017] sec. 4.6 (integration); V is that of exp on SE(3).
 struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, Vec<1>> {
   static constexpr std::array kBlocks{
@@ -66,28 +68,30 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   }
   explicit OdometryPose(Params& p)
       : OdometryPose(p, p.Choice("noise.kind", {"continuous", "discrete"},
-                                 "white velocities that add up, or one error held between updates",
+                                 "white noise of the velocities, or an error constant between "
+                                 "updates",
                                  0) == 1) {}
-  OdometryPose(Params& p, bool discrete)
-      : OdometryPose(discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
-                     p.PerAxis<3>("noise.linear_velocity", discrete ? "m/s" : "m/s^0.5",
-                                  discrete ? "noise of the linear velocity, 1 sigma"
-                                           : "noise of the linear velocity, root of its density",
-                                  kNonNegative),
-                     p.PerAxis<3>("noise.angular_velocity", discrete ? "rad/s" : "rad/s^0.5",
-                                  discrete ? "noise of the angular velocity, 1 sigma"
-                                           : "noise of the angular velocity, root of its density",
-                                  kNonNegative),
-                     p.Vector<3>("vehicle_from_cam.position", "m", "where the camera is mounted",
-                                 {}, std::array<double, 3>{}),
-                     ReadVehicleFromCam(p)) {}
+  OdometryPose(Params& p, bool is_discrete)
+      : OdometryPose(
+            is_discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
+            p.PerAxis<3>("noise.linear_velocity", is_discrete ? "m/s" : "m/s^0.5",
+                         is_discrete ? "noise of the linear velocity, 1 sigma"
+                                     : "noise of the linear velocity, root of its density",
+                         kNonNegative),
+            p.PerAxis<3>("noise.angular_velocity", is_discrete ? "rad/s" : "rad/s^0.5",
+                         is_discrete ? "noise of the angular velocity, 1 sigma"
+                                     : "noise of the angular velocity, root of its density",
+                         kNonNegative),
+            p.Vector<3>("vehicle_from_cam.position", "m", "position of the camera on the vehicle",
+                        {}, std::array<double, 3>{}),
+            ReadVehicleFromCam(p)) {}
 
   NoiseKind noise_kind() const { return kind; }
   template <class T>
   void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_scale_error,
             const T* u, const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1,
             T* speed_scale_error1) const {
-    T phi[3], way[3], t[3], turned[3], moved[3], turn[3], step[3];
+    T phi[3], way[3], t[3], turned[3], displacement[3], turn[3], step[3];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
     for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_scale_error[0]) * u[i] + w[i]);
     for (std::size_t i = 0; i < 3; ++i) t[i] = mount[i] + shift[i];
@@ -95,19 +99,19 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
     UnitQuaternion::Exp(phi, rotation);
     UnitQuaternion::Rotate(rotation, t, turned);
-    MoveAlong(phi, way, moved);
-    for (int i = 0; i < 3; ++i) moved[i] += turned[i] - t[i];
-    UnitQuaternion::RotateBack(mounted, moved, step);
+    IntegrateTurn(phi, way, displacement);
+    for (int i = 0; i < 3; ++i) displacement[i] += turned[i] - t[i];
+    UnitQuaternion::RotateBack(mounted, displacement, step);
     UnitQuaternion::RotateBack(mounted, phi, turn);
-    UnitQuaternion::Rotate(q, step, moved);
-    for (int i = 0; i < 3; ++i) r1[i] = r[i] + moved[i];
+    UnitQuaternion::Rotate(q, step, displacement);
+    for (int i = 0; i < 3; ++i) r1[i] = r[i] + displacement[i];
     UnitQuaternion::Plus(q, turn, q1);
     std::copy(shift, shift + 3, shift1);
     std::copy(tilt, tilt + 4, tilt1);
     speed_scale_error1[0] = speed_scale_error[0];
   }
   void SqrtQ(double dt_s, MatrixRef Lq) const {
-    double scale = 1.0;  // of the mean velocities of the step
+    double scale = 1.0;  // for the mean velocities of the step
     if (kind == NoiseKind::kContinuous) scale = dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       const int k = static_cast<int>(i);
@@ -117,9 +121,9 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   }
 
  private:
-  /// moved = V(phi) way
+  /// Computes displacement = V(phi) way.
   template <class T>
-  static void MoveAlong(const T* phi, const T* way, T* moved) {
+  static void IntegrateTurn(const T* phi, const T* way, T* displacement) {
     using std::cos;
     using std::sin;
     using std::sqrt;
@@ -135,7 +139,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     T once[3], twice[3];
     Cross(phi, way, once);
     Cross(phi, once, twice);
-    for (int i = 0; i < 3; ++i) moved[i] = way[i] + a * once[i] + b * twice[i];
+    for (int i = 0; i < 3; ++i) displacement[i] = way[i] + a * once[i] + b * twice[i];
   }
   template <class T>
   static void Cross(const T* x, const T* y, T* z) {
@@ -144,7 +148,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     z[2] = x[0] * y[1] - x[1] * y[0];
   }
   static std::array<double, 4> ReadVehicleFromCam(Params& p) {
-    const char* const doc = "how the camera is turned, a unit quaternion";
+    const char* const doc = "orientation of the camera on the vehicle, a unit quaternion";
     const std::array<double, 4> q{p.Number("vehicle_from_cam.orientation.w", "", doc, {}, 1.0),
                                   p.Number("vehicle_from_cam.orientation.x", "", doc, {}, 0.0),
                                   p.Number("vehicle_from_cam.orientation.y", "", doc, {}, 0.0),
@@ -152,7 +156,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     constexpr double kTolerance = 1e-3;
     if (std::abs(norm - 1.0) <= kTolerance) return q;
-    p.Fail("vehicle_from_cam.orientation", "not of unit length to 1e-3");
+    p.Fail("vehicle_from_cam.orientation", "is not of unit length to 1e-3");
     return {1.0, 0.0, 0.0, 0.0};
   }
 };

@@ -7,7 +7,7 @@ namespace {
 
 void MakeQuaternionPose(alidade::Params& p, AlidadeInstance* instance) {
   const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
-                            "white accelerations that add up, or held between updates", 0);
+                            "white accelerations, or accelerations constant between updates", 0);
   if (kind == 0) {
     alidade::EmplaceMotion<alidade::ContinuousQuaternionPose>(p, instance);
   } else {
@@ -18,6 +18,5 @@ void MakeQuaternionPose(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_MOTION_BY(MakeQuaternionPose, "quaternion_pose",
-                                 "a rigid body with constant velocities but for random "
-                                 "accelerations",
+                                 "a rigid body with constant velocities and random accelerations",
                                  "[MonoSlam2015] sec. 4.3, [Davison2007]; [BarShalom2001]"))

@@ -5,14 +5,14 @@
 
 namespace alidade {
 
-/// A rigid body that moves and turns with constant velocity but for random accelerations, held over
-/// the interval between two updates (discrete noise, DWNA).
+/// Rigid body with constant linear and angular velocity and random accelerations, which are
+/// constant between two updates (discrete noise, DWNA).
 ///
 ///   model      v' = v + a dt,           r' = r + v' dt
 ///              omega' = omega + alpha dt,   q' = q Exp(omega' dt)
 ///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)); G is 12 x 6: rank 6.
-///              In a second n intervals add sigma_a^2 / n to Var(v): it depends on the rate of the
-///              measurements
+///              n intervals in a second add sigma_a^2 / n to Var(v), which depends on the rate of
+///              the measurements
 ///   Jacobian   automatic differentiation               12 x 12; exact at omega = 0
 ///
 ///   symbol          shape  unit           frame  meaning
@@ -23,8 +23,8 @@ namespace alidade {
 ///   sigma_a         3      m/s^2          world  acceleration, per axis; >= 0
 ///   sigma_alpha     3      rad/s^2        body   angular acceleration, per axis; >= 0
 ///
-/// Defined everywhere. Additive in dt without noise. For a camera, body is cam. r' has v', so that
-/// the noise of r over a split interval is that of the whole to first order in dt.
+/// Defined everywhere. Additive in dt without noise. For a camera, body is cam. r' depends on v'.
+/// The noise of r over a split interval therefore equals that of the whole to first order in dt.
 /// Source       [MonoSlam2015] sec. 4.3, [Davison2007] sec. 3.4.
 struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
@@ -66,13 +66,14 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   }
 };
 
-/// The same body under white accelerations (continuous noise, CWNA), which add up: Q does not
-/// depend on how dt is split.
+/// Rigid body like QuaternionPose, with white accelerations (continuous noise, CWNA). Q does not
+/// depend on how dt is split into steps.
 ///
 ///   model      r' = r + v dt + w_r,     q' = q Exp(omega dt + w_q)
 ///              v' = v + w_v,            omega' = omega + w_omega
 ///   noise      w ~ N(0, Lq Lq'): per axis Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt],
-///              and so (w_q, w_omega) with sigma_alpha; exact where omega = 0, else to first order
+///              and likewise (w_q, w_omega) with sigma_alpha; exact for omega = 0, else to first
+///              order
 ///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],
 ///              phi = omega dt + w_q
 ///              G = diag(I, J(phi), I, I),  J(phi) = d Log(Exp(-phi) Exp(phi + d))/dd
@@ -81,7 +82,8 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
 ///   symbol          shape  unit           frame  meaning
 ///   sigma_a         3      m/s^1.5        world  root of the density of the acceleration, per
 ///                                                axis: m/s^2 for each Hz^0.5; >= 0
-///   sigma_alpha     3      rad/s^1.5      body   root of that of the angular acceleration; >= 0
+///   sigma_alpha     3      rad/s^1.5      body   root of the density of the angular acceleration,
+///                                                per axis; >= 0
 ///
 /// Defined everywhere. docs/noise_models.md compares the kinds and converts sigma.
 /// Source       [BarShalom2001] sec. 6.2; J: [Sola2017] sec. 4.3.
@@ -115,22 +117,22 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
   }
   void StepJacobian(const double*, const double*, const double*, const double* omega,
                     const double* w, double dt_s, MatrixRef f, MatrixRef g) const {
-    double phi[3], back[3], rotation[4];
+    double phi[3], minus_phi[3], rotation[4];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * omega[i] + w[3 + i];
-    for (int i = 0; i < 3; ++i) back[i] = -phi[i];
-    UnitQuaternion::Exp(back, rotation);
+    for (int i = 0; i < 3; ++i) minus_phi[i] = -phi[i];
+    UnitQuaternion::Exp(minus_phi, rotation);
     for (int c = 0; c < 3; ++c) {
       f(c, c) = f(6 + c, 6 + c) = f(9 + c, 9 + c) = 1.0;
       g(c, c) = g(6 + c, 6 + c) = g(9 + c, 9 + c) = 1.0;
       f(c, 6 + c) = dt_s;
       const double axis[3] = {c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0};
-      double turned[3], moved[3];
-      UnitQuaternion::Rotate(rotation, axis, turned);
-      RightJacobian(phi, axis, moved);
+      double rotated_axis[3], j_axis[3];
+      UnitQuaternion::Rotate(rotation, axis, rotated_axis);
+      MultiplyByRightJacobian(phi, axis, j_axis);
       for (int i = 0; i < 3; ++i) {
-        f(3 + i, 3 + c) = turned[i];
-        f(3 + i, 9 + c) = dt_s * moved[i];
-        g(3 + i, 3 + c) = moved[i];
+        f(3 + i, 3 + c) = rotated_axis[i];
+        f(3 + i, 9 + c) = dt_s * j_axis[i];
+        g(3 + i, 3 + c) = j_axis[i];
       }
     }
   }
@@ -146,8 +148,8 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
   }
 
  private:
-  /// to = J(phi) from
-  static void RightJacobian(const double* phi, const double* from, double* to) {
+  /// Computes product = J(phi) x.
+  static void MultiplyByRightJacobian(const double* phi, const double* x, double* product) {
     constexpr double kSeries = 1e-4;  // of the angle squared: the next term is 1e-16
     const double angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
     double a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);
@@ -158,9 +160,9 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
       b = (angle - std::sin(angle)) / (angle2 * angle);
     }
     double once[3], twice[3];
-    Cross(phi, from, once);
+    Cross(phi, x, once);
     Cross(phi, once, twice);
-    for (int i = 0; i < 3; ++i) to[i] = from[i] - a * once[i] + b * twice[i];
+    for (int i = 0; i < 3; ++i) product[i] = x[i] - a * once[i] + b * twice[i];
   }
   static void Cross(const double* x, const double* y, double* z) {
     z[0] = x[1] * y[2] - x[2] * y[1];

@@ -11,7 +11,7 @@ namespace alidade {
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma_u^2, sigma_v^2, (s0 + s2 d^2)^2)  3x3, px^2 and m^2, d predicted
-///   inverse    the point on the pixel's ray that is d ahead
+///   inverse    the point on the pixel's ray at the depth d
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
@@ -20,8 +20,8 @@ namespace alidade {
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
-///   s0, s2     1      m, 1/m  -      standard deviation of d: a constant part, > 0, and one that
-///                                    grows with d^2, >= 0 (that of a disparity behind it)
+///   s0, s2     1      m, 1/m  -      standard deviation of d: constant part, > 0, and coefficient
+///                                    of d^2, >= 0 (for a depth from disparity)
 ///
 /// Defined for  h within the lens, and hz > 0, rho > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the image, and d > 0; else the measurement is invalid.
@@ -29,27 +29,29 @@ namespace alidade {
 template <class Representation>
 struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Representation> {
   static constexpr Quantity kMeasurement{
-      "pixel_and_depth", "", "where the landmark is seen, px, and its depth, m", "u,v,depth"};
+      "pixel_and_depth", "", "pixel of the landmark, px, and its depth, m", "u,v,depth"};
 
   Camera camera;
   std::array<double, 2> sigma_px;
   double sigma_depth_m, sigma_depth_quadratic_1_m;
 
-  DepthFeature(const Camera& lens, const std::array<double, 2>& sigma, double depth_m,
-               double depth_per_m = 0.0)
-      : camera(lens),
+  DepthFeature(const Camera& depth_camera, const std::array<double, 2>& sigma, double depth_m,
+               double depth_quadratic_1_m = 0.0)
+      : camera(depth_camera),
         sigma_px(sigma),
         sigma_depth_m(depth_m),
-        sigma_depth_quadratic_1_m(depth_per_m) {}
-  DepthFeature(const Camera& lens, double sigma, double depth_m, double depth_per_m = 0.0)
-      : DepthFeature(lens, std::array{sigma, sigma}, depth_m, depth_per_m) {}
+        sigma_depth_quadratic_1_m(depth_quadratic_1_m) {}
+  DepthFeature(const Camera& depth_camera, double sigma, double depth_m,
+               double depth_quadratic_1_m = 0.0)
+      : DepthFeature(depth_camera, std::array{sigma, sigma}, depth_m, depth_quadratic_1_m) {}
   explicit DepthFeature(Params& p)
-      : DepthFeature(Camera(p),
-                     p.PerAxis<2>("sigma_px", "px",
-                                  "noise of a pixel, 1 sigma; one number, or [u, v]", kPositive),
-                     p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
-                     p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
-                                   "what is added to it, times the depth squared", 0.0)) {}
+      : DepthFeature(
+            Camera(p),
+            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+                         kPositive),
+            p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
+            p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
+                          "additional noise of the depth per squared depth, 1 sigma", 0.0)) {}
 
   template <class T>
   bool PredictInCamera(const T* h, const T& rho, T* z) const {

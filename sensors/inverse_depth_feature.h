@@ -19,25 +19,25 @@ namespace alidade {
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
-///   rho0       1      1/m     -      prior, from the camera to the landmark (xyz: > 0)
+///   rho0       1      1/m     -      prior of the inverse distance from the camera (xyz: > 0)
 ///
-/// Defined for  h before the camera and within its lens; else out_of_domain, outputs untouched.
-///              rho <= 0 is allowed: a ray that the camera sees, whatever lies along it.
+/// Defined for  h in front of the camera and within its lens; else out_of_domain, outputs
+///              untouched. rho <= 0 is allowed, because only the direction of the ray matters.
 /// Valid for    pixels on the image; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 4.3, [Civera2008] sec. II.
 template <class Representation>
 struct InverseDepthFeature
     : LandmarkSensor<InverseDepthFeature<Representation>, Vec<2>, Representation> {
-  static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
+  static constexpr Quantity kMeasurement{"pixel", "px", "pixel of the landmark", "u,v"};
   static constexpr int kPrior = 1;
 
   Camera camera;
   std::array<double, 2> sigma_px;
 
-  InverseDepthFeature(const Camera& lens, const std::array<double, 2>& sigma)
-      : camera(lens), sigma_px(sigma) {}
-  InverseDepthFeature(const Camera& lens, double sigma)
-      : InverseDepthFeature(lens, std::array{sigma, sigma}) {}
+  InverseDepthFeature(const Camera& camera_model, const std::array<double, 2>& sigma)
+      : camera(camera_model), sigma_px(sigma) {}
+  InverseDepthFeature(const Camera& camera_model, double sigma)
+      : InverseDepthFeature(camera_model, std::array{sigma, sigma}) {}
   explicit InverseDepthFeature(Params& p)
       : InverseDepthFeature(
             Camera(p),

@@ -4,5 +4,5 @@
 #include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::Pose, "pose",
-                              "position and orientation, with one covariance of both",
+                              "position and orientation with a joint covariance",
                               "[Sola2017] ch. 4"))

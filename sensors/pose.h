@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// A whole pose: motion capture, scan matching, a beacon, another estimator.
+/// Pose of a body, measured by motion capture, scan matching, a beacon or another estimator.
 ///
 ///   model      z = (r + n_r, q (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   dz/d(r, q) = I                          6x6
-///   noise      R = diag(sigma_r^2, sigma_q^2), or a whole covariance with each measurement
+///   noise      R = diag(sigma_r^2, sigma_q^2), or a full covariance with each measurement
 ///                                                      6x6, m^2, m rad, rad^2
 ///   inverse    r = z_r
 ///
@@ -25,7 +25,7 @@ namespace alidade {
 struct Pose : Sensor<Product<Vec<3>, UnitQuaternion>, Vec<3>, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"position", "m", "of the body in the world", "x,y,z"},
                                      Quantity{"orientation", "", "world_from_body", "w,x,y,z"}};
-  static constexpr Quantity kMeasurement{"pose", "", "where the body is, and how it is turned"};
+  static constexpr Quantity kMeasurement{"pose", "", "position and orientation of the body"};
   static constexpr std::array kParts{Quantity{"position", "m", "of the body in the world", "x,y,z"},
                                      Quantity{"orientation", "", "world_from_body", "w,x,y,z"}};
   static constexpr int kInitialises = 0;

@@ -4,5 +4,5 @@
 #include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::Pseudorange, "pseudorange",
-                              "distance to a transmitter at a known place, and clock bias",
+                              "distance to a transmitter at a known position, and clock bias",
                               "[Groves2013] sec. 9.4"))

@@ -5,8 +5,8 @@
 
 namespace alidade {
 
-/// Pseudorange from a receiver to a transmitter whose place comes with the measurement: a
-/// satellite, or a radio beacon.
+/// Pseudorange from a receiver to a transmitter whose position comes with the measurement: a
+/// satellite or a radio beacon.
 ///
 ///   model      z = |p - s| + b + n,   n ~ N(0, sigma^2)
 ///   Jacobian   dz/dp = (p - s)' / |p - s|,  dz/db = 1  1x3, 1x1
@@ -17,7 +17,7 @@ namespace alidade {
 ///   s          3      m       world  position of the transmitter when it sent, known
 ///   b          1      m       -      clock bias of the receiver times the speed of light; a model
 ///                                    parameter state, a random walk of 1 m / sqrt(s) from
-///                                    N(0, (1e5 m)^2) unless the config says else
+///                                    N(0, (1e5 m)^2) unless the config overrides it
 ///   sigma      1      m       -      standard deviation of z; > 0
 ///
 /// Defined for  p other than s; else out_of_domain, outputs untouched.

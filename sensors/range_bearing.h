@@ -10,7 +10,7 @@ namespace alidade {
 ///   model      d = |h| / rho + n_d,   b = h / |h| (+) n_b,      h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma_d^2, sigma_b^2, sigma_b^2)        3x3, m^2 and rad^2
-///   inverse    the point d along the bearing
+///   inverse    the point at the distance d along the bearing
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   d          1      m       -      range, the distance from the sensor
@@ -19,7 +19,7 @@ namespace alidade {
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_sensor) of the sensor
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   sigma_d, sigma_b  1  m, rad  -   standard deviations; > 0
-///   d_max      1      m       -      max_range_m: what lies further gives no measurement; > 0
+///   d_max      1      m       -      max_range_m: the largest range that is measured; > 0
 ///
 /// Defined for  rho > 0, |h| > 0; else out_of_domain, outputs untouched.
 /// Valid for    0 < d <= d_max; else the measurement is invalid.
@@ -27,7 +27,8 @@ namespace alidade {
 template <class Representation>
 struct RangeBearing
     : LandmarkSensor<RangeBearing<Representation>, Product<Vec<1>, UnitVector>, Representation> {
-  static constexpr Quantity kMeasurement{"range_and_bearing", "", "where the landmark is seen"};
+  static constexpr Quantity kMeasurement{"range_and_bearing", "",
+                                         "distance and direction of the landmark"};
   static constexpr std::array kParts{
       Quantity{"range", "m", "distance from the sensor"},
       Quantity{"bearing", "", "direction in the frame of the sensor", "x,y,z"}};
@@ -35,13 +36,13 @@ struct RangeBearing
   double sigma_range_m, sigma_bearing_rad, max_range_m;
 
   RangeBearing(double range_m, double bearing_rad,
-               double furthest_m = std::numeric_limits<double>::infinity())
-      : sigma_range_m(range_m), sigma_bearing_rad(bearing_rad), max_range_m(furthest_m) {}
+               double largest_range_m = std::numeric_limits<double>::infinity())
+      : sigma_range_m(range_m), sigma_bearing_rad(bearing_rad), max_range_m(largest_range_m) {}
   explicit RangeBearing(Params& p)
       : RangeBearing(p.Positive("sigma_range_m", "m", "noise of the range, 1 sigma"),
                      p.Positive("sigma_bearing_rad", "rad",
                                 "noise of the bearing across its direction, 1 sigma"),
-                     p.NumberOrNone("max_range_m", "m", "furthest it measures", kPositive)
+                     p.NumberOrNone("max_range_m", "m", "largest range that is measured", kPositive)
                          .value_or(std::numeric_limits<double>::infinity())) {}
 
   template <class T>

@@ -4,5 +4,5 @@
 #include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::RelativePose, "relative_pose",
-                              "the pose of a landmark that has one: a tag, or a keyframe",
+                              "pose of a landmark relative to the body: a tag, or a keyframe",
                               "[Roumeliotis2002]"))

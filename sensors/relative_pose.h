@@ -5,22 +5,23 @@
 
 namespace alidade {
 
-/// The pose of a landmark that has one, as seen from the body: a fiducial tag, an object, a
-/// station; or the body itself at an earlier time, a keyframe, to which odometry and loop closures
-/// tell the way. A landmark that is seen first at the neutral pose, without noise, is such a
-/// keyframe: its pose becomes that of the body, a clone with all of its correlations.
+/// Pose of a landmark relative to the body. The landmark is a fiducial tag, an object or a station,
+/// or a keyframe: the body itself at an earlier time, relative to which odometry and loop closures
+/// measure. A landmark that is first seen at the neutral pose, without noise, is such a keyframe.
+/// Its pose is then a clone of the body's pose, with all correlations.
 ///
 ///   model      z = (R_BW (p - r) + n_r, (q^-1 s) (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   automatic differentiation               6 x 12
-///   noise      R = diag(sigma_r^2, sigma_q^2), or a whole covariance with each measurement
+///   noise      R = diag(sigma_r^2, sigma_q^2), or a full covariance with each measurement
 ///                                                      6x6, m^2, m rad, rad^2
 ///   inverse    p = r + R_WB z_r,   s = q z_q
 ///
 ///   symbol     shape  unit    frame     meaning
 ///   r, q       3, 4   m, -    world     position and orientation (world_from_body) of the body
-///   p, s       3, 4   m, -    world     those of the landmark, world_from_landmark
-///   z_r        3      m       body      where the landmark is
-///   z_q        4      -       body      how it is turned, body_from_landmark
+///   p, s       3, 4   m, -    world     position and orientation (world_from_landmark) of the
+///                                       landmark
+///   z_r        3      m       body      position of the landmark
+///   z_q        4      -       body      orientation of the landmark, body_from_landmark
 ///   n_r        3      m       body      noise of z_r
 ///   n_q        3      rad     landmark  noise of z_q, q (+) n = q Exp(n)
 ///   sigma_r, sigma_q  3  m, rad  as n_r, n_q             standard deviations by axis; > 0
@@ -37,7 +38,7 @@ struct RelativePose
       Quantity{"landmark_orientation", "", "world_from_landmark", "w,x,y,z",
                ALIDADE_ROLE_LANDMARK}};
   static constexpr Quantity kMeasurement{"relative_pose", "",
-                                         "where the landmark is, and how it is turned"};
+                                         "position and orientation of the landmark in the body"};
   static constexpr std::array kParts{Quantity{"position", "m", "in the body", "x,y,z"},
                                      Quantity{"orientation", "", "body_from_landmark", "w,x,y,z"}};
   static constexpr int kInitialises = 2;
@@ -59,8 +60,8 @@ struct RelativePose
     T offset[3];
     for (int i = 0; i < 3; ++i) offset[i] = landmark_position[i] - position[i];
     UnitQuaternion::RotateBack(orientation, offset, z);
-    const T back[4] = {orientation[0], -orientation[1], -orientation[2], -orientation[3]};
-    UnitQuaternion::Multiply(back, landmark_orientation, z + 3);
+    const T inverse[4] = {orientation[0], -orientation[1], -orientation[2], -orientation[3]};
+    UnitQuaternion::Multiply(inverse, landmark_orientation, z + 3);
     return true;
   }
   template <class T>

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Inverse apparent size of a target relative to a template taken at depth Z0.
+/// Inverse apparent size of a target relative to a template that was recorded at depth Z0.
 ///
 ///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
 ///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
@@ -16,11 +16,12 @@ namespace alidade {
 ///   symbol     shape  unit    frame  meaning
 ///   s          1      -       cam    template size / apparent size
 ///   Z          1      m       cam    depth along the optical axis
-///   lambda     1      1/m     -      inverse depth at which the template was taken
+///   lambda     1      1/m     -      inverse depth at which the template was recorded
 ///   w, sigma   1      px      -      template width, noise of an edge, 1 sigma; > 0
 ///
-/// The scale w'/w of a target w' = w / s wide is known to 2 sigma / w' (two edges, as the source
-/// takes it: linearly, not in quadrature); s = 1 / scale turns that into s^2 2 sigma / w'.
+/// The scale w'/w of a target of width w' = w / s has the standard deviation 2 sigma / w'. The
+/// source adds the errors of the two edges linearly, not in quadrature. The standard deviation of
+/// s = 1 / scale is then s^2 2 sigma / w'.
 ///
 /// Defined for  Z > 0 and lambda > 0; else out_of_domain, outputs untouched.
 /// Valid for    s > 0; else the measurement is invalid.
@@ -28,7 +29,7 @@ namespace alidade {
 struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{
       Quantity{"depth", "m", "depth along the optical axis"},
-      Quantity{"inverse_distance", "1/m", "inverse depth at which the template was taken"}};
+      Quantity{"inverse_distance", "1/m", "inverse depth at which the template was recorded"}};
   static constexpr Quantity kMeasurement{"inverse_scale", "", "template size / apparent size"};
   static constexpr int kInitialises = 1;
 

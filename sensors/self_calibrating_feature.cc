@@ -7,7 +7,7 @@ namespace {
 
 void Make(alidade::Params& p, AlidadeInstance* instance) {
   using alidade::SelfCalibratingFeature;
-  if (p.Choice("lens", {"radial", "radtan"}, "what the intrinsics are", 0) == 1) {
+  if (p.Choice("lens", {"radial", "radtan"}, "lens model, which defines the intrinsics", 0) == 1) {
     alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadtanLens>>(p, instance);
   } else {
     alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadialLens>>(p, instance);

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Focal length and radial distortion, the camera of Bundler and of the BAL problems:
+/// Lens with focal length and radial distortion: the camera of Bundler and of the BAL problems.
 ///
 ///   z = f s(q) (x, y),   s(q) = 1 + k1 q + k2 q^2,   q = x^2 + y^2
 struct RadialLens {
@@ -13,7 +13,7 @@ struct RadialLens {
                                         "focal_px,k1,k2"};
   static constexpr int kSize = 3;
 
-  /// z of the ray (x, y, 1), with k = (f, k1, k2).
+  /// Computes z of the ray (x, y, 1), with k = (f, k1, k2).
   template <class T>
   static void Project(const T* k, const T& x, const T& y, T* z) {
     const T q = x * x + y * y;
@@ -37,8 +37,8 @@ struct RadialLens {
   }
 };
 
-/// Focal length, principal point, radial and tangential distortion, the `radtan` of
-/// alidade/model/camera.h with square pixels:
+/// Lens with focal length, principal point, radial and tangential distortion: `radtan` of
+/// alidade/model/camera.h with square pixels.
 ///
 ///   z = c + f (x s(q) + 2 p1 x y + p2 (q + 2 x^2),  y s(q) + p1 (q + 2 y^2) + 2 p2 x y)
 ///   s(q) = 1 + k1 q + k2 q^2 + k3 q^3,   q = x^2 + y^2
@@ -48,7 +48,7 @@ struct RadtanLens {
                                         "focal_px,cx,cy,k1,k2,k3,p1,p2"};
   static constexpr int kSize = 8;
 
-  /// z of the ray (x, y, 1), with k = (f, cx, cy, k1, k2, k3, p1, p2).
+  /// Computes z of the ray (x, y, 1), with k = (f, cx, cy, k1, k2, k3, p1, p2).
   template <class T>
   static void Project(const T* k, const T& x, const T& y, T* z) {
     T distorted[2];
@@ -88,21 +88,21 @@ struct RadtanLens {
   }
 };
 
-/// Pixel at which a camera sees a point, where the intrinsics of the camera are estimated too.
+/// Pixel at which a camera sees a point. The intrinsics of the camera are estimated too.
 ///
 ///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, R),   h = R_CW (p - r)
 ///   Jacobian   A = dz/dh:  dz/dr = -A R_CW,  dz/dq = A [h]x,  dz/dp = A R_CW,  dz/dk    2 x n
 ///   noise      R = diag(sigma_u^2, sigma_v^2)          2x2, px^2
 ///
 ///   symbol     shape  unit    frame  meaning
-///   u, v       2      px      -      the pixel, from where the lens has its origin
+///   u, v       2      px      -      the pixel, relative to the origin of the lens model
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   k          3, 8   px, -   -      intrinsics of the lens, above
+///   k          3, 8   px, -   -      intrinsics of the lens
 ///   p          3      m       world  the point
 ///   sigma      2      px      -      standard deviations of u and v; > 0
 ///
-/// Defined for  hz > 0, or where the domain is projective hz != 0; else out_of_domain, outputs
-///              untouched. BAL and Bundler define their camera by p = -P / P_z on both sides.
+/// Defined for  hz > 0, or hz != 0 if the domain is projective; else out_of_domain, outputs
+///              untouched. BAL and Bundler define their camera by p = -P / P_z for both signs.
 /// Source       [Agarwal2010], [Brown1971].
 template <class Lens>
 struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens::kSize>, Vec<3>> {
@@ -110,29 +110,28 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
       Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}, Lens::kIntrinsics,
       Quantity{"point", "m", "in the world", "x,y,z"}};
-  static constexpr Quantity kMeasurement{"pixel", "px", "where the point is seen", "u,v"};
+  static constexpr Quantity kMeasurement{"pixel", "px", "pixel of the point", "u,v"};
 
   std::array<double, 2> sigma_px;
-  bool projective;  ///< points behind the camera are seen too
+  bool is_projective;  ///< points behind the camera are seen too
 
-  explicit SelfCalibratingFeature(const std::array<double, 2>& sigma, bool both_sides = false)
-      : sigma_px(sigma), projective(both_sides) {}
-  explicit SelfCalibratingFeature(double sigma, bool both_sides = false)
-      : SelfCalibratingFeature(std::array{sigma, sigma}, both_sides) {}
+  explicit SelfCalibratingFeature(const std::array<double, 2>& sigma, bool projective = false)
+      : sigma_px(sigma), is_projective(projective) {}
+  explicit SelfCalibratingFeature(double sigma, bool projective = false)
+      : SelfCalibratingFeature(std::array{sigma, sigma}, projective) {}
   explicit SelfCalibratingFeature(Params& p)
       : SelfCalibratingFeature{
             p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
                          kPositive),
             p.Choice("domain", {"in_front", "projective"},
-                     "points it is defined for: in front of the camera, or behind it too",
-                     0) == 1} {}
+                     "visible points: only those in front of the camera, or all", 0) == 1} {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* intrinsics, const T* point,
                T* pixel) const {
     T h[3];
     InCamera(position, orientation, point, h);
-    if (!(h[2] > T(0.0) || (projective && h[2] < T(0.0)))) return false;
+    if (!(h[2] > T(0.0) || (is_projective && h[2] < T(0.0)))) return false;
     Lens::Project(intrinsics, T(h[0] / h[2]), T(h[1] / h[2]), pixel);
     return true;
   }
@@ -141,10 +140,10 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
                 MatrixRef J_z_p) const {
     double h[3], J_z_x[4];
     InCamera(position, orientation, point, h);
-    const double depth = 1.0 / h[2], x = h[0] * depth, y = h[1] * depth;
+    const double inverse_depth = 1.0 / h[2], x = h[0] * inverse_depth, y = h[1] * inverse_depth;
     Lens::Jacobian(intrinsics, x, y, J_z_x, J_z_k);
     for (int i = 0; i < 2; ++i) {
-      const double ax = J_z_x[2 * i] * depth, ay = J_z_x[2 * i + 1] * depth;
+      const double ax = J_z_x[2 * i] * inverse_depth, ay = J_z_x[2 * i + 1] * inverse_depth;
       const double a[3] = {ax, ay, -(ax * x + ay * y)};  // a row of dz/dh
       double in_world[3];
       UnitQuaternion::Rotate(orientation, a, in_world);
@@ -165,8 +164,8 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
  private:
   template <class T>
   static void InCamera(const T* position, const T* orientation, const T* point, T* h) {
-    const T along[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
-    UnitQuaternion::RotateBack(orientation, along, h);
+    const T offset[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
+    UnitQuaternion::RotateBack(orientation, offset, h);
   }
 };
 

@@ -12,14 +12,14 @@ namespace alidade {
 ///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, R)
 ///   Jacobian   automatic differentiation               4 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = diag(sigma_u^2, sigma_v^2, sigma_u^2, sigma_v^2)   4x4, px^2
-///   inverse    depth fx B / d of the ray through (u, (v + v_right)/2),  d = u - u_right
+///   inverse    the point at depth fx B / d on the ray of (u, (v + v_right)/2),  d = u - u_right
 ///
 ///   symbol     shape  unit    frame  meaning
-///   u, v       2      px      left   pixel of the left camera; likewise right
+///   u, v       2      px      left   pixel of the left camera; u_right, v_right of the right one
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_left)
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   fx..cy     1      px      -      of both cameras, which have no distortion
-///   B          1      m       -      baseline: the right camera is at +x of the left one; > 0
+///   B          1      m       -      baseline: the right camera is at x = B of the left one; > 0
 ///   sigma      2      px      -      standard deviations of u and v, in both images; > 0
 ///
 /// Defined for  hz > 0; else out_of_domain, outputs untouched.
@@ -27,7 +27,7 @@ namespace alidade {
 /// Source       [MonoSlam2015] sec. 2.2; stereo [Ekf2017] sec. 1.2.
 template <class Representation>
 struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Representation> {
-  static constexpr Quantity kMeasurement{"pixels", "px", "where the landmark is seen",
+  static constexpr Quantity kMeasurement{"pixels", "px", "pixels of the landmark in both images",
                                          "u,v,u_right,v_right"};
 
   Camera camera;
@@ -43,7 +43,9 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
                       p.PerAxis<2>("sigma_px", "px",
                                    "noise of a pixel, 1 sigma; one number, or [u, v]", kPositive)) {
     if (camera.model != CameraModel::kPinhole) {
-      p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
+      p.Fail("camera.model",
+             "is not 'pinhole'; expected pinhole, because a rectified pair has no "
+             "distortion");
     }
   }
 

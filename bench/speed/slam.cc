@@ -228,7 +228,7 @@ class Exchange {
   }
   void operator()() {
     BlockId& landmark = landmarks_[next_++ % landmarks_.size()];
-    state_.Drop(landmark);
+    state_.Remove(landmark);
     landmark = Initialise();
   }
 

@@ -190,7 +190,7 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   if (!f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved)) {
     return Outcome::kNotFinite;
   }
-  if (solution == Solution::kCancels) {
+  if (solution == Solution::kCancellation) {
     if (!Joseph(f, rows, considered ? &considered->gain : nullptr)) return Outcome::kNotPd;
   } else {
     update.Downdate();

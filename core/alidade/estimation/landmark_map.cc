@@ -319,7 +319,7 @@ void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
     const auto index = static_cast<std::size_t>(id);
     const bool shared = index < users_.size() && users_[index] > 0;
     if (shared && --users_[index] > 0) continue;
-    f.state.Drop(id);
+    f.state.Remove(id);
   }
   landmark.blocks.clear();
 }

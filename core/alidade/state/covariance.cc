@@ -9,7 +9,7 @@
 namespace alidade {
 
 int Covariance::Add(int rows) {
-  if (const int gap = TakeGap(rows); gap >= 0) return gap;
+  if (const int gap = UseGap(rows); gap >= 0) return gap;
   const int offset = size_;
   Reserve(rows);
   size_ += rows;
@@ -19,7 +19,7 @@ int Covariance::Add(int rows) {
 void Covariance::Reserve(int rows) {
   const int needed = size_ + rows;
   if (needed <= capacity_) return;
-  // An eighth more than asked for: a landmark that takes another form is there twice for a while.
+  // An eighth more than requested: a landmark has two representations while it is converted.
   const int capacity = internal::PaddedSize(std::max(2 * capacity_, needed + needed / 8));
   const auto side = static_cast<std::size_t>(capacity);
   AlignedNumbers larger(side * side, 0.0);
@@ -29,8 +29,9 @@ void Covariance::Reserve(int rows) {
   capacity_ = capacity;
 }
 
-/// Takes `rows` rows from the smallest gap that has them, and returns their offset; -1: none has.
-int Covariance::TakeGap(int rows) {
+/// Removes `rows` rows from the smallest gap that is large enough, and returns their offset.
+/// Returns -1 if no gap is large enough.
+int Covariance::UseGap(int rows) {
   auto best = gaps_.end();
   for (auto gap = gaps_.begin(); gap != gaps_.end(); ++gap) {
     if (gap->second < rows) continue;
@@ -50,10 +51,11 @@ void Covariance::Clear(int offset, int rows) {
 
 void Covariance::Release(int offset, int rows) {
   Clear(offset, rows);
-  // Gaps that touch become one, and one at the end is given back.
+  // Adjacent gaps are merged. A gap at the end is removed.
   for (auto gap = gaps_.begin(); gap != gaps_.end();) {
-    const bool before = gap->first + gap->second == offset, after = offset + rows == gap->first;
-    if (!before && !after) {
+    const bool is_before = gap->first + gap->second == offset;
+    const bool is_after = offset + rows == gap->first;
+    if (!is_before && !is_after) {
       ++gap;
       continue;
     }
@@ -68,18 +70,18 @@ void Covariance::Release(int offset, int rows) {
   }
 }
 
-int Covariance::MoveToGap(int from, int rows) {
-  const int to = TakeGap(rows);
-  if (to < 0) return to;
+int Covariance::MoveToGap(int offset, int rows) {
+  const int new_offset = UseGap(rows);
+  if (new_offset < 0) return new_offset;
   const Workspace::Use use(memory_);
   Workspace::Matrix cross = memory_.Take(size_, rows);
-  cross.topRows(from) = p().block(from, 0, rows, from).transpose();
-  cross.bottomRows(size_ - from) = p().block(from, from, size_ - from, rows);
-  moved_.resize(static_cast<std::size_t>(rows));
-  std::iota(moved_.begin(), moved_.end(), to);
-  SetRows(moved_, cross.middleRows(from, rows), cross);
-  Release(from, rows);
-  return to;
+  cross.topRows(offset) = p().block(offset, 0, rows, offset).transpose();
+  cross.bottomRows(size_ - offset) = p().block(offset, offset, size_ - offset, rows);
+  moved_rows_.resize(static_cast<std::size_t>(rows));
+  std::iota(moved_rows_.begin(), moved_rows_.end(), new_offset);
+  SetRows(moved_rows_, cross.middleRows(offset, rows), cross);
+  Release(offset, rows);
+  return new_offset;
 }
 
 Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
@@ -98,24 +100,24 @@ void Covariance::SetBlock(int a, int b, const ConstMatrix& value) {
   }
 }
 
-void Covariance::SetRows(int offset, const ConstMatrix& own) {
-  Clear(offset, static_cast<int>(own.rows()));
-  SetBlock(offset, offset, own);
+void Covariance::SetRows(int offset, const ConstMatrix& diagonal_block) {
+  Clear(offset, static_cast<int>(diagonal_block.rows()));
+  SetBlock(offset, offset, diagonal_block);
 }
 
-void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& own,
+void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& diagonal_block,
                          const ConstMatrix& cross) {
   auto p = this->p();
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const Eigen::Index row = rows[k], below = size_ - row;
+    const Eigen::Index row = rows[k], height = size_ - row;
     const auto column = cross.col(static_cast<Eigen::Index>(k));
     p.row(row).head(row) = column.head(row).transpose();
-    p.col(row).segment(row, below) = column.tail(below);
+    p.col(row).segment(row, height) = column.tail(height);
   }
-  for (std::size_t i = 0; i < rows.size(); ++i) {  // between rows that wrote `cross`
+  for (std::size_t i = 0; i < rows.size(); ++i) {  // replaces elements of `cross` among the rows
     for (std::size_t j = 0; j <= i; ++j) {
       p(std::max(rows[i], rows[j]), std::min(rows[i], rows[j])) =
-          own(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          diagonal_block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
 }

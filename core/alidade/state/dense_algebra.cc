@@ -84,10 +84,10 @@ Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd& symmetric) {
 
 LeastSquares SolveLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
   const Qr qr(a);
-  LeastSquares found{UpperTriangle(qr), {}, b};
-  found.q_adjoint_b.applyOnTheLeft(qr.householderQ().adjoint());
-  found.x = found.r.triangularView<Eigen::Upper>().solve(found.q_adjoint_b.head(a.cols()));
-  return found;
+  LeastSquares solution{UpperTriangle(qr), {}, b};
+  solution.q_adjoint_b.applyOnTheLeft(qr.householderQ().adjoint());
+  solution.x = solution.r.triangularView<Eigen::Upper>().solve(solution.q_adjoint_b.head(a.cols()));
+  return solution;
 }
 
 Eigen::MatrixXd UpperTriangleOf(const Eigen::MatrixXd& a) { return UpperTriangle(Qr(a)); }

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <type_traits>
 
-/// Matrices of Eigen go in and out of the library. It aligns them to 16 bytes and takes their
-/// memory from malloc: so must a program that uses them, whatever its flags. The CMake target
-/// alidade::estimation sees to it.
+/// Settings of Eigen that the library and its users must share, because Eigen matrices are part of
+/// its API. The library aligns matrices to 16 bytes and allocates them by malloc. A program must do
+/// the same, whatever its compiler flags. The CMake target alidade::estimation ensures this.
 static_assert(
     EIGEN_MAX_ALIGN_BYTES == 16 && EIGEN_MAX_STATIC_ALIGN_BYTES == 16,
     "Eigen aligns matrices in another way than libalidade-estimation, because of -mavx, "

@@ -12,14 +12,14 @@ namespace alidade::internal {
 namespace {
 
 std::vector<InstructionSet> FindSets() {
-  std::vector<InstructionSet> found = {InstructionSet::kBaseline};
+  std::vector<InstructionSet> sets = {InstructionSet::kBaseline};
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  const bool avx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-  if (avx2) found.push_back(InstructionSet::kAvx2);
-  if (avx2 && __builtin_cpu_supports("avx512f") != 0) found.push_back(InstructionSet::kAvx512);
+  const bool has_avx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  if (has_avx2) sets.push_back(InstructionSet::kAvx2);
+  if (has_avx2 && __builtin_cpu_supports("avx512f") != 0) sets.push_back(InstructionSet::kAvx512);
 #endif
-  return found;
+  return sets;
 }
 
 }  // namespace
@@ -30,21 +30,22 @@ const char* ToString(InstructionSet set) {
 }
 
 std::span<const InstructionSet> AllInstructionSets() {
-  static const std::vector<InstructionSet> all = FindSets();
-  return all;
+  static const std::vector<InstructionSet> sets = FindSets();
+  return sets;
 }
 
 InstructionSet BestInstructionSet() {
   static const InstructionSet best = [] {
-    const char* const asked = std::getenv("ALIDADE_KERNELS");
-    if (asked == nullptr || *asked == '\0') return AllInstructionSets().back();
+    const char* const requested = std::getenv("ALIDADE_KERNELS");
+    if (requested == nullptr || *requested == '\0') return AllInstructionSets().back();
     std::string names;
     for (const InstructionSet set : AllInstructionSets()) {
-      if (std::string_view(asked) == ToString(set)) return set;
+      if (std::string_view(requested) == ToString(set)) return set;
       names.append(names.empty() ? "" : ", ").append(ToString(set));
     }
-    throw Error(ExitCode::kUsage, "environment variable ALIDADE_KERNELS: '" + std::string(asked) +
-                                      "' is none of the kernels of this processor: " + names);
+    throw Error(ExitCode::kUsage,
+                "environment variable ALIDADE_KERNELS: '" + std::string(requested) +
+                    "' is not available on this processor; expected one of " + names);
   }();
   return best;
 }

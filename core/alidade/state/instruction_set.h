@@ -5,16 +5,16 @@
 
 namespace alidade::internal {
 
-/// A set of vector instructions that kernels are compiled for. The build asks for the baseline
-/// alone; the processor is asked at run time.
+/// Set of vector instructions for which kernels are compiled. The build requires only the baseline.
+/// The set is selected at run time, by the features of the processor.
 enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
 
-/// `baseline`, `AVX2`, `AVX-512`.
+/// Returns `baseline`, `AVX2` or `AVX-512`.
 const char* ToString(InstructionSet set);
-/// Those of this processor, the best last.
+/// Returns the sets of this processor. The last one is the best.
 std::span<const InstructionSet> AllInstructionSets();
-/// The best one, or the one that the environment variable ALIDADE_KERNELS names. Error kUsage if it
-/// names none of them.
+/// Returns the best set, or the set that the environment variable ALIDADE_KERNELS names. Error
+/// kUsage if this processor does not have it.
 InstructionSet BestInstructionSet();
 
 }  // namespace alidade::internal

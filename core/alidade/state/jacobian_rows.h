@@ -8,20 +8,20 @@
 
 namespace alidade {
 
-/// Matrices as they cross the plugin ABI.
+/// Matrix in the storage order of the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// A matrix that is read, a block of another one too.
+/// Read-only matrix, or a block of one.
 using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
 
-/// The columns of a Jacobian that belong to one block of the state: at `column` of its rows.
+/// Columns of a Jacobian that belong to one block of the state.
 struct JacobianPart {
   int offset;  ///< of the block in the covariance
   int size;
-  int column;
+  int column;  ///< index of the first column
 };
 
-/// m rows of a Jacobian of n columns that is zero but in some; one that is named twice has the sum.
+/// Non-zero columns of m rows of a Jacobian of n columns. A column that is listed twice is the sum.
 struct JacobianRows {
   const double* data;  ///< m x width, row-major
   int rows;

@@ -9,70 +9,71 @@ namespace alidade::internal {
 
 void KalmanUpdate::Begin(Covariance& p, int capacity) {
   const SymmetricView view = p.view();
-  const bool fits = view.size == update_.p.size && view.stride == update_.p.stride &&
-                    capacity <= update_.capacity && kernels_ != nullptr;
+  const bool has_capacity = view.size == update_.p.size && view.stride == update_.p.stride &&
+                            capacity <= update_.capacity && kernels_ != nullptr;
   update_.p = view;
   update_.m = 0;
-  if (fits) return;
+  if (has_capacity) return;
   kernels_ = &KernelsFor(view);
   update_.panel_rows = kernels_->panel_rows;
   update_.capacity = capacity;
   Allocate();
 }
 
-/// Memory for size and capacity of the update.
+/// Allocates memory for the size and capacity of the update.
 void KalmanUpdate::Allocate() {
-  const auto number = [](int count) { return static_cast<std::size_t>(count); };
-  const std::size_t n = number(PaddedSize(update_.p.size)), c = number(update_.capacity),
-                    m = number(PaddedSize(update_.capacity));
+  const auto to_size = [](int count) { return static_cast<std::size_t>(count); };
+  const std::size_t n = to_size(PaddedSize(update_.p.size)), c = to_size(update_.capacity),
+                    m = to_size(PaddedSize(update_.capacity));
   const std::size_t needed = 2 * n * c + m * c + 2 * m + 2 * n;
   if (memory_.size() < needed) memory_.assign(std::max(needed, 2 * memory_.size()), 0.0);
   double* next = memory_.data();
-  const auto take = [&](std::size_t count) { return std::exchange(next, next + count); };
-  update_.w = take(n * c);
-  gain_ = take(n * c);
-  update_.s = take(m * c);
-  update_.inverse_d = take(m);
-  update_.y = take(m);
-  update_.dx = take(n);
-  update_.lost = take(n);
+  const auto allocate = [&](std::size_t count) { return std::exchange(next, next + count); };
+  update_.w = allocate(n * c);
+  gain_ = allocate(n * c);
+  update_.s = allocate(m * c);
+  update_.inverse_d = allocate(m);
+  update_.y = allocate(m);
+  update_.dx = allocate(n);
+  update_.variance_decrease = allocate(n);
 }
 
-void KalmanUpdate::MoveColumns(int from, int to, int count) {
+void KalmanUpdate::MoveColumns(int source, int destination, int count) {
   const int height = update_.panel_rows;
   for (int i = 0; i < update_.p.size; i += height) {
     double* const panel = &update_.At(update_.w, i, 0);
-    std::copy_n(panel + std::ptrdiff_t{from} * height, std::ptrdiff_t{count} * height,
-                panel + std::ptrdiff_t{to} * height);
+    std::copy_n(panel + std::ptrdiff_t{source} * height, std::ptrdiff_t{count} * height,
+                panel + std::ptrdiff_t{destination} * height);
   }
 }
 
 Solution KalmanUpdate::Solve(std::span<const MeasurementRows* const> measurements,
-                             bool wants_gain) {
+                             bool needs_gain) {
   update_.measurements = measurements;
   update_.m = measurements.back()->column + measurements.back()->h.rows;
-  update_.gain = wants_gain ? gain_ : nullptr;
+  update_.gain = needs_gain ? gain_ : nullptr;
   return Kernels::For(kernels_->solve, update_.m)(update_);
 }
 
 void KalmanUpdate::CopyGainOfPanels(std::span<const int> rows, int column, int count,
-                                    double* to) const {
+                                    double* destination) const {
   const std::ptrdiff_t height = update_.panel_rows;
   const double* first = update_.gain + column * height;
   for (const double* const end = first + count * height; first != end; first += height) {
     for (const int i : rows) {
-      *to++ = i < height ? first[i] : first[i / height * height * update_.capacity + i % height];
+      *destination++ =
+          i < height ? first[i] : first[i / height * height * update_.capacity + i % height];
     }
   }
 }
 
-void KalmanUpdate::CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const {
+void KalmanUpdate::CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> destination) const {
   const Eigen::Index n = update_.p.size, height = update_.panel_rows;
   for (Eigen::Index i = 0; i < n; i += height) {
     const Eigen::Map<const Eigen::MatrixXd> panel(
-        &update_.At(update_.w, static_cast<int>(i), column), height, to.cols());
+        &update_.At(update_.w, static_cast<int>(i), column), height, destination.cols());
     const Eigen::Index count = std::min(height, n - i);
-    to.middleRows(i, count) = panel.topRows(count);
+    destination.middleRows(i, count) = panel.topRows(count);
   }
 }
 

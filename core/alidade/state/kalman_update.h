@@ -9,55 +9,57 @@
 
 namespace alidade::internal {
 
-/// The equations of a Kalman update of n states by m rows, in memory that is kept from one update
-/// to the next:
+/// Equations of a Kalman update of n states by m rows. Memory is reused by later updates. The steps
+/// are
 ///
-///   Begin        room for P H'
-///   ComputeNis   of each measurement i:  P H_i',  S_i = H_i P H_i' + R_i,  r_i' S_i^-1 r_i
-///   Solve        of those that passed, stacked:
+///   Begin        allocates P H'
+///   ComputeNis   for each measurement i:  P H_i',  S_i = H_i P H_i' + R_i,  r_i' S_i^-1 r_i
+///   Solve        for the accepted measurements, stacked:
 ///                S = H P H' + R = L D L',  W = P H' L^-T,  dx = W D^-1 L^-1 r,  K = W D^-1 L^-1
 ///   Downdate     P' = P - W D^-1 W'
 ///
-/// The kernels for the size of P have the loops (kernels.h).
+/// kernels.h contains the loops, which depend on the size of P.
 class KalmanUpdate {
  public:
-  /// Starts an update of P by at most `capacity` rows; P has to stay in its memory.
+  /// Starts an update of P by at most `capacity` rows. P must stay in its memory.
   void Begin(Covariance& p, int capacity);
-  /// Computes P H' of a measurement, in its columns, and its S. Returns its NIS, which is not a
-  /// number unless S is finite and positive definite.
+  /// Computes P H' of a measurement, in its columns, and its S. Returns its NIS, or NaN if S is not
+  /// finite and positive definite.
   double ComputeNis(const MeasurementRows& measurement) {
     return Kernels::For(kernels_->nis, measurement.h.rows)(update_, measurement);
   }
-  /// Moves P H' of a measurement to columns before those it has.
-  void MoveColumns(int from, int to, int count);
-  /// L, D, W, dx and, if wanted, K of the update by `measurements`, whose columns follow one
-  /// another.
-  Solution Solve(std::span<const MeasurementRows* const> measurements, bool wants_gain);
-  /// P - W D^-1 W' in place of P.
+  /// Moves P H' of a measurement from column `source` to `destination` < `source`.
+  void MoveColumns(int source, int destination, int count);
+  /// Computes L, D, W, dx and, if `needs_gain`, K of the update by `measurements`, whose columns
+  /// are adjacent.
+  Solution Solve(std::span<const MeasurementRows* const> measurements, bool needs_gain);
+  /// Replaces P by P - W D^-1 W'.
   void Downdate() { Kernels::For(kernels_->downdate, update_.m)(update_); }
 
   int rows() const { return update_.m; }  ///< m of Solve
   double* dx() { return update_.dx; }
-  /// L^-1 r.
+  /// Returns L^-1 r.
   std::span<const double> y() const { return {update_.y, static_cast<std::size_t>(update_.m)}; }
-  /// K, if it was wanted.
+  /// Returns K(i, j); requires `needs_gain` in Solve.
   double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
-  /// Elements of K, if it was wanted: of some rows in `count` columns, by columns.
-  void CopyGain(std::span<const int> rows, int column, int count, double* to) const {
-    if (update_.p.size > update_.panel_rows) return CopyGainOfPanels(rows, column, count, to);
+  /// Copies the given rows of `count` columns of K, by columns; requires `needs_gain` in Solve.
+  void CopyGain(std::span<const int> rows, int column, int count, double* destination) const {
+    if (update_.p.size > update_.panel_rows)
+      return CopyGainOfPanels(rows, column, count, destination);
     for (int j = column; j < column + count; ++j) {
-      for (const int i : rows) *to++ = update_.gain[j * update_.panel_rows + i];
+      for (const int i : rows) *destination++ = update_.gain[j * update_.panel_rows + i];
     }
   }
-  /// Columns of P H' before Solve, of W after it: n x their number.
-  void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> to) const;
+  /// Copies columns of P H' before Solve, or of W after it. `destination` has n rows.
+  void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> destination) const;
   double w(int i, int j) const { return update_.At(update_.w, i, j); }
-  /// L sqrt(D) in the lower triangle of an m x m matrix: S = L D L' = l l'.
+  /// Copies L sqrt(D) to the lower triangle of an m x m matrix: S = L D L' = l l'.
   void CopyFactor(Eigen::Ref<Eigen::MatrixXd> l) const;
 
  private:
   void Allocate();
-  void CopyGainOfPanels(std::span<const int> rows, int column, int count, double* to) const;
+  void CopyGainOfPanels(std::span<const int> rows, int column, int count,
+                        double* destination) const;
 
   const Kernels* kernels_ = nullptr;
   Update update_{};

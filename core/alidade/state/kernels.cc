@@ -19,21 +19,23 @@ namespace {
 
 constexpr int kSmall = 8;
 
-/// Of a variance, less than this left of it has lost nearly all its digits.
+/// A variance that an update reduces below this fraction has lost nearly all its digits.
 constexpr double kCancelled = 1e-10;
 
-/// Finite too.
+/// Returns true if x is positive and finite.
 inline bool IsPositive(double x) { return x > 0.0 && x < std::numeric_limits<double>::infinity(); }
 
-/// All N states of a small filter, number by number: what has just been written is not read as a
-/// vector, which would wait for the store.
+/// Column of all N states of a small filter, processed number by number. Reading recently written
+/// numbers as a vector would wait for the stores.
 template <int N>
 struct Scalars {
   static constexpr int kRows = N, kStates = N;
   double v[N];
 
-  void Load(const double* from) { ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] = from[i]; }
-  void Store(double* to) const { ALIDADE_UNROLL for (int i = 0; i < N; ++i) to[i] = v[i]; }
+  void Load(const double* source) { ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] = source[i]; }
+  void Store(double* destination) const {
+    ALIDADE_UNROLL for (int i = 0; i < N; ++i) destination[i] = v[i];
+  }
   void Add(double k, const Scalars& x) {
     ALIDADE_UNROLL for (int i = 0; i < N; ++i) v[i] += k * x.v[i];
   }
@@ -45,40 +47,42 @@ struct Scalars {
   }
 };
 
-/// N of many states, in one vector register.
+/// Column of N among many states, in one vector register.
 template <int N>
 struct Vector {
   static constexpr int kRows = N, kStates = 0;
   using Register [[gnu::vector_size(N * sizeof(double))]] = double;
   Register v;
 
-  [[gnu::always_inline]] void Load(const double* from) { std::memcpy(&v, from, sizeof v); }
-  [[gnu::always_inline]] void Store(double* to) const { std::memcpy(to, &v, sizeof v); }
+  [[gnu::always_inline]] void Load(const double* source) { std::memcpy(&v, source, sizeof v); }
+  [[gnu::always_inline]] void Store(double* destination) const {
+    std::memcpy(destination, &v, sizeof v);
+  }
   [[gnu::always_inline]] void Add(double k, const Vector& x) { v += k * x.v; }
   [[gnu::always_inline]] void Subtract(double k, const Vector& x) { v -= k * x.v; }
   [[gnu::always_inline]] void AddSquares(double k, const Vector& x) { v += k * x.v * x.v; }
 };
 
-/// The kernels on panels of Column::kRows rows, for updates of M rows (0: any number).
+/// Kernels for panels of Column::kRows rows and updates of M rows (0: any number).
 template <class Column, int M>
 struct Arithmetic {
   static constexpr int kRows = Column::kRows, kStates = Column::kStates;
-  /// How many panels a tile of the downdate is high: enough sums to keep the pipes full.
-  static constexpr int kHigh = kStates > 0 ? 1 : 2;
+  /// Height in panels of a tile of the downdate: enough sums to fill the pipelines.
+  static constexpr int kTileHeight = kStates > 0 ? 1 : 2;
 
-  // What the compiler knows of a small state or update.
+  // Sizes of a small state or update as constants for the compiler.
   ALIDADE_KERNEL SymmetricView Sized(const SymmetricView& p) {
     return kStates > 0 ? SymmetricView{p.data, kStates, kSmall} : p;
   }
   ALIDADE_KERNEL int Rows(int m) { return M > 0 ? M : m; }
-  /// Element (i, j) of a matrix in panels.
+  /// Returns element (i, j) of a matrix in panels.
   ALIDADE_KERNEL double& At(const Update& u, double* panels, int i, int j) {
     if (kStates > 0) return panels[j * kRows + i];
     const int row = i % kRows;
     return panels[std::ptrdiff_t{i - row} * u.capacity + std::ptrdiff_t{j} * kRows + row];
   }
 
-  /// y += k x, n numbers.
+  /// Computes y += k x for n numbers.
   ALIDADE_KERNEL void AddScaled(int n, double k, const double* x, double* y) {
     int i = 0;
     for (; kStates == 0 && i + kRows <= n; i += kRows) {
@@ -90,28 +94,28 @@ struct Arithmetic {
     }
     ALIDADE_UNROLL for (; i < n; ++i) y[i] += k * x[i];
   }
-  /// S = L D L' in place, m x m by columns; false unless positive definite. Reads the lower
-  /// triangle.
+  /// Computes S = L D L' in place, m x m by columns, from the lower triangle. Returns false unless
+  /// S is positive definite.
   ALIDADE_KERNEL bool Factorise(int m, double* s, double* inverse_d) {
     const int stride = PaddedSize(m);
-    int at = 0;
-    for (; kStates == 0 && at + kRows <= m; at += kRows) {  // rows [at, at + kRows) of L
-      Divide(at, s, s + at, stride, stride);
-      double* const own = s + std::ptrdiff_t{at} * stride + at;
+    int begin = 0;
+    for (; kStates == 0 && begin + kRows <= m; begin += kRows) {  // rows [begin, begin + kRows)
+      Divide(begin, s, s + begin, stride, stride);
+      double* const diagonal_block = s + std::ptrdiff_t{begin} * stride + begin;
       Column x[kRows];
-      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(own + c * stride);
-      for (int k = 0; k < at; ++k) {
-        double* const l = s + std::ptrdiff_t{k} * stride + at;
-        Column before, scaled{};
-        before.Load(l);
-        scaled.Add(inverse_d[k], before);
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(diagonal_block + c * stride);
+      for (int k = 0; k < begin; ++k) {
+        double* const l = s + std::ptrdiff_t{k} * stride + begin;
+        Column unscaled, scaled{};
+        unscaled.Load(l);
+        scaled.Add(inverse_d[k], unscaled);
         scaled.Store(l);
-        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(l[c], before);
+        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(l[c], unscaled);
       }
-      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Store(own + c * stride);
-      if (!FactoriseOwn(kRows, own, stride, inverse_d + at)) return false;
+      ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Store(diagonal_block + c * stride);
+      if (!FactoriseBlock(kRows, diagonal_block, stride, inverse_d + begin)) return false;
     }
-    for (int i = at; kStates == 0 && i < m; ++i) {  // the last rows, one by one
+    for (int i = begin; kStates == 0 && i < m; ++i) {  // the last rows, one by one
       for (int j = 0; j < i; ++j) {
         double sum = s[std::ptrdiff_t{j} * stride + i];
         for (int k = 0; k < j; ++k) {
@@ -122,22 +126,22 @@ struct Arithmetic {
       double* const pivot = s + std::ptrdiff_t{i} * (stride + 1);
       for (int k = 0; k < i; ++k) {
         double& l = s[std::ptrdiff_t{k} * stride + i];
-        const double before = l;
+        const double unscaled = l;
         l *= inverse_d[k];
-        *pivot -= l * before;
+        *pivot -= l * unscaled;
       }
       if (!IsPositive(*pivot)) return false;
       inverse_d[i] = 1.0 / *pivot;
     }
-    return kStates == 0 || FactoriseOwn(m, s, stride, inverse_d);
+    return kStates == 0 || FactoriseBlock(m, s, stride, inverse_d);
   }
-  /// The same of few rows, by columns.
-  ALIDADE_KERNEL bool FactoriseOwn(int m, double* s, int stride, double* inverse_d) {
+  /// Factorises a few rows, like Factorise, by columns.
+  ALIDADE_KERNEL bool FactoriseBlock(int m, double* s, int stride, double* inverse_d) {
     ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
       double* const l = s + std::ptrdiff_t{k} * stride;
       if (!IsPositive(l[k])) return false;
       inverse_d[k] = 1.0 / l[k];
-      ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {  // to the right, while l is still L D
+      ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {  // updates the right, while l is L D
         const double factor = -l[j] * inverse_d[k];
         ALIDADE_UNROLL for (int i = j; i < m; ++i) s[std::ptrdiff_t{j} * stride + i] +=
             factor * l[i];
@@ -146,7 +150,7 @@ struct Arithmetic {
     }
     return true;
   }
-  /// y <- L^-1 y.
+  /// Computes y <- L^-1 y.
   ALIDADE_KERNEL void Substitute(int m, const double* l, double* y) {
     const int stride = PaddedSize(m);
     ALIDADE_UNROLL for (int k = 0; k + 1 < m; ++k) {
@@ -154,16 +158,18 @@ struct Arithmetic {
     }
   }
 
-  /// Rows [i, i + kRows) of column c of P.
+  /// Returns rows [i, i + kRows) of column c of P.
   ALIDADE_KERNEL Column ColumnOf(const SymmetricView& p, int c, int i) {
     Column column;
     if (kStates == 0 && c <= i) {
       column.Load(p.data + std::ptrdiff_t{c} * p.stride + i);
     } else {
       double rows[kRows];
-      const double* const from = p.data + std::ptrdiff_t{i} * p.stride + c;
+      const double* const source = p.data + std::ptrdiff_t{i} * p.stride + c;
       if (kStates == 0 && c >= i + kRows) {
-        ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = from[std::ptrdiff_t{r} * p.stride];
+        ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) {
+          rows[r] = source[std::ptrdiff_t{r} * p.stride];
+        }
       } else {
         ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) rows[r] = p(i + r, c);
       }
@@ -171,50 +177,51 @@ struct Arithmetic {
     }
     return column;
   }
-  /// P H' of rows [first, last) of H, kAtOnce of them at a time, in the columns of w from `at` on.
-  template <int kAtOnce>
+  /// Computes P H' for rows [first, last) of H, in batches of kBatch rows, in the columns of w from
+  /// `first_column` on.
+  template <int kBatch>
   ALIDADE_KERNEL void ProjectRows(const Update& u, const JacobianRows& rows, int first, int last,
-                                  int at) {
+                                  int first_column) {
     const SymmetricView p = Sized(u.p);
     const int width = rows.width();
     const int* const columns = rows.columns.data();
     for (int i = 0; i < p.size; i += kRows) {
-      double* const pht = &At(u, u.w, i, at);
-      for (int r = first; r < last; r += kAtOnce) {
-        Column sum[kAtOnce]{};
+      double* const pht = &At(u, u.w, i, first_column);
+      for (int r = first; r < last; r += kBatch) {
+        Column sum[kBatch]{};
         for (int c = 0; c < width; ++c) {
           const Column column = ColumnOf(p, columns[c], i);
-          ALIDADE_UNROLL for (int k = 0; k < kAtOnce; ++k) {
+          ALIDADE_UNROLL for (int k = 0; k < kBatch; ++k) {
             sum[k].Add(rows.data[(r + k) * width + c], column);
           }
         }
-        ALIDADE_UNROLL for (int k = 0; k < kAtOnce; ++k) sum[k].Store(pht + (r + k) * kRows);
+        ALIDADE_UNROLL for (int k = 0; k < kBatch; ++k) sum[k].Store(pht + (r + k) * kRows);
       }
     }
   }
-  ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int at) {
-    if (M > 0) return ProjectRows<std::max(M, 1)>(u, rows, 0, m, at);
-    constexpr int kAtOnce = kStates > 0 ? 1 : 3;  // most measurements of more than two have three
-    const int most = m - m % kAtOnce;
-    ProjectRows<kAtOnce>(u, rows, 0, most, at);
-    if (kAtOnce > 1) ProjectRows<1>(u, rows, most, m, at);
+  ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int first_column) {
+    if (M > 0) return ProjectRows<std::max(M, 1)>(u, rows, 0, m, first_column);
+    constexpr int kBatch = kStates > 0 ? 1 : 3;  // most measurements of more than two have three
+    const int batched = m - m % kBatch;
+    ProjectRows<kBatch>(u, rows, 0, batched, first_column);
+    if (kBatch > 1) ProjectRows<1>(u, rows, batched, m, first_column);
   }
-  ALIDADE_KERNEL double ComputeNis(const Update& u, const MeasurementRows& one) {
-    const int m = Rows(one.h.rows), width = one.h.width();
-    const double* const h = one.h.data;
-    const int* const columns = one.h.columns.data();
-    double* const s = one.s;
-    Project(u, one.h, m, one.column);
+  ALIDADE_KERNEL double ComputeNis(const Update& u, const MeasurementRows& measurement) {
+    const int m = Rows(measurement.h.rows), width = measurement.h.width();
+    const double* const h = measurement.h.data;
+    const int* const columns = measurement.h.columns.data();
+    double* const s = measurement.s;
+    Project(u, measurement.h, m, measurement.column);
     ALIDADE_UNROLL for (int i = 0; i < m; ++i) {
       ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
-        double sum = one.noise[i * m + j];
+        double sum = measurement.noise[i * m + j];
         for (int c = 0; c < width; ++c) {
-          sum += h[i * width + c] * At(u, u.w, columns[c], one.column + j);
+          sum += h[i * width + c] * At(u, u.w, columns[c], measurement.column + j);
         }
         s[i * m + j] = s[j * m + i] = sum;
       }
     }
-    const double* const r = one.innovation;
+    const double* const r = measurement.innovation;
     if (M == 1) return IsPositive(s[0]) ? r[0] * r[0] / s[0] : kNotANumber;
     const int stride = PaddedSize(m);
     ALIDADE_UNROLL for (int j = 0; j < m; ++j) {
@@ -228,62 +235,64 @@ struct Arithmetic {
     return nis;
   }
 
-  /// The lower triangle of S, and the innovations.
+  /// Computes the lower triangle of S, and copies the innovations.
   ALIDADE_KERNEL void Stack(const Update& u, int m) {
     const int stride = PaddedSize(m);
-    for (const MeasurementRows* const each : u.measurements) {
-      const MeasurementRows& one = *each;
-      const int at = one.column, rows = one.h.rows;
-      if (at > 0) StackBefore(u, one, stride);
+    for (const MeasurementRows* const pointer : u.measurements) {
+      const MeasurementRows& measurement = *pointer;
+      const int begin = measurement.column, rows = measurement.h.rows;
+      if (begin > 0) StackCrossTerms(u, measurement, stride);
       for (int r = 0; r < rows; ++r) {
         for (int j = 0; j <= r; ++j) {
-          u.s[std::ptrdiff_t{at + j} * stride + at + r] = one.s[r * rows + j];
+          u.s[std::ptrdiff_t{begin + j} * stride + begin + r] = measurement.s[r * rows + j];
         }
-        u.y[at + r] = one.innovation[r];
+        u.y[begin + r] = measurement.innovation[r];
       }
     }
   }
-  /// H of a measurement times P H' of those before it, some columns of H at a time.
-  ALIDADE_KERNEL void StackBefore(const Update& u, const MeasurementRows& one, int stride) {
-    constexpr int kAtOnce = 16;
-    const int at = one.column, rows = one.h.rows, width = one.h.width();
-    const int* const columns = one.h.columns.data();
+  /// Computes H of a measurement times P H' of the preceding ones, in batches of columns of H.
+  ALIDADE_KERNEL void StackCrossTerms(const Update& u, const MeasurementRows& measurement,
+                                      int stride) {
+    constexpr int kBatch = 16;
+    const int begin = measurement.column, rows = measurement.h.rows, width = measurement.h.width();
+    const int* const columns = measurement.h.columns.data();
     for (int r = 0; kStates > 0 && r < rows; ++r) {
-      const double* const h = one.h.data + r * width;
-      for (int j = 0; j < at; ++j) {
+      const double* const h = measurement.h.data + r * width;
+      for (int j = 0; j < begin; ++j) {
         double sum = 0.0;
         for (int c = 0; c < width; ++c) sum += h[c] * At(u, u.w, columns[c], j);
-        u.s[std::ptrdiff_t{j} * stride + at + r] = sum;
+        u.s[std::ptrdiff_t{j} * stride + begin + r] = sum;
       }
     }
-    for (int first = 0; kStates == 0 && first < width; first += kAtOnce) {
-      const int count = std::min(kAtOnce, width - first);
-      const double* from[kAtOnce];
+    for (int first = 0; kStates == 0 && first < width; first += kBatch) {
+      const int count = std::min(kBatch, width - first);
+      const double* source[kBatch];
       for (int c = 0; c < count; ++c) {
-        from[c] = &At(u, u.w, columns[first + c], 0);
+        source[c] = &At(u, u.w, columns[first + c], 0);
       }
       for (int r = 0; r < rows; ++r) {
-        const double* const h = one.h.data + r * width + first;
-        double* const s = u.s + at + r;
-        for (int j = 0; j < at; ++j) {
+        const double* const h = measurement.h.data + r * width + first;
+        double* const s = u.s + begin + r;
+        for (int j = 0; j < begin; ++j) {
           double sum = first == 0 ? 0.0 : s[std::ptrdiff_t{j} * stride];
-          for (int c = 0; c < count; ++c) sum += h[c] * from[c][j * kRows];
+          for (int c = 0; c < count; ++c) sum += h[c] * source[c][j * kRows];
           s[std::ptrdiff_t{j} * stride] = sum;
         }
       }
     }
   }
-  /// Rows of P H' to those of W, kRows columns at a time; columns lie `step` apart.
+  /// Converts rows of P H' to rows of W, in batches of kRows columns. The distance of two columns
+  /// is `step`.
   ALIDADE_KERNEL void Divide(int m, const double* l, double* panel, int step, int stride) {
     int j = 0;
     for (; kStates == 0 && j + kRows <= m; j += kRows) {
       Column x[kRows];
       ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Load(panel + (j + c) * step);
       for (int k = 0; k < j; ++k) {
-        Column done;
-        done.Load(panel + k * step);
+        Column solved;
+        solved.Load(panel + k * step);
         const double* const row = l + std::ptrdiff_t{k} * stride + j;
-        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(row[c], done);
+        ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Subtract(row[c], solved);
       }
       ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
         ALIDADE_UNROLL for (int k = 0; k < c; ++k) {
@@ -296,37 +305,37 @@ struct Arithmetic {
       Column x;
       x.Load(panel + j * step);
       ALIDADE_UNROLL for (int k = 0; k < j; ++k) {
-        Column done;
-        done.Load(panel + k * step);
-        x.Subtract(l[std::ptrdiff_t{k} * stride + j], done);
+        Column solved;
+        solved.Load(panel + k * step);
+        x.Subtract(l[std::ptrdiff_t{k} * stride + j], solved);
       }
       x.Store(panel + j * step);
     }
   }
-  /// dx and the variances of P' in the rows of a panel from i on.
+  /// Computes dx and the decrease of the variances, in the rows of a panel from i on.
   ALIDADE_KERNEL Solution Correct(const Update& u, int m, int i, const double* panel) {
     const SymmetricView p = Sized(u.p);
-    Column dx{}, lost{};
+    Column dx{}, decrease{};
     ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
       Column w;
       w.Load(panel + k * kRows);
       dx.Add(u.inverse_d[k] * u.y[k], w);
-      lost.AddSquares(u.inverse_d[k], w);
+      decrease.AddSquares(u.inverse_d[k], w);
     }
     dx.Store(u.dx + i);
-    lost.Store(u.lost + i);
-    double defect = 0.0;  // or not a number
-    bool cancels = false;
+    decrease.Store(u.variance_decrease + i);
+    double defect = 0.0;  // NaN if a result is not finite
+    bool has_cancellation = false;
     ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) {
-      const double before = p.data[std::ptrdiff_t{i + r} * (p.stride + 1)];
-      const double after = before - u.lost[i + r];
-      defect += 0.0 * u.dx[i + r] + 0.0 * after;
-      cancels |= after < kCancelled * before;
+      const double prior = p.data[std::ptrdiff_t{i + r} * (p.stride + 1)];
+      const double posterior = prior - u.variance_decrease[i + r];
+      defect += 0.0 * u.dx[i + r] + 0.0 * posterior;
+      has_cancellation |= posterior < kCancelled * prior;
     }
     if (defect != 0.0) return Solution::kNotFinite;
-    return cancels ? Solution::kCancels : Solution::kFine;
+    return has_cancellation ? Solution::kCancellation : Solution::kOk;
   }
-  /// A panel of K from one of W.
+  /// Computes a panel of K from a panel of W.
   ALIDADE_KERNEL void Gain(const Update& u, int m, const double* panel, double* gain) {
     const int stride = PaddedSize(m);
     ALIDADE_UNROLL for (int j = m - 1; j >= 0; --j) {
@@ -334,9 +343,9 @@ struct Arithmetic {
       w.Load(panel + j * kRows);
       k.Add(u.inverse_d[j], w);
       ALIDADE_UNROLL for (int i = j + 1; i < m; ++i) {
-        Column done;
-        done.Load(gain + i * kRows);
-        k.Subtract(u.s[std::ptrdiff_t{j} * stride + i], done);
+        Column solved;
+        solved.Load(gain + i * kRows);
+        k.Subtract(u.s[std::ptrdiff_t{j} * stride + i], solved);
       }
       k.Store(gain + j * kRows);
     }
@@ -347,7 +356,7 @@ struct Arithmetic {
     Stack(u, m);
     if (!Factorise(m, u.s, u.inverse_d)) return Solution::kNotPositiveDefinite;
     Substitute(m, u.s, u.y);
-    Solution worst = Solution::kFine;
+    Solution worst = Solution::kOk;
     for (int i = 0; i < n; i += kRows) {
       double* const panel = &At(u, u.w, i, 0);
       Divide(m, u.s, panel, kRows, PaddedSize(m));
@@ -357,8 +366,8 @@ struct Arithmetic {
     return worst;
   }
 
-  /// P'(i, j) of kTile panels of rows from i and one of columns from j, by columns [first, last) of
-  /// W; `scaled`: D^-1 times those of the panel at j.
+  /// Subtracts the part of columns [first, last) of W from a tile of P: kTile panels of rows from i
+  /// on, one panel of columns from j on. `scaled`: D^-1 times W of the panel at j.
   template <int kTile>
   ALIDADE_KERNEL void Tile(const Update& u, int first, int last, int i, int j,
                            const double* scaled) {
@@ -370,13 +379,13 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Load(p + c * stride + t * kRows);
     }
     ALIDADE_UNROLL for (int k = first; k < last; ++k) {
-      Column left[kTile];
+      Column column[kTile];
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
-        left[t].Load(w + (std::ptrdiff_t{t} * u.capacity + k) * kRows);
+        column[t].Load(w + (std::ptrdiff_t{t} * u.capacity + k) * kRows);
       }
       ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) {
         ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) {
-          sum[c][t].Subtract(scaled[(k - first) * kRows + c], left[t]);
+          sum[c][t].Subtract(scaled[(k - first) * kRows + c], column[t]);
         }
       }
     }
@@ -384,9 +393,9 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Store(p + c * stride + t * kRows);
     }
   }
-  /// P' in blocks of rows and columns of W that stay in the second cache.
+  /// Computes P' in blocks of rows and columns of W that fit into the L2 cache.
   ALIDADE_KERNEL void Downdate(const Update& u) {
-    constexpr int kDepth = 256, kHeight = kStates > 0 ? kRows : 24 * kHigh * kRows;
+    constexpr int kDepth = 256, kHeight = kStates > 0 ? kRows : 24 * kTileHeight * kRows;
     const int n = Sized(u.p).size, m = Rows(u.m);
     double scaled[(M > 0 ? M : kDepth) * kRows];
     for (int first = 0; first < m; first += kDepth) {
@@ -401,8 +410,8 @@ struct Arithmetic {
             column.Store(scaled + (k - first) * kRows);
           }
           int i = std::max(block, j);
-          for (; i + kHigh * kRows <= end; i += kHigh * kRows) {
-            Tile<kHigh>(u, first, last, i, j, scaled);
+          for (; i + kTileHeight * kRows <= end; i += kTileHeight * kRows) {
+            Tile<kTileHeight>(u, first, last, i, j, scaled);
           }
           for (; i < end; i += kRows) Tile<1>(u, first, last, i, j, scaled);
         }
@@ -410,45 +419,45 @@ struct Arithmetic {
     }
   }
 
-  /// For up to two rows of a small state, K of them, all in registers.
+  /// Propagates K rows, up to two, of a small state, in registers.
   template <int K>
-  ALIDADE_KERNEL bool PropagateFew(const SymmetricView& whole, const Transition& step) {
-    const SymmetricView p = Sized(whole);
+  ALIDADE_KERNEL bool PropagateFew(const SymmetricView& covariance, const Transition& step) {
+    const SymmetricView p = Sized(covariance);
     constexpr int n = kStates;
     const int* const rows = step.rows.data();
-    double before[K * n], moved[K * n], own[K * K], defect = 0.0;  // P_a, F P_a
+    double p_a[K * n], f_p_a[K * n], diagonal_block[K * K], defect = 0.0;
     ALIDADE_UNROLL for (int c = 0; c < K; ++c) {
-      ALIDADE_UNROLL for (int i = 0; i < n; ++i) before[c * n + i] = p(rows[c], i);
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p_a[c * n + i] = p(rows[c], i);
     }
     ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
       Column sum{};
       ALIDADE_UNROLL for (int c = 0; c < K; ++c) {
         Column row;
-        row.Load(before + c * n);
+        row.Load(p_a + c * n);
         sum.Add(step.f[r * K + c], row);
       }
-      sum.Store(moved + r * n);
+      sum.Store(f_p_a + r * n);
     }
     ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
       ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
         double sum = NoiseOf(step, r, c);
         ALIDADE_UNROLL for (int j = 0; j < K; ++j) {
-          sum += moved[r * n + rows[j]] * step.f[c * K + j];
+          sum += f_p_a[r * n + rows[j]] * step.f[c * K + j];
         }
-        own[r * K + c] = sum;
+        diagonal_block[r * K + c] = sum;
       }
-      defect += 0.0 * own[r * K + r];
+      defect += 0.0 * diagonal_block[r * K + r];
     }
     if (defect != 0.0) return false;
     ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
-      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p(rows[r], i) = moved[r * n + i];
+      ALIDADE_UNROLL for (int i = 0; i < n; ++i) p(rows[r], i) = f_p_a[r * n + i];
     }
     ALIDADE_UNROLL for (int r = 0; r < K; ++r) {
-      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = own[r * K + c];
+      ALIDADE_UNROLL for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = diagonal_block[r * K + c];
     }
     return true;
   }
-  /// Element (r, c) of N N' + C + C'.
+  /// Returns element (r, c) of N N' + C + C'.
   ALIDADE_KERNEL double NoiseOf(const Transition& step, int r, int c) {
     const int width = step.width;
     const double *const a = step.noise + r * width, *const b = step.noise + c * width;
@@ -458,7 +467,7 @@ struct Arithmetic {
     const int k = static_cast<int>(step.rows.size());
     return sum + step.cross[r * k + c] + step.cross[c * k + r];
   }
-  /// c += a b, row-major: a rows x inner, b inner x PaddedSize(k), c rows x PaddedSize(k).
+  /// Computes c += a b, row-major: a rows x inner, b inner x PaddedSize(k), c rows x PaddedSize(k).
   ALIDADE_KERNEL void AddProduct(int rows, int inner, int k, const double* a, const double* b,
                                  double* c) {
     for (int i = 0; i < k; i += kRows) {
@@ -467,64 +476,68 @@ struct Arithmetic {
       for (; r < rows; ++r) AddRows<1>(r, inner, i, PaddedSize(k), a, b, c);
     }
   }
-  /// The same of kAtOnce rows from r on, which share what they read of b, and columns from i on.
-  template <int kAtOnce>
+  /// Computes c += a b for kBatch rows from r on and the columns from i on. The rows share the
+  /// loads of b.
+  template <int kBatch>
   ALIDADE_KERNEL void AddRows(int r, int inner, int i, int stride, const double* a, const double* b,
                               double* c) {
-    double* const to = c + std::ptrdiff_t{r} * stride + i;
-    Column sum[kAtOnce];
-    ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Load(to + t * stride);
+    double* const destination = c + std::ptrdiff_t{r} * stride + i;
+    Column sum[kBatch];
+    ALIDADE_UNROLL for (int t = 0; t < kBatch; ++t) sum[t].Load(destination + t * stride);
     for (int j = 0; j < inner; ++j) {
       Column row;
       row.Load(b + std::ptrdiff_t{j} * stride + i);
-      ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Add(a[(r + t) * inner + j], row);
+      ALIDADE_UNROLL for (int t = 0; t < kBatch; ++t) sum[t].Add(a[(r + t) * inner + j], row);
     }
-    ALIDADE_UNROLL for (int t = 0; t < kAtOnce; ++t) sum[t].Store(to + t * stride);
+    ALIDADE_UNROLL for (int t = 0; t < kBatch; ++t) sum[t].Store(destination + t * stride);
   }
-  /// Row `row` of P to `to`, PaddedSize(n) numbers.
-  ALIDADE_KERNEL void CopyRow(const SymmetricView& p, int row, double* to) {
-    for (int i = 0; i < p.size; i += kRows) ColumnOf(p, row, i).Store(to + i);
+  /// Copies row `row` of P, PaddedSize(n) numbers.
+  ALIDADE_KERNEL void CopyRow(const SymmetricView& p, int row, double* destination) {
+    for (int i = 0; i < p.size; i += kRows) ColumnOf(p, row, i).Store(destination + i);
   }
-  ALIDADE_KERNEL bool PropagateMany(const SymmetricView& whole, const Transition& step) {
-    const SymmetricView p = Sized(whole);
+  /// Propagates any number of rows, in memory.
+  ALIDADE_KERNEL bool PropagateMany(const SymmetricView& covariance, const Transition& step) {
+    const SymmetricView p = Sized(covariance);
     const int n = p.size, k = static_cast<int>(step.rows.size()), w = step.width;
     const int* const rows = step.rows.data();
     double* next = step.memory;
-    const auto take = [&](int height, int width) {
+    const auto allocate = [&](int height, int width) {
       return std::exchange(next, next + std::ptrdiff_t{height} * width);
     };
-    double *const before = take(k, PaddedSize(n)), *const moved = take(k, PaddedSize(n)),
-                  *const own = take(k, PaddedSize(k)), *const f_transposed = take(k, PaddedSize(k)),
-                  *const noise_transposed = take(w, PaddedSize(k)), *const among = take(k, k);
-    for (int c = 0; c < k; ++c) CopyRow(p, rows[c], before + std::ptrdiff_t{c} * PaddedSize(n));
-    std::fill(moved, f_transposed, 0.0);
-    AddProduct(k, k, n, step.f, before, moved);
+    double *const p_a = allocate(k, PaddedSize(n)), *const f_p_a = allocate(k, PaddedSize(n)),
+                  *const diagonal_block = allocate(k, PaddedSize(k)),
+                  *const f_transposed = allocate(k, PaddedSize(k)),
+                  *const noise_transposed = allocate(w, PaddedSize(k)),
+                  *const f_p_aa = allocate(k, k);
+    for (int c = 0; c < k; ++c) CopyRow(p, rows[c], p_a + std::ptrdiff_t{c} * PaddedSize(n));
+    std::fill(f_p_a, f_transposed, 0.0);
+    AddProduct(k, k, n, step.f, p_a, f_p_a);
     for (int r = 0; r < k; ++r) {
       for (int j = 0; j < k; ++j) {
         f_transposed[j * PaddedSize(k) + r] = step.f[r * k + j];
-        among[r * k + j] = moved[r * PaddedSize(n) + rows[j]];
+        f_p_aa[r * k + j] = f_p_a[r * PaddedSize(n) + rows[j]];
       }
       for (int j = 0; j < w; ++j) noise_transposed[j * PaddedSize(k) + r] = step.noise[r * w + j];
     }
-    AddProduct(k, w, k, step.noise, noise_transposed, own);
+    AddProduct(k, w, k, step.noise, noise_transposed, diagonal_block);
     for (int r = 0; step.cross != nullptr && r < k; ++r) {
       for (int c = 0; c <= r; ++c) {
-        own[r * PaddedSize(k) + c] += step.cross[r * k + c];
-        own[r * PaddedSize(k) + c] += step.cross[c * k + r];
+        diagonal_block[r * PaddedSize(k) + c] += step.cross[r * k + c];
+        diagonal_block[r * PaddedSize(k) + c] += step.cross[c * k + r];
       }
     }
-    AddProduct(k, k, k, among, f_transposed, own);
+    AddProduct(k, k, k, f_p_aa, f_transposed, diagonal_block);
     double defect = 0.0;
-    for (int r = 0; r < k; ++r) defect += 0.0 * own[r * (PaddedSize(k) + 1)];
+    for (int r = 0; r < k; ++r) defect += 0.0 * diagonal_block[r * (PaddedSize(k) + 1)];
     if (defect != 0.0) return false;
     for (int r = 0; r < k; ++r) {
-      const double* const from = moved + std::ptrdiff_t{r} * PaddedSize(n);
+      const double* const source = f_p_a + std::ptrdiff_t{r} * PaddedSize(n);
       double* const column = p.data + std::ptrdiff_t{rows[r]} * p.stride;
-      for (int i = 0; i < rows[r]; ++i) p.data[std::ptrdiff_t{i} * p.stride + rows[r]] = from[i];
-      for (int i = rows[r]; i < n; ++i) column[i] = from[i];
+      for (int i = 0; i < rows[r]; ++i) p.data[std::ptrdiff_t{i} * p.stride + rows[r]] = source[i];
+      for (int i = rows[r]; i < n; ++i) column[i] = source[i];
     }
     for (int r = 0; r < k; ++r) {
-      for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = own[r * PaddedSize(k) + c];
+      for (int c = 0; c <= r; ++c) p(rows[r], rows[c]) = diagonal_block[r * PaddedSize(k) + c];
     }
     return true;
   }
@@ -539,31 +552,31 @@ struct Arithmetic {
   }
 };
 
-/// The table of one Column, compiled for an instruction set.
-#define ALIDADE_KERNEL_TABLE(table, target, text)                                  \
-  template <class Column>                                                          \
-  struct table {                                                                   \
-    template <int M>                                                               \
-    target static double ComputeNis(const Update& u, const MeasurementRows& one) { \
-      return Arithmetic<Column, M>::ComputeNis(u, one);                            \
-    }                                                                              \
-    template <int M>                                                               \
-    target static Solution Solve(const Update& u) {                                \
-      return Arithmetic<Column, M>::Solve(u);                                      \
-    }                                                                              \
-    template <int M>                                                               \
-    target static void Downdate(const Update& u) {                                 \
-      Arithmetic<Column, M>::Downdate(u);                                          \
-    }                                                                              \
-    target static bool Propagate(const SymmetricView& p, const Transition& step) { \
-      return Arithmetic<Column, 0>::Propagate(p, step);                            \
-    }                                                                              \
-    static constexpr Kernels kTable{text,                                          \
-                                    Column::kRows,                                 \
-                                    {ComputeNis<1>, ComputeNis<2>, ComputeNis<0>}, \
-                                    {Solve<1>, Solve<2>, Solve<0>},                \
-                                    {Downdate<1>, Downdate<2>, Downdate<0>},       \
-                                    Propagate};                                    \
+/// Defines the table of kernels of a Column, compiled for an instruction set.
+#define ALIDADE_KERNEL_TABLE(table, target, text)                                          \
+  template <class Column>                                                                  \
+  struct table {                                                                           \
+    template <int M>                                                                       \
+    target static double ComputeNis(const Update& u, const MeasurementRows& measurement) { \
+      return Arithmetic<Column, M>::ComputeNis(u, measurement);                            \
+    }                                                                                      \
+    template <int M>                                                                       \
+    target static Solution Solve(const Update& u) {                                        \
+      return Arithmetic<Column, M>::Solve(u);                                              \
+    }                                                                                      \
+    template <int M>                                                                       \
+    target static void Downdate(const Update& u) {                                         \
+      Arithmetic<Column, M>::Downdate(u);                                                  \
+    }                                                                                      \
+    target static bool Propagate(const SymmetricView& p, const Transition& step) {         \
+      return Arithmetic<Column, 0>::Propagate(p, step);                                    \
+    }                                                                                      \
+    static constexpr Kernels kTable{text,                                                  \
+                                    Column::kRows,                                         \
+                                    {ComputeNis<1>, ComputeNis<2>, ComputeNis<0>},         \
+                                    {Solve<1>, Solve<2>, Solve<0>},                        \
+                                    {Downdate<1>, Downdate<2>, Downdate<0>},               \
+                                    Propagate};                                            \
   };
 ALIDADE_KERNEL_TABLE(Baseline, , "baseline")
 #if defined(__x86_64__)
@@ -581,8 +594,8 @@ constexpr std::array<const Kernels*, kSmall + 1> SmallKernels(std::integer_seque
 const Kernels& KernelsFor(const SymmetricView& p) {
   static constexpr auto kTables = SmallKernels(std::make_integer_sequence<int, kSmall>());
   static const Kernels& vectors = KernelsOf(BestInstructionSet());
-  const bool small = p.stride == kSmall && p.size > 0;
-  return small ? *kTables[static_cast<std::size_t>(p.size)] : vectors;
+  const bool is_small = p.stride == kSmall && p.size > 0;
+  return is_small ? *kTables[static_cast<std::size_t>(p.size)] : vectors;
 }
 
 const Kernels& KernelsOf([[maybe_unused]] InstructionSet set) {

@@ -7,17 +7,17 @@
 #include "alidade/state/instruction_set.h"
 #include "alidade/state/jacobian_rows.h"
 
-/// The arithmetic of a Kalman filter on raw memory. Each kernel is written once, over columns of a
-/// few rows (kernels.cc): compiled for 1 to 8 states, with loops that unroll, and for any number of
-/// states in panels of vector registers, once for each instruction set. The sets differ by rounding
-/// alone.
+/// Arithmetic of a Kalman filter on raw memory. kernels.cc contains each kernel once, for columns
+/// of a few rows. It is compiled for 1 to 8 states, with unrolled loops. For any number of states
+/// it is compiled for panels of vector registers, once for each instruction set. The results of the
+/// sets differ only by rounding.
 namespace alidade::internal {
 
-/// The size of memory for n rows or columns: whole cache lines.
+/// Returns the size of memory for n rows or columns, in whole cache lines.
 constexpr int PaddedSize(int n) { return (n + 7) & ~7; }
 
-/// A symmetric n x n matrix by columns, of which the lower triangle counts. Its memory has
-/// PaddedSize(n) rows and columns; the lower triangle of those beyond n is zero.
+/// View of a symmetric n x n matrix by columns, of which only the lower triangle is used. Its
+/// memory has PaddedSize(n) rows and columns. The lower triangle beyond n is zero.
 struct SymmetricView {
   double* data;
   int size, stride;
@@ -27,16 +27,16 @@ struct SymmetricView {
   }
 };
 
-/// One measurement of an update, linearised at the state.
+/// Measurement of an update, linearised at the state.
 struct MeasurementRows {
   JacobianRows h;
   const double* innovation;  ///< m
   const double* noise;       ///< R, m x m
-  double* s;                 ///< m x m, of Kernels::nis: S = H P H' + R
-  int column = 0;            ///< its first one in the update
+  double* s;                 ///< m x m, output of Kernels::nis: S = H P H' + R
+  int column = 0;            ///< first column in the update
 };
 
-/// An update of n states by m rows, in memory of the caller.
+/// Update of n states by m rows, in memory of the caller.
 ///
 ///   S = H P H' + R = L D L'     W = P H' L^-T     dx = W D^-1 L^-1 r     K = W D^-1 L^-1
 ///   P' = P - W D^-1 W'
@@ -44,19 +44,19 @@ struct MeasurementRows {
 /// P H', W and K are n x m in panels of Kernels::panel_rows rows, each panel by columns: see At().
 struct Update {
   SymmetricView p;
-  std::span<const MeasurementRows* const> measurements;  ///< one after the other
+  std::span<const MeasurementRows* const> measurements;  ///< in the order of their columns
   int m;
-  int capacity;  ///< columns that a panel has room for
+  int capacity;  ///< of a panel, in columns
   int panel_rows;
-  double* w;          ///< PaddedSize(n) x capacity: P H', then W
-  double* s;          ///< PaddedSize(capacity) x capacity by columns: S, then L
-  double* inverse_d;  ///< capacity
-  double* y;          ///< capacity: L^-1 r
-  double* dx;         ///< PaddedSize(n)
-  double* lost;       ///< PaddedSize(n): the diagonal of W D^-1 W'
-  double* gain;       ///< as w: K; null: not wanted
+  double* w;                  ///< PaddedSize(n) x capacity: P H', then W
+  double* s;                  ///< PaddedSize(capacity) x capacity by columns: S, then L
+  double* inverse_d;          ///< capacity
+  double* y;                  ///< capacity: L^-1 r
+  double* dx;                 ///< PaddedSize(n)
+  double* variance_decrease;  ///< PaddedSize(n): the diagonal of W D^-1 W'
+  double* gain;               ///< K, of the size of w; null if K is not needed
 
-  /// Element (i, j) of a matrix in panels.
+  /// Returns element (i, j) of a matrix in panels.
   double& At(double* panels, int i, int j) const {
     if (i < panel_rows) return panels[std::ptrdiff_t{j} * panel_rows + i];
     const int row = i % panel_rows;
@@ -64,15 +64,15 @@ struct Update {
   }
 };
 
-/// What Kernels::solve found, from good to bad.
+/// Result of Kernels::solve, from best to worst.
 enum class Solution {
-  kFine,
-  kCancels,  ///< P - W D^-1 W' would lose nearly all digits of a variance
+  kOk,
+  kCancellation,  ///< P - W D^-1 W' would lose nearly all digits of a variance
   kNotPositiveDefinite,
   kNotFinite,
 };
 
-/// x' = F x + N v, v ~ N(0, I), C = Cov(F x, N v), of the k states in `rows`.
+/// Transition x' = F x + N v, v ~ N(0, I), C = Cov(F x, N v), of the k states in `rows`.
 struct Transition {
   std::span<const int> rows;
   const double* f;      ///< F, k x k by rows
@@ -81,7 +81,7 @@ struct Transition {
   const double* cross;  ///< C, k x k by rows; null: zero
   double* memory;       ///< MemoryOf(n, k, width)
 
-  /// How many numbers a step of k of n states needs.
+  /// Returns the size of `memory` for a step of k of n states.
   static std::size_t MemoryOf(int n, int k, int width) {
     return static_cast<std::size_t>(k) *
                static_cast<std::size_t>(2 * PaddedSize(n) + 2 * PaddedSize(k) + k) +
@@ -89,31 +89,34 @@ struct Transition {
   }
 };
 
+/// Kernels for an instruction set or a small number of states.
 struct Kernels {
   const char* name;  ///< of the instruction set: `baseline`, `AVX2`, `AVX-512`
   int panel_rows;
-  // Each of an array is compiled for 1 row, 2 rows and any number: see For().
-  /// P H' of one measurement in the columns of w from `one.column` on, and its S. Returns the NIS,
-  /// r' S^-1 r; not a number unless S is finite and positive definite. Writes over s, inverse_d, y.
-  double (*nis[3])(const Update& update, const MeasurementRows& one);
-  /// All of an update but P', of the P H' that `nis` made.
+  // The elements of an array are compiled for 1 row, 2 rows and any number of rows: see For().
+  /// Computes P H' of a measurement, in the columns of w from `measurement.column` on, and its S.
+  /// Returns the NIS, r' S^-1 r, or NaN if S is not finite and positive definite. Overwrites s,
+  /// inverse_d and y.
+  double (*nis[3])(const Update& update, const MeasurementRows& measurement);
+  /// Computes all of an update except P', from the P H' of `nis`.
   Solution (*solve[3])(const Update& update);
-  /// P' in place of P.
+  /// Replaces P by P'.
   void (*downdate[3])(const Update& update);
-  /// P of x' in place of P. False, and P is as it was, if it would not be finite.
+  /// Replaces P by the covariance of x'. Returns false and leaves P unchanged if it would not be
+  /// finite.
   bool (*propagate)(const SymmetricView& p, const Transition& step);
 
-  /// Of a kernel, the one for m rows.
+  /// Returns the element of an array for m rows.
   template <class Kernel>
   static Kernel For(Kernel const (&kernels)[3], int m) {
     return kernels[m <= 2 ? m - 1 : 2];
   }
 };
 
-/// For 1 to 8 states of a stride of 8 those whose loops unroll; else the vectors of
+/// Returns the unrolled kernels for 1 to 8 states with a stride of 8, else the vector kernels of
 /// BestInstructionSet().
 const Kernels& KernelsFor(const SymmetricView& p);
-/// For any number of states, by the vectors of an instruction set.
+/// Returns the vector kernels of an instruction set, for any number of states.
 const Kernels& KernelsOf(InstructionSet set);
 
 }  // namespace alidade::internal

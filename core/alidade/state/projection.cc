@@ -12,10 +12,10 @@ void Project(const Covariance& p, const JacobianRows& h, double* pht, double* s)
   Eigen::Map<Eigen::MatrixXd> product(pht, n, m);
   product.setZero();
   for (Eigen::Index c = 0; c < width; ++c) {
-    const Eigen::Index column = h.columns[static_cast<std::size_t>(c)], below = n - column;
+    const Eigen::Index column = h.columns[static_cast<std::size_t>(c)], height = n - column;
     for (Eigen::Index i = 0; i < m; ++i) {
       product.col(i).head(column) += rows(i, c) * lower.row(column).head(column).transpose();
-      product.col(i).tail(below) += rows(i, c) * lower.col(column).tail(below);
+      product.col(i).tail(height) += rows(i, c) * lower.col(column).tail(height);
     }
   }
   for (Eigen::Index i = 0; i < m; ++i) {
@@ -35,7 +35,7 @@ void AddProjection(const Covariance& p, const JacobianRows& h, double* s) {
   const Eigen::Map<const RowMajor> rows(h.data, m, width);
   for (Eigen::Index i = 0; i < m; ++i) {
     for (Eigen::Index c = 0; c < width; ++c) {
-      double sum = 0.0;  // of row i of H P
+      double sum = 0.0;  // an element of row i of H P
       for (Eigen::Index d = 0; d < width; ++d) {
         const auto [low, high] = std::minmax(h.columns[static_cast<std::size_t>(c)],
                                              h.columns[static_cast<std::size_t>(d)]);

@@ -5,18 +5,19 @@
 #include <numeric>
 #include <span>
 
-/// q and -q are one rotation; which of the two is written is settled here.
+/// Sign of quaternions: q and -q are the same rotation, of which one is written.
 namespace alidade::internal {
 
-/// Of q and -q the one nearer to `near`; where `near` is empty, the one whose first element that
-/// is not zero is positive.
-inline void ChooseSign(std::span<const double> near, std::span<double> q) {
+/// Replaces q by -q if that is nearer to `reference`. If `reference` is empty, makes the first
+/// non-zero element positive.
+inline void ChooseSign(std::span<const double> reference, std::span<double> q) {
   const auto first = std::ranges::find_if(q, [](double element) { return element != 0.0; });
-  const double along = !near.empty() ? std::inner_product(q.begin(), q.end(), near.begin(), 0.0)
-                       : first == q.end() ? 0.0
-                                          : *first;
-  const double sign = along < 0.0 ? -1.0 : 1.0;
-  for (double& element : q) element = element == 0.0 ? 0.0 : sign * element;  // no -0 either
+  const double product = !reference.empty()
+                             ? std::inner_product(q.begin(), q.end(), reference.begin(), 0.0)
+                         : first == q.end() ? 0.0
+                                            : *first;
+  const double sign = product < 0.0 ? -1.0 : 1.0;
+  for (double& element : q) element = element == 0.0 ? 0.0 : sign * element;  // replaces -0 too
 }
 
 }  // namespace alidade::internal

@@ -12,8 +12,8 @@
 namespace alidade {
 namespace {
 
-/// The offset of `size` numbers of `values`, in a gap of that size or at the end.
-int TakeValues(std::vector<double>& values, std::vector<std::pair<int, int>>& gaps, int size) {
+/// Returns the offset of `size` numbers in `values`, in a gap of that size or at the end.
+int AllocateValues(std::vector<double>& values, std::vector<std::pair<int, int>>& gaps, int size) {
   const auto gap = std::ranges::find(gaps, size, &std::pair<int, int>::second);
   if (gap == gaps.end()) {
     values.resize(values.size() + static_cast<std::size_t>(size));
@@ -29,21 +29,21 @@ int TakeValues(std::vector<double>& values, std::vector<std::pair<int, int>>& ga
 BlockId StateLayout::Declare(std::string_view name, std::string_view owner, const Space& space,
                              BlockStatus status) {
   ALIDADE_EXPECTS(Find(name) < 0);
-  if (dropped_.empty()) {
-    Block fresh;  // before blocks_ moves: the arguments may lie in it
-    fresh.name = name;
-    fresh.owner = owner;
-    fresh.space = space;
-    fresh.status = status;
-    blocks_.push_back(std::move(fresh));
+  if (removed_.empty()) {
+    Block new_block;  // constructed first, because the arguments may be references into blocks_
+    new_block.name = name;
+    new_block.owner = owner;
+    new_block.space = space;
+    new_block.status = status;
+    blocks_.push_back(std::move(new_block));
     return static_cast<BlockId>(blocks_.size()) - 1;
   }
-  // One of the same kind has memory for all that is assigned.
-  const auto same = [&](BlockId id) { return (*this)[id].space.name == space.name; };
-  auto place = std::ranges::find_if(dropped_, same);
-  if (place == dropped_.end()) --place;
-  const BlockId id = *place;
-  dropped_.erase(place);
+  // A removed block with the same space has enough memory for the assignments below.
+  const auto has_same_space = [&](BlockId id) { return (*this)[id].space.name == space.name; };
+  auto position = std::ranges::find_if(removed_, has_same_space);
+  if (position == removed_.end()) --position;
+  const BlockId id = *position;
+  removed_.erase(position);
   Block& block = blocks_[static_cast<std::size_t>(id)];
   block.name = name;
   block.owner = owner;
@@ -52,16 +52,16 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
   return id;
 }
 
-void StateLayout::Drop(BlockId id) {
+void StateLayout::Remove(BlockId id) {
   (*this)[id].present = false;
-  (*this)[id].name.clear();  // what is assigned to it next has its memory
-  dropped_.push_back(id);
+  (*this)[id].name.clear();  // retains the memory for the next assignment
+  removed_.push_back(id);
 }
 
 BlockId StateLayout::Find(std::string_view name) const {
-  const auto found = std::find_if(blocks_.begin(), blocks_.end(),
+  const auto block = std::find_if(blocks_.begin(), blocks_.end(),
                                   [name](const Block& b) { return b.name == name; });
-  return found == blocks_.end() ? -1 : static_cast<BlockId>(found - blocks_.begin());
+  return block == blocks_.end() ? -1 : static_cast<BlockId>(block - blocks_.begin());
 }
 
 double State::sigma(BlockId id, int i) const {
@@ -84,15 +84,15 @@ BlockEstimate State::Estimate(BlockId id) const {
 void State::Reserve(BlockId id) {
   Block& block = layout_[id];
   if (block.value_offset >= 0) return;
-  block.value_offset = TakeValues(values_, value_gaps_, block.geometry().ambient);
+  block.value_offset = AllocateValues(values_, value_gaps_, block.geometry().ambient);
   if (block.status == BlockStatus::kConstant) {
-    flat_ = false;
+    is_flat_ = false;
     return;
   }
   block.tangent_offset = covariance_.Add(block.geometry().tangent);
-  flat_ = flat_ && block.geometry().kind == GeometryKind::kVector &&
-          block.value_offset == block.tangent_offset;
-  placed_.insert(std::ranges::lower_bound(placed_, id), id);
+  is_flat_ = is_flat_ && block.geometry().kind == GeometryKind::kVector &&
+             block.value_offset == block.tangent_offset;
+  covariance_blocks_.insert(std::ranges::lower_bound(covariance_blocks_, id), id);
 }
 
 void State::PlaceValue(BlockId id, const double* value) {
@@ -111,28 +111,29 @@ void State::Add(BlockId id, const double* value, const ConstMatrix& covariance) 
 }
 
 void State::Initialise(std::span<const BlockId> ids, const double* values,
-                       std::span<const BlockId> from, const Eigen::Ref<const RowMajor>& jacobian,
-                       const ConstMatrix& own) {
+                       std::span<const BlockId> sources, const Eigen::Ref<const RowMajor>& jacobian,
+                       const ConstMatrix& noise_covariance) {
   for (const BlockId id : ids) {
     PlaceValue(id, values);
     values += layout_[id].geometry().ambient;
   }
-  ALIDADE_EXPECTS(jacobian.cols() == FindRows(from));
+  ALIDADE_EXPECTS(jacobian.cols() == FindRows(sources));
   const Workspace::Use use(memory_);
   const Eigen::Index count = jacobian.rows(), width = std::ssize(columns_);
   Workspace::Matrix cross = memory_.Take(covariance_.size(), count), p = memory_.Take(count, count);
-  Eigen::Map<RowMajor> present(memory_.Take(count * width).data(), count, width);
+  Eigen::Map<RowMajor> used_columns(memory_.Take(count * width).data(), count, width);
   for (Eigen::Index c = 0; c < width; ++c) {
-    present.col(c) = jacobian.col(columns_[static_cast<std::size_t>(c)]);
+    used_columns.col(c) = jacobian.col(columns_[static_cast<std::size_t>(c)]);
   }
   p.setZero();
-  Project(covariance_, {present.data(), static_cast<int>(count), rows_}, cross.data(), p.data());
-  p += own;
+  Project(covariance_, {used_columns.data(), static_cast<int>(count), rows_}, cross.data(),
+          p.data());
+  p += noise_covariance;
   ALIDADE_EXPECTS(FindRows(ids) == std::ssize(rows_));
   covariance_.SetRows(rows_, p, cross);
 }
 
-/// Fills rows_ and columns_, and returns the size of the blocks' tangents.
+/// Computes rows_ and columns_, and returns the size of the blocks' tangents.
 int State::FindRows(std::span<const BlockId> blocks) {
   rows_.clear();
   columns_.clear();
@@ -148,75 +149,75 @@ int State::FindRows(std::span<const BlockId> blocks) {
   return column;
 }
 
-/// Gives the place of a block back.
+/// Releases the memory of a block.
 void State::Release(BlockId id) {
   Block& block = layout_[id];
   value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
   if (block.tangent_offset >= 0) {
     covariance_.Release(block.tangent_offset, block.geometry().tangent);
-    placed_.erase(std::ranges::lower_bound(placed_, id));
+    covariance_blocks_.erase(std::ranges::lower_bound(covariance_blocks_, id));
   }
   block.present = false;
   block.value_offset = block.tangent_offset = -1;
   FillGaps();
 }
 
-/// Moves the last block into a gap, as long as one holds it.
+/// Moves the last block into a gap, as long as a gap is large enough.
 void State::FillGaps() {
   for (;;) {
-    const auto found = std::ranges::max_element(
-        placed_, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
-    if (found == placed_.end()) return;
-    Block& last = layout_[*found];
+    const auto last_id = std::ranges::max_element(
+        covariance_blocks_, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
+    if (last_id == covariance_blocks_.end()) return;
+    Block& last = layout_[*last_id];
     const int rows = last.geometry().tangent;
     const int gap = covariance_.MoveToGap(last.tangent_offset, rows);
     if (gap < 0) return;
     last.tangent_offset = gap;
-    flat_ = false;
+    is_flat_ = false;
   }
 }
 
-void State::Drop(BlockId id) {
+void State::Remove(BlockId id) {
   if (layout_[id].value_offset >= 0) Release(id);
-  layout_.Drop(id);
+  layout_.Remove(id);
 }
 
-bool State::Retract(const double* dx, std::vector<double>& moved) const {
-  moved.resize(values_.size());
-  if (!flat_) return RetractBlocks(dx, moved);
-  const double* const from = values_.data();
-  double* const to = moved.data();
-  const std::size_t n = static_cast<std::size_t>(covariance_.size()), all = moved.size();
+bool State::Retract(const double* dx, std::vector<double>& new_values) const {
+  new_values.resize(values_.size());
+  if (!is_flat_) return RetractBlocks(dx, new_values);
+  const double* const source = values_.data();
+  double* const destination = new_values.data();
+  const std::size_t n = static_cast<std::size_t>(covariance_.size()), size = new_values.size();
   double defect = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    to[i] = from[i] + dx[i];
-    defect += 0.0 * to[i];
+    destination[i] = source[i] + dx[i];
+    defect += 0.0 * destination[i];
   }
-  for (std::size_t i = n; i < all; ++i) to[i] = from[i];
+  for (std::size_t i = n; i < size; ++i) destination[i] = source[i];
   return defect == 0.0;
 }
 
-/// Retract block by block.
-bool State::RetractBlocks(const double* dx, std::vector<double>& moved) const {
-  std::ranges::copy(values_, moved.begin());
-  for (const BlockId id : placed_) {
+/// Computes Retract block by block.
+bool State::RetractBlocks(const double* dx, std::vector<double>& new_values) const {
+  std::ranges::copy(values_, new_values.begin());
+  for (const BlockId id : covariance_blocks_) {
     const Block& block = layout_[id];
     if (!block.present) continue;
-    double* x = moved.data() + block.value_offset;
+    double* x = new_values.data() + block.value_offset;
     block.geometry().Plus(x, dx + block.tangent_offset, x);
   }
-  return internal::AllFinite(moved);
+  return internal::AllFinite(new_values);
 }
 
 void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
-  if (!flat_) TurnTangents(values);
+  if (!is_flat_) TransportCovariance(values);
   for (std::size_t i = 0, n = values.size(); i < n; ++i) values_[i] = values[i];
 }
 
-/// P where the tangent basis of a block turns on the way to those values.
-void State::TurnTangents(const std::vector<double>& values) {
-  for (const BlockId id : placed_) {
+/// Transports P for the blocks whose tangent basis changes with their value.
+void State::TransportCovariance(const std::vector<double>& values) {
+  for (const BlockId id : covariance_blocks_) {
     const Block& block = layout_[id];
     if (!block.present || block.geometry().kind != GeometryKind::kUnitVector) continue;
     std::array<double, 4> j;  // a unit vector's tangent has two elements

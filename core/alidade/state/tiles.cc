@@ -8,20 +8,22 @@
 namespace alidade::internal {
 namespace {
 
-/// Calls take(first, size) for the tiles of [0, size).
-template <class Take>
-void ForEachTile(Eigen::Index size, const Take& take) {
-  for (Eigen::Index at = 0; at < size; at += kTile) take(at, std::min(kTile, size - at));
+/// Calls visit(first, size) for the tiles of [0, size).
+template <class Visitor>
+void ForEachTile(Eigen::Index size, const Visitor& visit) {
+  for (Eigen::Index first = 0; first < size; first += kTile) {
+    visit(first, std::min(kTile, size - first));
+  }
 }
 
 Strided ByColumns(const ConstMatrix& a) { return {a.data(), 1, a.outerStride()}; }
 Strided Transposed(const ConstMatrix& a) { return {a.data(), a.outerStride(), 1}; }
 
-/// C <- C + sign A B of the given depth.
+/// Computes C <- C + sign A B; A has `depth` columns.
 void Add(MutableMatrix& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
-         bool lower = false) {
+         bool lower_only = false) {
   BestVectorKernels().add_product(c.rows(), c.cols(), depth, a, b, c.data(), c.outerStride(), sign,
-                                  lower);
+                                  lower_only);
 }
 
 }  // namespace
@@ -58,10 +60,10 @@ void DivideByTransposed(const ConstMatrix& l, MutableMatrix b) {
 }
 
 void Divide(const ConstMatrix& l, MutableMatrix b) {
-  ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
-    const Eigen::Index j = l.rows() - from_end - columns;
-    AddProduct(b.middleCols(j, columns), b.rightCols(from_end),
-               l.block(j + columns, j, from_end, columns), -1.0);
+  ForEachTile(l.rows(), [&](Eigen::Index remaining, Eigen::Index columns) {
+    const Eigen::Index j = l.rows() - remaining - columns;
+    AddProduct(b.middleCols(j, columns), b.rightCols(remaining),
+               l.block(j + columns, j, remaining, columns), -1.0);
     ForEachTile(b.rows(), [&](Eigen::Index i, Eigen::Index rows) {
       auto tile = b.block(i, j, rows, columns);
       l.block(j, j, columns, columns)

@@ -9,16 +9,17 @@
 #include <new>
 #include <utility>
 
-// Vectors go from one inlined function to the next, never through a call.
+// Vectors are only passed between inlined functions, never through a call.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace alidade::internal {
 namespace {
 
-/// Numbers of any value that begin at a cache line, kept from call to call.
+/// Scratch memory that begins at a cache line. Later calls reuse it.
 class Buffer {
  public:
-  double* Take(long size) {
+  /// Returns memory for `size` uninitialised numbers, valid until the next call.
+  double* Allocate(long size) {
     if (size > size_) {
       const long larger = std::max(size, 2 * size_);
       data_.reset(static_cast<double*>(
@@ -30,16 +31,16 @@ class Buffer {
 
  private:
   static constexpr std::align_val_t kLine{64};
-  struct Free {
+  struct Deleter {
     void operator()(double* data) const { ::operator delete(data, kLine); }
   };
-  std::unique_ptr<double, Free> data_;
+  std::unique_ptr<double, Deleter> data_;
   long size_ = 0;
 };
 
 thread_local Buffer packed_left, packed_right;
 
-/// Vectors of `kLanes` numbers, of which a product holds kVectors x kColumns in registers.
+/// Loops over vectors of `kLanes` numbers. A product uses kVectors x kColumns registers.
 template <int kLanes, int kVectorsOfTile, int kColumnsOfTile>
 struct Loops {
   using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -47,20 +48,21 @@ struct Loops {
   static constexpr int kRows = kVectors * kLanes;
   using Tile = Vector[kColumns][kVectors];
 
-  // A panel of the left side stays in the second cache, one of the right side in the third.
+  // A panel of the left factor fits into the L2 cache, a panel of the right factor into the L3
+  // cache.
   static constexpr long kDepth = 256, kLeftRows = kRows * (192 / kRows), kRightColumns = 768;
 
-  [[gnu::always_inline]] static Vector Load(const double* from) {
+  [[gnu::always_inline]] static Vector Load(const double* source) {
     Vector v;
-    std::memcpy(&v, from, sizeof v);
+    std::memcpy(&v, source, sizeof v);
     return v;
   }
-  [[gnu::always_inline]] static void Store(double* to, const Vector& v) {
-    std::memcpy(to, &v, sizeof v);
+  [[gnu::always_inline]] static void Store(double* destination, const Vector& v) {
+    std::memcpy(destination, &v, sizeof v);
   }
 
-  /// sum += A B of the first kHeight vectors of a panel of A and kColumns columns of B, the rows of
-  /// B `step` apart.
+  /// Computes sum += A B for the first kHeight vectors of a panel of A and kColumns columns of B.
+  /// The distance of two rows of B is `step`.
   template <int kHeight>
   [[gnu::always_inline]] static void Multiply(long depth, const double* a, const double* b,
                                               long step, Vector (&sum)[kColumns][kHeight]) {
@@ -76,56 +78,61 @@ struct Loops {
     }
   }
 
-  /// Panels of kRows rows of A, one after the other, zeros below its last row.
+  /// Copies A to adjacent panels of kRows rows, with zeros below its last row.
   [[gnu::always_inline]] static void PackLeft(long rows, long depth, const double* a,
-                                              const Strided& steps, double* to) {
+                                              const Strided& steps, double* destination) {
     for (long i = 0; i < rows; i += kRows) {
       const long count = std::min<long>(kRows, rows - i);
-      for (long k = 0; k < depth; ++k, to += kRows) {
-        const double* from = a + i * steps.row_step + k * steps.column_step;
+      for (long k = 0; k < depth; ++k, destination += kRows) {
+        const double* source = a + i * steps.row_step + k * steps.column_step;
         if (count == kRows && steps.row_step == 1) {
 #pragma GCC unroll 8
-          for (int v = 0; v < kVectors; ++v) Store(to + v * kLanes, Load(from + v * kLanes));
+          for (int v = 0; v < kVectors; ++v)
+            Store(destination + v * kLanes, Load(source + v * kLanes));
           continue;
         }
         if (count < kRows) {
 #pragma GCC unroll 8
-          for (int v = 0; v < kVectors; ++v) Store(to + v * kLanes, Vector{});
+          for (int v = 0; v < kVectors; ++v) Store(destination + v * kLanes, Vector{});
         }
-        for (long r = 0; r < count; ++r) to[r] = from[r * steps.row_step];
+        for (long r = 0; r < count; ++r) destination[r] = source[r * steps.row_step];
       }
     }
   }
 
-  /// Panels of kColumns columns of sign B, zeros to the right of its last column.
+  /// Copies sign B to adjacent panels of kColumns columns, with zeros to the right of its last
+  /// column.
   [[gnu::always_inline]] static void PackRight(long columns, long depth, const double* b,
-                                               const Strided& steps, double sign, double* to) {
+                                               const Strided& steps, double sign,
+                                               double* destination) {
     for (long j = 0; j < columns; j += kColumns) {
       const long count = std::min<long>(kColumns, columns - j);
-      for (long k = 0; k < depth; ++k, to += kColumns) {
-        const double* from = b + k * steps.row_step + j * steps.column_step;
+      for (long k = 0; k < depth; ++k, destination += kColumns) {
+        const double* source = b + k * steps.row_step + j * steps.column_step;
         if (count == kColumns && steps.column_step == 1) {
 #pragma GCC unroll 8
-          for (int c = 0; c < kColumns; c += kLanes) Store(to + c, sign * Load(from + c));
+          for (int c = 0; c < kColumns; c += kLanes)
+            Store(destination + c, sign * Load(source + c));
           continue;
         }
-        for (long c = 0; c < count; ++c) to[c] = sign * from[c * steps.column_step];
-        for (long c = count; c < kColumns; ++c) to[c] = 0.0;
+        for (long c = 0; c < count; ++c) destination[c] = sign * source[c * steps.column_step];
+        for (long c = count; c < kColumns; ++c) destination[c] = 0.0;
       }
     }
   }
 
-  /// C += sum where C has `rows` and `columns` of the tile, and of `lower` only what lies on or
-  /// below its diagonal, which begins `shift` rows above the tile's first row.
-  [[gnu::always_inline]] static void AddTile(const Tile& sum, long rows, long columns, bool whole,
-                                             long shift, double* c, long ldc) {
-    if (whole && rows == kRows && columns == kColumns) {
+  /// Computes C += sum for the `rows` and `columns` of a tile that are inside C. Unless `is_whole`,
+  /// only elements on or below the diagonal of C are changed. The diagonal begins `shift` rows
+  /// above the tile's first row.
+  [[gnu::always_inline]] static void AddTile(const Tile& sum, long rows, long columns,
+                                             bool is_whole, long shift, double* c, long ldc) {
+    if (is_whole && rows == kRows && columns == kColumns) {
 #pragma GCC unroll 8
       for (int j = 0; j < kColumns; ++j) {
 #pragma GCC unroll 8
         for (int v = 0; v < kVectors; ++v) {
-          double* const to = c + j * ldc + v * kLanes;
-          Store(to, Load(to) + sum[j][v]);
+          double* const destination = c + j * ldc + v * kLanes;
+          Store(destination, Load(destination) + sum[j][v]);
         }
       }
       return;
@@ -133,7 +140,7 @@ struct Loops {
     double numbers[kColumns][kRows];
     std::memcpy(numbers, sum, sizeof numbers);
     for (long j = 0; j < columns; ++j) {
-      for (long i = whole ? 0 : std::max(0L, j - shift); i < rows; ++i) {
+      for (long i = is_whole ? 0 : std::max(0L, j - shift); i < rows; ++i) {
         c[i + j * ldc] += numbers[j][i];
       }
     }
@@ -141,26 +148,29 @@ struct Loops {
 
   [[gnu::always_inline]] static void AddProduct(long rows, long columns, long depth,
                                                 const Strided& a, const Strided& b, double* c,
-                                                long ldc, double sign, bool lower) {
+                                                long ldc, double sign, bool lower_only) {
     const long width = std::min(depth, kDepth);
-    double* const left = packed_left.Take((std::min(rows, kLeftRows) + kRows) * width);
-    double* const right = packed_right.Take((std::min(columns, kRightColumns) + kColumns) * width);
+    double* const left = packed_left.Allocate((std::min(rows, kLeftRows) + kRows) * width);
+    double* const right =
+        packed_right.Allocate((std::min(columns, kRightColumns) + kColumns) * width);
     for (long j = 0; j < columns; j += kRightColumns) {
-      const long wide = std::min(kRightColumns, columns - j);
+      const long panel_columns = std::min(kRightColumns, columns - j);
       for (long k = 0; k < depth; k += kDepth) {
-        const long deep = std::min(kDepth, depth - k);
-        PackRight(wide, deep, b.data + k * b.row_step + j * b.column_step, b, sign, right);
-        for (long i = lower ? j : 0; i < rows; i += kLeftRows) {
-          const long high = std::min(kLeftRows, rows - i);
-          PackLeft(high, deep, a.data + i * a.row_step + k * a.column_step, a, left);
-          for (long q = 0; q < wide; q += kColumns) {
-            for (long p = 0; p < high; p += kRows) {
-              const long shift = i + p - (j + q);  // of the tile below C's diagonal
-              if (lower && shift + kRows <= 0) continue;
+        const long panel_depth = std::min(kDepth, depth - k);
+        PackRight(panel_columns, panel_depth, b.data + k * b.row_step + j * b.column_step, b, sign,
+                  right);
+        for (long i = lower_only ? j : 0; i < rows; i += kLeftRows) {
+          const long panel_rows = std::min(kLeftRows, rows - i);
+          PackLeft(panel_rows, panel_depth, a.data + i * a.row_step + k * a.column_step, a, left);
+          for (long q = 0; q < panel_columns; q += kColumns) {
+            for (long p = 0; p < panel_rows; p += kRows) {
+              const long shift = i + p - (j + q);  // of the tile, below the diagonal of C
+              if (lower_only && shift + kRows <= 0) continue;
               Tile sum = {};
-              Multiply(deep, left + p * deep, right + q * deep, kColumns, sum);
-              AddTile(sum, std::min<long>(kRows, high - p), std::min<long>(kColumns, wide - q),
-                      !lower || shift >= kColumns - 1, shift, c + i + p + (j + q) * ldc, ldc);
+              Multiply(panel_depth, left + p * panel_depth, right + q * panel_depth, kColumns, sum);
+              AddTile(sum, std::min<long>(kRows, panel_rows - p),
+                      std::min<long>(kColumns, panel_columns - q),
+                      !lower_only || shift >= kColumns - 1, shift, c + i + p + (j + q) * ldc, ldc);
             }
           }
         }
@@ -168,42 +178,44 @@ struct Loops {
     }
   }
 
-  /// kCount columns of the first kHeight vectors of a panel, `own`, less what its columns
-  /// [begin, end) take from them by those rows of L that `l` begins with.
+  /// Subtracts the product of columns [begin, end) of a panel and kCount rows of L, which begin at
+  /// `l`, from kCount columns `target` of the panel, in its first kHeight vectors.
   template <int kHeight, int kCount>
   [[gnu::always_inline]] static void SubtractColumns(long begin, long end, const double* l,
-                                                     long ldl, const double* panel, double* own) {
+                                                     long ldl, const double* panel,
+                                                     double* target) {
     Vector x[kCount][kHeight];
 #pragma GCC unroll 8
     for (int c = 0; c < kCount; ++c) {
 #pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) x[c][v] = Load(own + c * kRows + v * kLanes);
+      for (int v = 0; v < kHeight; ++v) x[c][v] = Load(target + c * kRows + v * kLanes);
     }
     for (long k = begin; k < end; ++k) {
-      Vector done[kHeight];
+      Vector solved[kHeight];
 #pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) done[v] = Load(panel + k * kRows + v * kLanes);
+      for (int v = 0; v < kHeight; ++v) solved[v] = Load(panel + k * kRows + v * kLanes);
 #pragma GCC unroll 8
       for (int c = 0; c < kCount; ++c) {
 #pragma GCC unroll 8
-        for (int v = 0; v < kHeight; ++v) x[c][v] -= done[v] * l[c + k * ldl];
+        for (int v = 0; v < kHeight; ++v) x[c][v] -= solved[v] * l[c + k * ldl];
       }
     }
 #pragma GCC unroll 8
     for (int c = 0; c < kCount; ++c) {
 #pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) Store(own + c * kRows + v * kLanes, x[c][v]);
+      for (int v = 0; v < kHeight; ++v) Store(target + c * kRows + v * kLanes, x[c][v]);
     }
   }
 
-  /// kCount columns of the first kHeight vectors of a panel, `own`, times L^-T of as many rows.
+  /// Multiplies kCount columns `target` of a panel, in its first kHeight vectors, by L^-T of size
+  /// kCount.
   template <int kHeight, int kCount>
-  [[gnu::always_inline]] static void DivideColumns(const double* l, long ldl, double* own) {
+  [[gnu::always_inline]] static void DivideColumns(const double* l, long ldl, double* target) {
     Vector x[kCount][kHeight];
 #pragma GCC unroll 8
     for (int c = 0; c < kCount; ++c) {
 #pragma GCC unroll 8
-      for (int v = 0; v < kHeight; ++v) x[c][v] = Load(own + c * kRows + v * kLanes);
+      for (int v = 0; v < kHeight; ++v) x[c][v] = Load(target + c * kRows + v * kLanes);
 #pragma GCC unroll 8
       for (int d = 0; d < c; ++d) {
 #pragma GCC unroll 8
@@ -213,38 +225,38 @@ struct Loops {
 #pragma GCC unroll 8
       for (int v = 0; v < kHeight; ++v) {
         x[c][v] *= reciprocal;
-        Store(own + c * kRows + v * kLanes, x[c][v]);
+        Store(target + c * kRows + v * kLanes, x[c][v]);
       }
     }
   }
 
   template <int kHeight, int kCount>
-  [[gnu::always_inline]] static void SolveColumns(long j, long k, bool last, const double* l,
+  [[gnu::always_inline]] static void SolveColumns(long j, long k, bool is_last, const double* l,
                                                   long ldl, double* panel) {
-    double* const own = panel + j * kRows;
-    SubtractColumns<kHeight, kCount>(k, std::min(k + kDepth, j), l + j, ldl, panel, own);
-    if (last) DivideColumns<kHeight, kCount>(l + j + j * ldl, ldl, own);
+    double* const target = panel + j * kRows;
+    SubtractColumns<kHeight, kCount>(k, std::min(k + kDepth, j), l + j, ldl, panel, target);
+    if (is_last) DivideColumns<kHeight, kCount>(l + j + j * ldl, ldl, target);
   }
 
-  /// Columns [first, first + count) of the first kHeight vectors of a panel of B L^-T, as far as
-  /// columns [k, k + kDepth) go, which are done but for those from `first` on.
+  /// Applies columns [k, k + kDepth) of L to columns [first, first + count) of a panel of B L^-T,
+  /// in its first kHeight vectors. The columns of the panel before `first` are final.
   template <int kHeight>
   [[gnu::always_inline]] static void SolvePanel(long first, long count, long k, const double* l,
                                                 long ldl, double* panel) {
-    const bool last = k == first;
+    const bool is_last = k == first;
     long j = first;
     for (; j + kColumns <= first + count; j += kColumns) {
-      SolveColumns<kHeight, kColumns>(j, k, last, l, ldl, panel);
+      SolveColumns<kHeight, kColumns>(j, k, is_last, l, ldl, panel);
     }
     if (j + 4 <= first + count) {
-      SolveColumns<kHeight, 4>(j, k, last, l, ldl, panel);
+      SolveColumns<kHeight, 4>(j, k, is_last, l, ldl, panel);
       j += 4;
     }
     if (j + 2 <= first + count) {
-      SolveColumns<kHeight, 2>(j, k, last, l, ldl, panel);
+      SolveColumns<kHeight, 2>(j, k, is_last, l, ldl, panel);
       j += 2;
     }
-    if (j < first + count) SolveColumns<kHeight, 1>(j, k, last, l, ldl, panel);
+    if (j < first + count) SolveColumns<kHeight, 1>(j, k, is_last, l, ldl, panel);
   }
 
   [[gnu::always_inline]] static void DividePanels(long rows, long m, const double* l, long ldl,
@@ -269,7 +281,7 @@ struct Loops {
 
   [[gnu::always_inline]] static void DivideByTransposed(long rows, long m, const double* l,
                                                         long ldl, double* b, long ldb) {
-    double* const panels = packed_left.Take((rows + kRows) * m);
+    double* const panels = packed_left.Allocate((rows + kRows) * m);
     PackLeft(rows, m, b, {nullptr, 1, ldb}, panels);
     DividePanels(rows, m, l, ldl, panels);
     for (long i = 0; i < rows; i += kRows) {
@@ -280,17 +292,17 @@ struct Loops {
     }
   }
 
-  /// The compiler would keep what is stored in registers for whoever loads it next, so many that it
-  /// has none left for the loop before (a quarter of the time of a factorisation).
-  [[gnu::always_inline]] static void EmptyRegisters() {
+  /// Prevents the compiler from keeping stored values in registers for later loads. The preceding
+  /// loop would then lack registers (a quarter of the time of a factorisation).
+  [[gnu::always_inline]] static void FlushRegisters() {
 #if defined(__x86_64__)
     asm volatile("" ::: "memory");
 #endif
   }
 
-  /// L of A = L L', kColumns square; of A the lower triangle is read. False where a pivot is not
-  /// finite and positive.
-  [[gnu::always_inline]] static bool FactoriseOwn(const double* a, long lda, double* l) {
+  /// Computes L of A = L L', kColumns x kColumns, from the lower triangle of A. Returns false if a
+  /// pivot is not finite and positive.
+  [[gnu::always_inline]] static bool FactoriseBlock(const double* a, long lda, double* l) {
     constexpr int kHeight = kColumns / kLanes;
     Vector x[kColumns][kHeight];
 #pragma GCC unroll 8
@@ -319,41 +331,41 @@ struct Loops {
   }
 
   [[gnu::always_inline]] static bool Factorise(long m, double* s, long lds) {
-    double* const panel = packed_left.Take(kRows * (m + kRows));
-    for (long at = 0; at < m; at += kRows) {
-      const long high = std::min<long>(kRows, m - at), end = at + high;
-      PackLeft(high, end, s + at, {nullptr, 1, lds}, panel);
-      for (long j = end; j < at + kRows; ++j) {  // what is missing of the last panel: I
+    double* const panel = packed_left.Allocate(kRows * (m + kRows));
+    for (long begin = 0; begin < m; begin += kRows) {
+      const long rows = std::min<long>(kRows, m - begin), end = begin + rows;
+      PackLeft(rows, end, s + begin, {nullptr, 1, lds}, panel);
+      for (long j = end; j < begin + kRows; ++j) {  // completes the last panel by identity
         std::fill_n(panel + j * kRows, kRows, 0.0);
-        panel[j - at + j * kRows] = 1.0;
+        panel[j - begin + j * kRows] = 1.0;
       }
-      DividePanels(high, at, s, lds, panel);
-      for (long j = at; j < end; j += kColumns) {
-        // Of its own columns the panel has the rows of L itself.
-        double* const own = panel + j * kRows;
-        SubtractColumns<kVectors, kColumns>(0, j, panel + j - at, kRows, panel, own);
-        EmptyRegisters();
+      DividePanels(rows, begin, s, lds, panel);
+      for (long j = begin; j < end; j += kColumns) {
+        // The panel contains the rows of L that correspond to these columns.
+        double* const target = panel + j * kRows;
+        SubtractColumns<kVectors, kColumns>(0, j, panel + j - begin, kRows, panel, target);
+        FlushRegisters();
         double l[kColumns * kColumns];
-        if (!FactoriseOwn(own + j - at, kRows, l)) return false;
-        DivideColumns<kVectors, kColumns>(l, kColumns, own);
+        if (!FactoriseBlock(target + j - begin, kRows, l)) return false;
+        DivideColumns<kVectors, kColumns>(l, kColumns, target);
       }
       for (long k = 0; k < end; ++k) {
-        const long i = std::max(k - at, 0L);
-        std::memcpy(s + at + i + k * lds, panel + i + k * kRows,
-                    static_cast<std::size_t>(high - i) * sizeof(double));
+        const long i = std::max(k - begin, 0L);
+        std::memcpy(s + begin + i + k * lds, panel + i + k * kRows,
+                    static_cast<std::size_t>(rows - i) * sizeof(double));
       }
     }
     return true;
   }
 };
 
-/// The loops, compiled for one instruction set; `target` is an attribute, or nothing.
+/// Defines the loops, compiled for one instruction set. `target` is an attribute, or empty.
 #define ALIDADE_KERNELS(kernels, loops, target)                                                    \
   struct kernels {                                                                                 \
     target static void AddProduct(long rows, long columns, long depth, const Strided& a,           \
                                   const Strided& b, double* c, long ldc, double sign,              \
-                                  bool lower) {                                                    \
-      loops::AddProduct(rows, columns, depth, a, b, c, ldc, sign, lower);                          \
+                                  bool lower_only) {                                               \
+      loops::AddProduct(rows, columns, depth, a, b, c, ldc, sign, lower_only);                     \
     }                                                                                              \
     target static void DivideByTransposed(long rows, long m, const double* l, long ldl, double* b, \
                                           long ldb) {                                              \

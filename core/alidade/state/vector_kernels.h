@@ -3,30 +3,32 @@
 
 #include "alidade/state/instruction_set.h"
 
-/// The inner loops of large products and factors, once for each instruction set: this build asks
-/// for none, the processor it runs on is asked at run time. The sets differ by rounding alone.
+/// Inner loops of large products and factors, compiled for each instruction set. The set is
+/// selected at run time, by the features of the processor. The results of the sets differ only by
+/// rounding.
 namespace alidade::internal {
 
-/// A matrix that is read: element (i, j) at data[i * row_step + j * column_step].
+/// Read-only matrix with element (i, j) at data[i * row_step + j * column_step].
 struct Strided {
   const double* data;
   long row_step, column_step;
 };
 
+/// Kernels of one instruction set.
 struct VectorKernels {
-  /// C <- C + sign A B, C rows x columns, by columns with leading dimension ldc, A rows x depth;
-  /// `lower`: of C the lower triangle alone. C overlaps neither A nor B.
+  /// Computes C <- C + sign A B. C is rows x columns, by columns with leading dimension ldc; A is
+  /// rows x depth. `lower_only` restricts C to its lower triangle. C overlaps neither A nor B.
   void (*add_product)(long rows, long columns, long depth, const Strided& a, const Strided& b,
-                      double* c, long ldc, double sign, bool lower);
-  /// B <- B L^-T, B rows x m, L m x m lower triangular, both by columns.
+                      double* c, long ldc, double sign, bool lower_only);
+  /// Computes B <- B L^-T. B is rows x m, L is m x m lower triangular, both by columns.
   void (*divide_by_transposed)(long rows, long m, const double* l, long ldl, double* b, long ldb);
-  /// Puts L of a symmetric S = L L', m x m by columns, in place of its lower triangle; false unless
-  /// that is finite and positive definite.
+  /// Replaces the lower triangle of a symmetric S = L L', m x m by columns, by L. Returns false
+  /// unless S is finite and positive definite.
   bool (*factorise)(long m, double* s, long lds);
 };
 
 const VectorKernels& VectorKernelsOf(InstructionSet set);
-/// Those of BestInstructionSet().
+/// Returns the kernels of BestInstructionSet().
 const VectorKernels& BestVectorKernels();
 
 }  // namespace alidade::internal

@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-/// Allocates whole cache lines.
+/// Allocator of whole cache lines.
 template <class T>
 struct CacheLines {
   using value_type = T;  // NOLINT(readability-identifier-naming): of an allocator
@@ -30,7 +30,7 @@ struct CacheLines {
 /// Numbers in whole cache lines.
 using AlignedNumbers = std::vector<double, CacheLines<double>>;
 
-/// Memory that a copy does not take along.
+/// Scratch memory: copying the owner does not copy it.
 template <class T>
 struct Scratch : T {
   Scratch() = default;
@@ -38,14 +38,14 @@ struct Scratch : T {
   Scratch& operator=(const Scratch& /*other*/) { return *this; }
 };
 
-/// Memory for the matrices of a step or an update, kept from one to the next: where no more and no
-/// larger ones are taken than before, nothing is allocated.
+/// Memory for the matrices of a step or an update, which later ones reuse. It allocates only if
+/// they need more or larger matrices than before.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
 
-  /// Gives back at its end what was taken while it lived.
+  /// Scope that releases at its end all memory that was taken in it.
   class Use {
    public:
     explicit Use(Workspace& workspace) : workspace_(workspace), used_(workspace.used_) {}
@@ -58,22 +58,22 @@ class Workspace {
     std::size_t used_;
   };
 
-  /// rows x columns numbers of any value.
+  /// Returns an uninitialised matrix.
   Matrix Take(Eigen::Index rows, Eigen::Index columns) {
     return {Memory(rows * columns), rows, columns};
   }
-  /// `size` numbers of any value.
+  /// Returns an uninitialised vector.
   Vector Take(Eigen::Index size) { return {Memory(size), size}; }
 
  private:
   double* Memory(Eigen::Index size) {
-    if (used_ == pieces_.size()) pieces_.emplace_back();
-    Eigen::VectorXd& piece = pieces_[used_++];
-    if (piece.size() < size) piece.resize(std::max(size, piece.size() + piece.size() / 2));
-    return piece.data();
+    if (used_ == buffers_.size()) buffers_.emplace_back();
+    Eigen::VectorXd& buffer = buffers_[used_++];
+    if (buffer.size() < size) buffer.resize(std::max(size, buffer.size() + buffer.size() / 2));
+    return buffer.data();
   }
 
-  std::vector<Eigen::VectorXd> pieces_;  ///< the first used_ are taken
+  std::vector<Eigen::VectorXd> buffers_;  ///< the first used_ are in use
   std::size_t used_ = 0;
 };
 

@@ -68,7 +68,7 @@ struct KernelProblem {
     update.inverse_d = take(rows);
     update.y = take(rows);
     update.dx = take(stride);
-    update.lost = take(stride);
+    update.variance_decrease = take(stride);
     measurements.clear();
     int at = 0;
     for (One& one : ones) {
@@ -158,12 +158,12 @@ TEST(Kernels, AnUpdateIsThatOfTheTextbook) {
             kKernelRounding);
         at += m;
       }
-      EXPECT_EQ(Kernels::For(kernels.solve, at)(update), Solution::kFine);
+      EXPECT_EQ(Kernels::For(kernels.solve, at)(update), Solution::kOk);
       const MatrixXd gain = s.llt().solve(h * p).transpose(), dx = gain * problem.r;
       const MatrixXd lost = (gain * s * gain.transpose()).diagonal();
       for (int i = 0; i < n; ++i) {
         EXPECT_NEAR(update.dx[i], dx(i), kKernelRounding * (1.0 + dx.norm()));
-        EXPECT_NEAR(update.lost[i], lost(i), kKernelRounding * (1.0 + lost.norm()));
+        EXPECT_NEAR(update.variance_decrease[i], lost(i), kKernelRounding * (1.0 + lost.norm()));
         for (int j = 0; j < at; ++j) {
           EXPECT_NEAR(update.At(update.gain, i, j), gain(i, j),
                       kKernelRounding * (1.0 + gain.norm()));
@@ -252,7 +252,7 @@ TEST(Kernels, AVarianceThatCancelsIsFound) {
     problem.ones[0].noise(0, 0) = 1e-12 * problem.p(n - 1, n - 1);
     const Update update = problem.Begin(kernels);
     Kernels::For(kernels.nis, 1)(update, problem.measurements[0]);
-    EXPECT_EQ(Kernels::For(kernels.solve, 1)(update), Solution::kCancels);
+    EXPECT_EQ(Kernels::For(kernels.solve, 1)(update), Solution::kCancellation);
   });
 }
 

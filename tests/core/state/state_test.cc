@@ -67,7 +67,7 @@ TEST(State, ABlockThatHasAValueTakesAnotherInItsPlace) {
   const Eigen::RowVector2d ja(1.0, -2.0);
   const Eigen::MatrixXd own = Eigen::MatrixXd::Constant(1, 1, 0.25);
   const double value = 7.0;
-  moved.Drop(b);
+  moved.Remove(b);
   ASSERT_EQ(moved.Declare("s.b", "s", Named(Geometry::Vector(1))), b);
   for (State* one : {&state, &moved})
     one->Initialise(std::array{b}, &value, std::array{a}, ja, own);
@@ -95,7 +95,7 @@ TEST(State, AReservedPlaceIsTakenByItsBlockAlone) {
   EXPECT_FALSE(state.layout()[first].present);
   EXPECT_EQ(state.covariance().Dense(),
             Eigen::Vector3d(0.0, 4.0, 4.0).asDiagonal().toDenseMatrix());
-  state.Drop(third);
+  state.Remove(third);
   state.Add(first, &value, Eigen::MatrixXd::Constant(1, 1, 9.0));
   EXPECT_EQ(state.layout()[first].tangent_offset, 0);
   EXPECT_EQ(state.layout()[first].value_offset, 0);
@@ -105,7 +105,7 @@ TEST(State, AReservedPlaceIsTakenByItsBlockAlone) {
 TEST(State, DropKeepsTheRestAndFillsTheGap) {
   State state = Abc();
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
-  state.Drop(state.layout().Find("s.a"));
+  state.Remove(state.layout().Find("s.a"));
   // c, the last block of the same size, moved into the place of a.
   EXPECT_EQ(state.covariance().size(), 3);
   EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
@@ -121,7 +121,7 @@ TEST(State, DropMovesAtMostOneBlock) {
     ids.push_back(state.Declare("s.b" + std::to_string(i), "s", Named(Geometry::Vector(1))));
     state.Add(ids.back(), &value, Eigen::MatrixXd::Constant(1, 1, 1.0 + i));
   }
-  state.Drop(ids[4]);
+  state.Remove(ids[4]);
   int moved = 0;
   for (int i = 0; i < 20; ++i) {
     if (i == 4) continue;
@@ -143,7 +143,7 @@ TEST(State, ASmallerBlockAtTheEndMovesIntoAGap) {
   state.Add(a, value, Eigen::MatrixXd::Constant(1, 1, 4.0));
   state.Add(b, value, Eigen::MatrixXd::Constant(1, 1, 9.0));
   state.covariance().SetBlock(3, 4, Eigen::MatrixXd::Constant(1, 1, 5.0));
-  state.Drop(large);
+  state.Remove(large);
   EXPECT_EQ(state.covariance().size(), 2);
   EXPECT_EQ(Cross(state, "s.a", "s.a")(0), 4.0);
   EXPECT_EQ(Cross(state, "s.b", "s.b")(0), 9.0);
@@ -155,7 +155,7 @@ TEST(State, ADroppedBlockGivesItsIdAndNameBack) {
   const std::size_t blocks = state.layout().blocks().size();
   const BlockId a = state.layout().Find("s.a");
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
-  state.Drop(a);
+  state.Remove(a);
   EXPECT_EQ(state.layout().Find("s.a"), -1);
   EXPECT_FALSE(state.layout()[a].present);
   EXPECT_EQ(state.Declare("s.a", "s", Named(Geometry::Vector(4))), a);

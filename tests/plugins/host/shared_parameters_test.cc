@@ -90,7 +90,8 @@ TEST_F(SharedParametersTest, AModelsOwnComplaintNamesTheMap) {
       Parse(kCamera.substr(0, kCamera.size() - 2) +
             ", model: photogrammetric, k1: 0, k2: 0, baseline_m: 1}\nsensors: {s: {sigma_px: 1}}");
   ExpectError(
-      ExitCode::kBadConfig, {"test.yaml:1:78 camera.model: not 'pinhole', but a rectified pair"},
+      ExitCode::kBadConfig,
+      {"test.yaml:1:78 camera.model: is not 'pinhole'; expected pinhole, because a rectified pair"},
       [&] { Shipped().CreateSensor("stereo_feature", config.root().At("sensors").At("s")); });
 }
 

@@ -33,7 +33,7 @@ std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment) {
   }
   bool stop_requested = false;  // stop only once: it must end the frames, not the smoothing
   RunOptions options;
-  options.progress = [&](std::int64_t done, std::int64_t) { prediction.frames = done; };
+  options.progress = [&](std::int64_t frames, std::int64_t) { prediction.frames = frames; };
   options.stop = [&] {
     return prediction.frames >= kFrames && !std::exchange(stop_requested, true);
   };

@@ -11,10 +11,9 @@ namespace {
 /// The estimators between which the steps are computed; null if one is missing.
 struct StepEstimators {
   const Candidate* full_information = nullptr;  ///< the full-information filter
-  const Candidate* smoother =
-      nullptr;  ///< of the same models, with the linearisation of the filter
-  const Candidate* accepted = nullptr;  ///< the batch of the accepted measurements
-  const Candidate* all = nullptr;       ///< the batch of all data
+  const Candidate* smoother = nullptr;          ///< with the models and linearisation of the filter
+  const Candidate* accepted = nullptr;          ///< the batch of the accepted measurements
+  const Candidate* all_data = nullptr;          ///< the batch of all data
 };
 
 StepEstimators FindStepEstimators(const Candidate& filter,
@@ -33,7 +32,7 @@ StepEstimators FindStepEstimators(const Candidate& filter,
       select(found.smoother, candidate);
     }
     if (!candidate.is_batch()) continue;
-    if (result.smoothed) select(by_filter ? found.accepted : found.all, candidate);
+    if (result.smoothed) select(by_filter ? found.accepted : found.all_data, candidate);
     // A full-information filter of the accepted measurements is preferred, because another step
     // covers the rejected ones.
     const bool is_better = by_filter && candidate.is_usable() &&
@@ -108,7 +107,7 @@ DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, co
 DecompositionStep LinearisationStep(const Candidate& filter, const StepEstimators& estimators,
                                     bool with_truth) {
   const bool has_accepted = estimators.accepted != nullptr && estimators.accepted->is_usable();
-  const Candidate* const batch = has_accepted ? estimators.accepted : estimators.all;
+  const Candidate* const batch = has_accepted ? estimators.accepted : estimators.all_data;
   const bool at_end = estimators.full_information == nullptr && batch != nullptr;
   return ComputeStep(DecompositionKind::kLinearisation, &filter,
                      at_end ? batch : estimators.full_information, with_truth,
@@ -161,14 +160,14 @@ std::vector<DecompositionStep> Decompose(const Candidate& filter,
       DecompositionKind::kSmoothing, has_smoother ? &filter : estimators.full_information,
       has_smoother                     ? estimators.smoother
       : estimators.accepted != nullptr ? estimators.accepted
-                                       : estimators.all,
+                                       : estimators.all_data,
       with_truth,
       "there is neither a smoother, {type: rts}, nor a batch of all data with a "
       "full-information filter"));
-  steps.push_back(
-      ComputeStep(DecompositionKind::kRejected, estimators.accepted, estimators.all, with_truth,
-                  "the batch of all data or that of the accepted measurements is missing, "
-                  "{type: BATCH, use: {accepted_by: FILTER}}"));
+  steps.push_back(ComputeStep(
+      DecompositionKind::kRejected, estimators.accepted, estimators.all_data, with_truth,
+      "the batch of all data or that of the accepted measurements is missing, "
+      "{type: BATCH, use: {accepted_by: FILTER}}"));
   const std::int64_t count = filter.measurements(), used = filter.used();
   steps.back().values["measurements"] = SingleValue(static_cast<double>(count));
   steps.back().values["rejected"] = SingleValue(static_cast<double>(count - used));

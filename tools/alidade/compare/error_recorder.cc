@@ -46,9 +46,9 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
     const std::vector<bool> angles = AreAngles(layout[id].geometry());
     series_.angles.push_back(std::ranges::find(angles, false) == angles.end());
   }
-  const bool online = spec.kind == EstimatorKind::kFilter ||
-                      (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
-  if (!online || blocks_.empty()) return;
+  const bool is_online = spec.kind == EstimatorKind::kFilter ||
+                         (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());
+  if (!is_online || blocks_.empty()) return;
   series_.no_bound_reason = CramerRaoBound::WhyUnavailable(spec.problem, truths);
   if (!series_.no_bound_reason.empty()) return;
   const Source* source = experiment.source.get();

@@ -115,8 +115,8 @@ std::string ReasonOf(const Error& error) {
   std::string reason = error.what();
   reason = reason.substr(0, reason.find('\n'));
   reason = reason.substr(0, reason.find("; expected"));
-  const std::size_t place = reason.find(": ");
-  return place == reason.npos ? reason : reason.substr(place + 2);
+  const std::size_t separator = reason.find(": ");
+  return separator == reason.npos ? reason : reason.substr(separator + 2);
 }
 
 /// Adds the variant. If that is impossible, adds its description to `left_out`, by the reason.

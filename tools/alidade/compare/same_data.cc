@@ -123,7 +123,7 @@ std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
   const ComparedRun& first = runs.front();
   for (std::size_t r = 1; r < runs.size(); ++r) {
     const ComparedRun& run = runs[r];
-    const std::string both = "'" + first.folder.string() + "' and '" + run.folder.string() + "'";
+    const std::string folders = "'" + first.folder.string() + "' and '" + run.folder.string() + "'";
     if (first.measurements_sha256 != run.measurements_sha256) {
       throw Error(ExitCode::kBadData,
                   ErrorLine(Place{run.folder.string()}, {},
@@ -133,12 +133,12 @@ std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
                             "runs of the same source, seed and start"));
     }
     if (first.truth_sha256 != run.truth_sha256) {
-      notes.push_back("the truths of " + both +
+      notes.push_back("the truths of " + folders +
                       " differ: their errors relative to truth are not comparable");
     }
     const std::string settings = DifferingSettings(first.folder, run.folder);
     if (!settings.empty()) {
-      notes.push_back("the settings of " + both + " differ: " + settings +
+      notes.push_back("the settings of " + folders + " differ: " + settings +
                       ": the estimator is not the only difference");
     }
   }

@@ -220,8 +220,8 @@ RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
 
 std::string WithoutOption(std::string text, const std::string& option, const std::string& value) {
   const std::string words = ",\n    " + JsonString(option) + ",\n    " + JsonString(value);
-  const std::size_t place = text.find(words);
-  return place == text.npos ? text : text.erase(place, words.size());
+  const std::size_t position = text.find(words);
+  return position == text.npos ? text : text.erase(position, words.size());
 }
 
 std::vector<std::string> InputDifferences(const std::string& recorded, const std::string& file,

@@ -30,12 +30,12 @@ Config WithSeed(const Config& config, std::uint64_t seed) {
 }
 
 bool AreEqual(const SourceFrame& a, const SourceFrame& b) {
-  const auto same = [](const Measurement& m, const Measurement& n) {
+  const auto are_equal = [](const Measurement& m, const Measurement& n) {
     return m.timestamp == n.timestamp && m.stream == n.stream && m.landmark == n.landmark &&
            m.values == n.values && m.covariance == n.covariance;
   };
   return a.timestamp == b.timestamp && a.truth == b.truth &&
-         std::ranges::equal(a.measurements, b.measurements, same);
+         std::ranges::equal(a.measurements, b.measurements, are_equal);
 }
 
 }  // namespace

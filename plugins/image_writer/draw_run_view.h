@@ -44,15 +44,15 @@ inline cv::Scalar Fade(const cv::Scalar& colour, double age) {
 inline void DrawFeature(Canvas& canvas, const ViewFeature& feature, const Placement& placement) {
   const double radius = feature.predicted ? 2.4 : 3.2;  // px; larger without an ellipse around it
   const cv::Scalar colour = ColourOf(feature.mark);
-  cv::Point2d end = placement.At(feature.at);
-  for (auto position = feature.tail.rbegin(); position != feature.tail.rend(); ++position) {
+  cv::Point2d end = placement.At(feature.pixel);
+  for (auto position = feature.trail.rbegin(); position != feature.trail.rend(); ++position) {
     const cv::Point2d start = placement.At(*position);
-    const auto age = static_cast<double>(position - feature.tail.rbegin() + 1) /
-                     static_cast<double>(feature.tail.size() + 1);
+    const auto age = static_cast<double>(position - feature.trail.rbegin() + 1) /
+                     static_cast<double>(feature.trail.size() + 1);
     canvas.Line(start, end, Fade(colour, age));
     end = start;
   }
-  const cv::Point2d centre = placement.At(feature.at);
+  const cv::Point2d centre = placement.At(feature.pixel);
   if (feature.mark == Mark::kLost) return canvas.Cross(centre, 4.0, colour);
   canvas.Disc(centre, radius + 0.9, {0, 0, 0});
   if (feature.predicted) {

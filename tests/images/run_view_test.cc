@@ -217,8 +217,8 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   const Outcome blind = Call({"run", "table.yaml", "-o", "run", "--save-video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
   EXPECT_TRUE(Contains(blind.err,
-                       "source: it has no images, so there is nothing to show; expected a source "
-                       "that measures in images, or draws them from `surfaces`"))
+                       "source: the source has no images to show; expected a source that measures "
+                       "in images, or draws them from `surfaces`"))
       << blind.err;
   EXPECT_FALSE(Exists("run"));
   EXPECT_FALSE(Exists("v.avi"));
@@ -226,7 +226,7 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   const Outcome buffered = Run(kPlate, {"--save-video", "v.avi", "--set",
                                         "out_of_sequence={policy: buffer, window_s: 0.1}"});
   EXPECT_EQ(buffered.code, 78);
-  EXPECT_TRUE(Contains(buffered.err, "out_of_sequence.policy: frames are not taken as their"))
+  EXPECT_TRUE(Contains(buffered.err, "out_of_sequence.policy: frames are not processed in"))
       << buffered.err;
 }
 
@@ -242,7 +242,7 @@ TEST_F(RunView, RefusesWhatItCannotWrite) {
   Write("v.avi", "mine");
   const Outcome there = Run(kPlate, {"--save-video", "v.avi"});
   EXPECT_EQ(there.code, 73);
-  EXPECT_TRUE(Contains(there.err, "v.avi: is there; --force replaces it")) << there.err;
+  EXPECT_TRUE(Contains(there.err, "v.avi: exists; --force replaces it")) << there.err;
   EXPECT_EQ(Read("v.avi"), "mine");
   EXPECT_FALSE(Exists("run"));
   EXPECT_EQ(Run(kPlate, {"--save-video", "v.avi", "--force"}).code, 0);
@@ -259,7 +259,7 @@ TEST_F(RunView, AWindowNeedsADisplay) {
   EXPECT_EQ(outcome.code, 73);
   EXPECT_TRUE(Contains(outcome.err,
                        "--view: there is no display: DISPLAY is not set; expected a graphical "
-                       "session; --save-video FILE.avi needs none"))
+                       "session; --save-video FILE.avi does not need it"))
       << outcome.err;
   EXPECT_FALSE(Exists("run"));
 

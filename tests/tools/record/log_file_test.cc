@@ -55,7 +55,7 @@ TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
   EXPECT_TRUE(warnings.texts[0].starts_with((temporary / "out.partial/log.txt").string() +
                                             ": cannot create: "))
       << warnings.texts[0];
-  EXPECT_TRUE(warnings.texts[0].ends_with("; the run goes on without its log"));
+  EXPECT_TRUE(warnings.texts[0].ends_with("; the run continues without a log"));
 }
 
 // A limit of 4 bytes stands for a full disk. The buffer holds 64 KiB: one message is written

@@ -46,12 +46,12 @@ TEST(FeatureTrails, WhatIsNotSeenAnyMoreIsLostOnce) {
   FeatureTrails trails;
   UpdateReport report;
   AddReport(report, 4, Outcome::kAccepted);
-  ASSERT_EQ(trails.Take(PixelsOf({{4, {10, 20}}}), &report).size(), 1u);
-  const std::vector<ViewFeature> lost = trails.Take(PixelsOf({}), nullptr);
+  ASSERT_EQ(trails.Add(PixelsOf({{4, {10, 20}}}), &report).size(), 1u);
+  const std::vector<ViewFeature> lost = trails.Add(PixelsOf({}), nullptr);
   ASSERT_EQ(lost.size(), 1u);
   EXPECT_EQ(lost[0].mark, Mark::kLost);
-  EXPECT_EQ(lost[0].at, (std::array<double, 2>{10, 20}));
-  EXPECT_TRUE(trails.Take(PixelsOf({}), nullptr).empty());
+  EXPECT_EQ(lost[0].pixel, (std::array<double, 2>{10, 20}));
+  EXPECT_TRUE(trails.Add(PixelsOf({}), nullptr).empty());
 }
 
 // Without a report a feature waits: it is new. Once it was accepted, it is left out by a choice.
@@ -59,19 +59,19 @@ TEST(FeatureTrails, WithoutAReportAFeatureIsNewUntilItIsAccepted) {
   FeatureTrails trails;
   UpdateReport none, accepted;
   AddReport(accepted, 4, Outcome::kAccepted);
-  EXPECT_EQ(trails.Take(PixelsOf({{4, {10, 20}}}), &none)[0].mark, Mark::kNew);
-  EXPECT_EQ(trails.Take(PixelsOf({{4, {11, 20}}}), &accepted)[0].mark, Mark::kAccepted);
-  EXPECT_EQ(trails.Take(PixelsOf({{4, {12, 20}}}), &none)[0].mark, Mark::kUnused);
+  EXPECT_EQ(trails.Add(PixelsOf({{4, {10, 20}}}), &none)[0].mark, Mark::kNew);
+  EXPECT_EQ(trails.Add(PixelsOf({{4, {11, 20}}}), &accepted)[0].mark, Mark::kAccepted);
+  EXPECT_EQ(trails.Add(PixelsOf({{4, {12, 20}}}), &none)[0].mark, Mark::kUnused);
 }
 
 TEST(FeatureTrails, TheTailHasTheEightPlacesBefore) {
   FeatureTrails trails;
   for (int k = 0; k < 12; ++k) {
     const double u = k;
-    const std::vector<ViewFeature> features = trails.Take(PixelsOf({{4, {u, 0}}}), nullptr);
-    ASSERT_EQ(features[0].tail.size(), static_cast<std::size_t>(std::min(k, 8)));
+    const std::vector<ViewFeature> features = trails.Add(PixelsOf({{4, {u, 0}}}), nullptr);
+    ASSERT_EQ(features[0].trail.size(), static_cast<std::size_t>(std::min(k, 8)));
     if (k > 0) {
-      EXPECT_EQ(features[0].tail.back()[0], u - 1.0);
+      EXPECT_EQ(features[0].trail.back()[0], u - 1.0);
     }
   }
 }
@@ -84,7 +84,7 @@ TEST(FeatureTrails, ThePredictionIsHAndTheFirstTwoOfS) {
   one.h = report.Copy(std::vector{11.0, 21.0, 5.0});
   one.s = report.Copy(std::vector{4.0, 1.0, 0.1, 1.0, 9.0, 0.2, 0.1, 0.2, 0.3});
   FeatureTrails trails;
-  const auto predicted = trails.Take(PixelsOf({{4, {10, 20, 5}}}), &report)[0].predicted;
+  const auto predicted = trails.Add(PixelsOf({{4, {10, 20, 5}}}), &report)[0].predicted;
   ASSERT_TRUE(predicted);
   EXPECT_EQ(predicted->x, 11);
   EXPECT_EQ(predicted->y, 21);
@@ -95,7 +95,7 @@ TEST(FeatureTrails, ThePredictionIsHAndTheFirstTwoOfS) {
 
 TEST(FeatureTrails, WhatIsNoPixelIsNoFeature) {
   FeatureTrails trails;
-  EXPECT_TRUE(trails.Take(PixelsOf({{-1, {1, 2}}, {3, {7}}}), nullptr).empty());
+  EXPECT_TRUE(trails.Add(PixelsOf({{-1, {1, 2}}, {3, {7}}}), nullptr).empty());
 }
 
 const Eigen::Matrix3d kNoTurn = Eigen::Matrix3d::Identity();

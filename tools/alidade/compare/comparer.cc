@@ -31,7 +31,7 @@ RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
     spec.estimator = internal::WithCpuClock(std::move(spec.estimator), impl_->clocks.back());
     if (over_seeds) impl_->errors.emplace_back(spec, experiment);
     candidate.series.blocks = internal::SeriesBlocksOf(spec.problem);
-    candidate.series.joint = candidate.series.tangent() <= internal::Series::kMostJoint;
+    candidate.series.joint = candidate.series.tangent() <= internal::Series::kMaxJoint;
   }
 }
 

@@ -125,7 +125,7 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
 
 /// Reads P and replaces its diagonal by it, if the file exists and P is not too large.
 void ReadCovariances(const fs::path& file, Series& series) {
-  if (series.tangent() > Series::kMostJoint || !fs::exists(file)) return;
+  if (series.tangent() > Series::kMaxJoint || !fs::exists(file)) return;
   series.joint = true;
   RequireFile(file);
   std::vector<double> cells(series.cells() * series.timestamps.size());

@@ -8,45 +8,45 @@
 #include "alidade/base/timestamp.h"
 #include "alidade/record/estimate_series.h"
 
-/// What the csv files of a run folder hold, for those who draw them. Columns go by their names.
+/// Contents of the csv files of a run folder, for figures. Columns are identified by name.
 namespace alidade::internal {
 
-/// One element of a block in `NAME/estimates.csv`. Value and truth are ambient elements, sigma is a
-/// tangent one: next to a value only where both are the same, in vectors and angles.
+/// Element of a block in `NAME/estimates.csv`. Value and truth are ambient elements; sigma belongs
+/// to a tangent element. Only elements of vectors and angles have both.
 struct RecordedElement {
-  std::string name;  ///< the column of its value too
+  std::string name;  ///< also the column of the value
   std::string unit;
   bool has_sigma = false;  ///< in column `sigma:NAME`
   std::string truth;       ///< column in truth.csv, or ""
-  bool has_value = false;  ///< at some timestamp
-  bool varies = false;     ///< likewise, and its block was not constant
+  bool has_value = false;  ///< the element has a value at some timestamp
+  bool varies = false;     ///< it has a value at some timestamp, and its block is not constant
   bool has_truth = false;
   bool is_random = false;  ///< its variance was above zero at some timestamp
 };
 
-/// One tangent element of a block, whose standard deviation is in column `sigma:NAME` of
-/// `NAME/estimates.csv`.
+/// Tangent element of a block. Column `sigma:NAME` of `NAME/estimates.csv` is its standard
+/// deviation.
 struct RecordedSigma {
   std::string name;
   std::string unit;
   bool is_random = false;  ///< its variance was above zero at some timestamp
 };
 
-/// One element of the error of a block in `NAME/errors.csv`, a tangent one; sigma in column
-/// `sigma:NAME`.
+/// Tangent element of the error of a block in `NAME/errors.csv`. Column `sigma:NAME` is its
+/// standard deviation.
 struct RecordedError {
   std::string name;
   std::string unit;
-  int truth = 0, part = 0;  ///< of the source's truths, and the tangent element of it
-  bool is_angle = false;    ///< or of a rotation or direction: rad
-  bool is_known = false;    ///< finite at some timestamp
+  int truth = 0, part = 0;  ///< index of the source's truth, and of its tangent element
+  bool is_angle = false;    ///< an angle, or an element of a rotation or direction: rad
+  bool is_known = false;    ///< the error is finite at some timestamp
   bool is_random = false;   ///< its variance was above zero at some timestamp
 };
 
 struct RecordedGain {
   std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
-  std::string unit;      ///< "" where it has none, or that of the measurement is not known
-  std::size_t cell = 0;  ///< of a row, behind time and sensor
+  std::string unit;      ///< "" if it has no unit, or if the unit of the measurement is unknown
+  std::size_t cell = 0;  ///< column index after time and sensor
   bool used = false;
 };
 
@@ -56,14 +56,14 @@ struct RecordedSensor {
   std::string unit;
   int tangent = 1;
   bool has_landmark = false;
-  bool has_several = false;  ///< measurements at one timestamp: of landmarks, of satellites
+  bool has_several = false;  ///< several measurements at a timestamp, as of landmarks or satellites
   std::vector<RecordedGain> gains;
   bool has_innovations = false;
   bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
 };
 
-/// Landmarks of `NAME/landmarks.csv` that have a place: all, those of them whose true one is known
-/// too, and those that were removed.
+/// Numbers of landmarks in `NAME/landmarks.csv` with a position: all, those with a known true
+/// position, and removed ones.
 struct RecordedMap {
   std::int64_t placed = 0, known = 0, removed = 0;
 };
@@ -75,8 +75,8 @@ struct RecordedEstimator {
   std::vector<RecordedSigma> sigmas = {};
   std::vector<RecordedError> errors = {};
   std::vector<RecordedSensor> sensors = {};
-  int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
-  int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
+  int width = 0;  ///< size of the largest measurement: columns z0 .. z<width - 1>, then h, s and r
+  int path = -1;  ///< first of the three elements of the position that sees landmarks; -1: none
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
   RecordedMap map = {};
@@ -89,21 +89,21 @@ struct RecordedStream {
   std::int64_t expected_rows = 0;  ///< in expected.csv
 };
 
-/// A block whose value each measurement of a sensor implies, in `implied_states.csv`: by itself, or
-/// with the sensor's other roles at truth.
+/// Block whose value each measurement of a sensor implies, in `implied_states.csv`: from the
+/// measurement alone, or with the true values of the sensor's other roles.
 struct RecordedImplied {
   std::string sensor;
-  std::string block;  ///< the column too
+  std::string block;  ///< also the column
   std::string unit;
-  bool rest_at_truth = false;
-  std::size_t cell = 0;  ///< of a row, behind time and sensor
+  bool rest_at_truth = false;  ///< the other roles have their true values
+  std::size_t cell = 0;        ///< column index after time and sensor
   std::int64_t rows = 0;
 };
 
-/// An estimator with a column in `timing.csv`.
+/// Estimator with a column in `timing.csv`.
 struct RecordedTimes {
-  std::string estimator;  ///< the column
-  bool is_known = false;  ///< of some frame
+  std::string estimator;  ///< also the column
+  bool is_known = false;  ///< the time of some frame is known
 };
 
 struct RecordedRun {

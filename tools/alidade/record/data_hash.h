@@ -9,29 +9,29 @@
 
 namespace alidade::internal {
 
-/// SHA-256 of what the source of a run gave: of the values, whatever text or simulator they came
-/// from.
+/// SHA-256 of the data of a run's source. It depends on the values only, not on their text or
+/// simulator.
 ///
-///   measurements   of each frame its timestamp, and of each of its measurements stream, landmark,
-///                  values and own covariance; those of one frame by the name of their stream
-///   truth          of each truth that a frame knows its timestamp, name and values
+///   measurements   timestamp of each frame; stream, landmark, values and covariance of each of its
+///                  measurements, sorted by the name of the stream
+///   truth          timestamp, name and values of each known truth of a frame
 ///
-/// Numbers go in as 8 bytes, the lowest first; 0 and -0 are the same, and so is every NaN.
+/// A number contributes 8 bytes, the lowest first. 0 and -0 are equal, and so are all NaNs.
 class DataHash {
  public:
   DataHash(std::vector<StreamInfo> streams, std::vector<StreamInfo> truths);
 
   void Add(const SourceFrame& frame);
-  /// 64 hexadecimal digits of all frames so far.
+  /// Returns the hash of the measurements so far, 64 hexadecimal digits.
   std::string measurements() const { return measurements_.Digest(); }
-  /// Likewise; "" where no frame had a truth.
+  /// Returns the hash of the truths so far; "" if no frame had a truth.
   std::string truth() const { return has_truth_ ? truth_.Digest() : ""; }
 
  private:
   std::vector<StreamInfo> streams_, truths_;
   Sha256Stream measurements_, truth_;
   bool has_truth_ = false;
-  std::string bytes_;  ///< of one frame; kept for its memory
+  std::string bytes_;  ///< bytes of one frame; a member to reuse its memory
 };
 
 }  // namespace alidade::internal

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// Texts of files next to this one, without their licence lines; alidade_embed makes their source.
+/// Texts of files in this folder, without their licence lines. alidade_embed generates the source.
 namespace alidade::internal {
 
 extern const char* const kReportCss;    ///< report.css

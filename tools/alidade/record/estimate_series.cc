@@ -24,17 +24,17 @@ std::vector<SeriesBlock> SeriesBlocksOf(const Problem& problem) {
 }
 
 void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells) {
-  std::vector<int> places;  // of each tangent element; -1: it has no covariance
+  std::vector<int> indices;  // index of each tangent element in P; -1: no covariance
   for (std::size_t b = 0; b < blocks; ++b) {
     const Block& block = state.layout()[static_cast<BlockId>(b)];
     for (int i = 0; i < block.geometry().tangent; ++i) {
-      places.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
+      indices.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
     }
   }
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  for (std::size_t i = 0; i < indices.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      const bool known = places[i] >= 0 && places[j] >= 0;
-      cells.push_back(known ? state.covariance().Block(places[i], 1, places[j], 1)(0, 0) : kNan);
+      const bool known = indices[i] >= 0 && indices[j] >= 0;
+      cells.push_back(known ? state.covariance().Block(indices[i], 1, indices[j], 1)(0, 0) : kNan);
     }
   }
 }
@@ -58,11 +58,12 @@ std::size_t Series::cells() const {
 
 Eigen::MatrixXd Series::Covariance(std::size_t row, int first, int size) const {
   Eigen::MatrixXd p = Eigen::MatrixXd::Zero(size, size);
-  const double* const at = covariances.data() + row * cells();
+  const double* const row_cells = covariances.data() + row * cells();
   for (int i = 0; i < size; ++i) {
     const int a = first + i;
-    if (!joint) p(i, i) = at[a];
-    for (int j = 0; joint && j <= i; ++j) p(i, j) = p(j, i) = at[a * (a + 1) / 2 + first + j];
+    if (!joint) p(i, i) = row_cells[a];
+    for (int j = 0; joint && j <= i; ++j)
+      p(i, j) = p(j, i) = row_cells[a * (a + 1) / 2 + first + j];
   }
   return p;
 }

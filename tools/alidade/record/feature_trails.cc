@@ -14,26 +14,27 @@ Mark MarkOf(Outcome outcome) {
                                        : Mark::kUnused;
 }
 
-std::vector<ViewFeature> FeatureTrails::Take(const Frame& frame, const UpdateReport* report) {
-  constexpr std::size_t kTail = 8;  // places of a feature before the present one
+std::vector<ViewFeature> FeatureTrails::Add(const Frame& frame, const UpdateReport* report) {
+  constexpr std::size_t kMaxTrail = 8;  // number of earlier positions of a feature
   std::vector<ViewFeature> features;
-  std::map<std::int64_t, Trail> now;
+  std::map<std::int64_t, Trail> current_trails;
   for (const Measurement& m : frame.measurements) {
-    if (m.landmark < 0 || m.values.size() < 2 || now.contains(m.landmark)) continue;
+    if (m.landmark < 0 || m.values.size() < 2 || current_trails.contains(m.landmark)) continue;
     ViewFeature feature = FeatureOf(m, report);
-    Trail& trail = now[m.landmark];
-    if (const auto before = trails_.find(m.landmark); before != trails_.end()) {
-      trail = before->second;
+    Trail& trail = current_trails[m.landmark];
+    if (const auto previous = trails_.find(m.landmark); previous != trails_.end()) {
+      trail = previous->second;
     }
-    feature.tail = trail;
-    trail.push_back(feature.at);
-    if (trail.size() > kTail) trail.erase(trail.begin());
+    feature.trail = trail;
+    trail.push_back(feature.pixel);
+    if (trail.size() > kMaxTrail) trail.erase(trail.begin());
     features.push_back(std::move(feature));
   }
   for (const auto& [id, trail] : trails_) {
-    if (!now.contains(id)) features.push_back({Mark::kLost, trail.back(), std::nullopt, trail});
+    if (!current_trails.contains(id))
+      features.push_back({Mark::kLost, trail.back(), std::nullopt, trail});
   }
-  trails_ = std::move(now);
+  trails_ = std::move(current_trails);
   return features;
 }
 
@@ -41,9 +42,9 @@ ViewFeature FeatureTrails::FeatureOf(const Measurement& m, const UpdateReport* r
   ViewFeature feature{Mark::kUnused, {m.values[0], m.values[1]}, std::nullopt};
   const MeasurementReport* found = nullptr;
   if (report != nullptr) {
-    const auto all = report->measurements();
-    const auto it = std::ranges::find(all, m.landmark, &MeasurementReport::landmark);
-    if (it != all.end()) found = &*it;
+    const auto reports = report->measurements();
+    const auto iterator = std::ranges::find(reports, m.landmark, &MeasurementReport::landmark);
+    if (iterator != reports.end()) found = &*iterator;
   }
   if (found == nullptr) {
     if (!accepted_.contains(m.landmark)) feature.mark = Mark::kNew;

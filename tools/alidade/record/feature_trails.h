@@ -12,22 +12,23 @@
 
 namespace alidade::internal {
 
-/// What the outcome of a measurement is shown as.
+/// Returns the mark that represents the outcome of a measurement in an image.
 Mark MarkOf(Outcome outcome);
 
-/// Features over the frames: where each was, and whether it was ever accepted.
+/// Tracker of the image features of recent frames: their positions, and whether they were accepted.
 class FeatureTrails {
  public:
-  /// The features of a frame, the measurements of landmarks whose first two values are a pixel,
-  /// with those of the frame before that are lost. `report` is null where no estimator took it.
-  std::vector<ViewFeature> Take(const Frame& frame, const UpdateReport* report);
+  /// Adds a frame. Returns its features and those of the previous frame that are lost. Features are
+  /// the measurements of landmarks whose first two values are a pixel. `report` is null if no
+  /// estimator processed the frame.
+  std::vector<ViewFeature> Add(const Frame& frame, const UpdateReport* report);
 
  private:
   using Trail = std::vector<std::array<double, 2>>;
 
   ViewFeature FeatureOf(const Measurement& m, const UpdateReport* report);
 
-  std::map<std::int64_t, Trail> trails_;  ///< of the frame before
+  std::map<std::int64_t, Trail> trails_;  ///< trails of the features in the previous frame
   std::set<std::int64_t> accepted_;
 };
 

@@ -17,7 +17,7 @@ void Follower::Begin(const Experiment& experiment) {
 
 void Follower::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                           const UpdateReport& /*report*/) {
-  const Followed& followed = estimators_[static_cast<std::size_t>(estimator)];
+  const FollowedEstimator& followed = estimators_[static_cast<std::size_t>(estimator)];
   internal::Json line;
   line["t_s"] = Seconds(frame.timestamp);
   line["estimator"] = followed.name;

@@ -11,12 +11,12 @@
 
 namespace alidade {
 
-/// Writes each estimate as it is made, a line of JSON for each frame and estimator: `t_s`,
-/// `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the blocks of the
-/// system that have a value. An offline estimator has none until all frames are there.
+/// Observer that writes each estimate immediately, as a line of JSON for each frame and estimator:
+/// `t_s`, `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the problem's
+/// blocks that have a value. An offline estimator writes its estimates after the last frame.
 class Follower : public RunObserver {
  public:
-  /// `write` takes a line with its end.
+  /// Calls `write` with each line, including its line end.
   explicit Follower(std::function<void(std::string_view line)> write) : write_(std::move(write)) {}
 
   void Begin(const Experiment& experiment) override;
@@ -24,12 +24,12 @@ class Follower : public RunObserver {
                   const UpdateReport& report) override;
 
  private:
-  struct Followed {
+  struct FollowedEstimator {
     std::string name;
-    StateLayout layout;  ///< of its problem
+    StateLayout layout;  ///< layout of its problem
   };
   std::function<void(std::string_view line)> write_;
-  std::vector<Followed> estimators_;
+  std::vector<FollowedEstimator> estimators_;
 };
 
 }  // namespace alidade

@@ -11,9 +11,9 @@ std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
   const void* const factory = internal::FactoryOnDemand(
       kImageWriterKind, window ? "image_window" : "images", folder,
       ErrorLine({arguments.shown}, {},
-                window ? "this build of alidade opens no windows"
-                       : "this build of alidade draws no images",
-                "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
+                window ? "this build of alidade does not include windows"
+                       : "this build of alidade does not include images",
+                "a build with OpenCV: apt-get install libopencv-dev, then configure and build "
                 "again"));
   return static_cast<const ImageWriterEntry*>(factory)->create(arguments);
 }

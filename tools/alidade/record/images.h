@@ -14,34 +14,34 @@
 
 namespace alidade {
 
-/// What a camera sees, frame by frame: a video or a folder of images.
+/// Writer of camera images, frame by frame: to a video, a folder or a window.
 class ImageWriter {
  public:
   virtual ~ImageWriter() = default;
-  /// Adds the image of frame `number`, of whose points `pixels` are the centres (u, v); the
-  /// timestamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
+  /// Draws the image of frame `number` with points at `pixels` (u, v). The timestamps of the first
+  /// two frames determine the frame rate of a video. Errors: kCannotCreate, kIo.
   virtual void Add(std::int64_t number, Timestamp timestamp,
                    const std::vector<std::array<double, 2>>& pixels) = 0;
-  /// Adds an image as it is; all are of one size.
+  /// Adds an unchanged image. All images have the same size.
   virtual void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) = 0;
-  /// Adds the image of a frame with what became of it, next to it the estimate.
+  /// Draws the image of a frame with its marked features, and the estimate next to it.
   virtual void Add(const RunView& view) = 0;
-  /// Completes what was written. Error: kIo.
+  /// Completes the output. Error: kIo.
   virtual void Close() = 0;
 };
 
-/// What an image writer is made from.
+/// Arguments of the creation of an image writer.
 struct ImageArguments {
   enum class Form { kVideo, kImages, kWindow } form;
-  /// Of the video, or of the folder of images, whose folder is there; or the title of the window.
+  /// Path of the video or of the folder of images, in an existing folder; or title of the window.
   std::filesystem::path path;
   std::string shown;  ///< the path in messages
-  int width, height;  ///< px, of images that are drawn from points
+  int width, height;  ///< px; size of images that are drawn from points
 };
 
 inline constexpr const char* kImageWriterKind = "image writer";
 
-/// The factory of an image writer.
+/// Factory that an image writer plugin exports.
 struct ImageWriterEntry {
   std::unique_ptr<ImageWriter> (*create)(const ImageArguments& arguments);
 };
@@ -49,9 +49,9 @@ constexpr CppEntry EntryOf(const ImageWriterEntry& writer) {
   return {kImageWriterKind, "images", "", "", "", &writer};
 }
 
-/// Makes the image writer of the C++ plugin in `folder`; of the one that was built with
-/// this library where "". It is loaded when it is first asked for, because its libraries are slow
-/// to load. A window is of a plugin of its own. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
+/// Creates an image writer with the C++ plugin in `folder`; "": the plugin that was built with this
+/// library. The plugin is loaded at its first use, because its libraries are slow to load. Windows
+/// have a separate plugin. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
 std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder = {});
 

@@ -11,21 +11,22 @@ namespace alidade::internal {
 
 RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks) {
   RecordedMap map;
-  for (const LandmarkEstimate& one : landmarks) {
-    if (!one.position.allFinite()) continue;
+  for (const LandmarkEstimate& landmark : landmarks) {
+    if (!landmark.position.allFinite()) continue;
     ++map.placed;
-    map.known += one.true_position.allFinite() ? 1 : 0;
-    map.removed += one.removed != kNoTimestamp ? 1 : 0;
+    map.known += landmark.true_position.allFinite() ? 1 : 0;
+    map.removed += landmark.removed != kNoTimestamp ? 1 : 0;
   }
   return map;
 }
 
-std::vector<LandmarkEstimate> WholeMap(const EstimatorResult& result) {
+std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result) {
   if (!result.landmarks) return {};
   std::vector<LandmarkEstimate> map = *result.landmarks;
   map.insert(map.end(), result.removed_landmarks.begin(), result.removed_landmarks.end());
-  std::ranges::sort(map, {},
-                    [](const LandmarkEstimate& one) { return std::pair(one.id, one.generation); });
+  std::ranges::sort(map, {}, [](const LandmarkEstimate& landmark) {
+    return std::pair(landmark.id, landmark.generation);
+  });
   return map;
 }
 
@@ -62,20 +63,25 @@ void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
       file.Empty();
     }
   };
-  for (const LandmarkEstimate& one : landmarks) {
-    file.Integer(one.id)
-        .Integer(one.generation)
-        .Text(one.representation ? ToString(*one.representation) : "");
-    for (const double x : one.position) number(x);
-    for (int i = 0; i < 3; ++i) number(std::sqrt(one.covariance(i, i)));
-    number(one.inverse_distance);
-    number(one.sigma);
-    file.Time(one.first).Time(one.last).Integer(one.tried).Integer(one.accepted);
-    for (const double x : one.true_position) number(x);
-    number(one.covariance(0, 1));
-    number(one.covariance(0, 2));
-    number(one.covariance(1, 2));
-    file.Text(one.removed == kNoTimestamp ? "kept" : "removed").Time(one.removed).EndRow();
+  for (const LandmarkEstimate& landmark : landmarks) {
+    file.Integer(landmark.id)
+        .Integer(landmark.generation)
+        .Text(landmark.representation ? ToString(*landmark.representation) : "");
+    for (const double x : landmark.position) number(x);
+    for (int i = 0; i < 3; ++i) number(std::sqrt(landmark.covariance(i, i)));
+    number(landmark.inverse_distance);
+    number(landmark.sigma);
+    file.Time(landmark.first)
+        .Time(landmark.last)
+        .Integer(landmark.tried)
+        .Integer(landmark.accepted);
+    for (const double x : landmark.true_position) number(x);
+    number(landmark.covariance(0, 1));
+    number(landmark.covariance(0, 2));
+    number(landmark.covariance(1, 2));
+    file.Text(landmark.removed == kNoTimestamp ? "kept" : "removed")
+        .Time(landmark.removed)
+        .EndRow();
   }
   file.Close();
 }

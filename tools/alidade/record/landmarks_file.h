@@ -10,14 +10,14 @@
 
 namespace alidade::internal {
 
-/// What a figure of the map has to know.
+/// Counts the landmarks, for a figure of the map.
 RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks);
 
-/// Every landmark that the estimator had, by id and generation: those at the end, and those that
-/// were removed before, as they were then. Empty where `result` has no map.
-std::vector<LandmarkEstimate> WholeMap(const EstimatorResult& result);
+/// Returns all landmarks of an estimator, sorted by id and generation: those in the final state,
+/// and removed ones with their last estimates. Empty if `result` has no map.
+std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result);
 
-/// `NAME/landmarks.csv`. A number that is not finite is left empty. Error: kIo.
+/// Writes `NAME/landmarks.csv`. The cell of a number that is not finite is empty. Error: kIo.
 void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
                     const std::vector<LandmarkEstimate>& landmarks);
 

@@ -10,13 +10,14 @@ namespace alidade::internal {
 std::string LandmarksPly(const std::vector<LandmarkEstimate>& landmarks) {
   std::string vertices;
   std::int64_t count = 0;
-  for (const LandmarkEstimate& one : landmarks) {
-    const Eigen::Vector3d sigma = one.covariance.diagonal().cwiseSqrt();
-    if (!one.position.allFinite() || !sigma.allFinite()) continue;
+  for (const LandmarkEstimate& landmark : landmarks) {
+    const Eigen::Vector3d sigma = landmark.covariance.diagonal().cwiseSqrt();
+    if (!landmark.position.allFinite() || !sigma.allFinite()) continue;
     ++count;
-    for (const double x : one.position) vertices += NumberText(x) + ' ';
+    for (const double x : landmark.position) vertices += NumberText(x) + ' ';
     for (const double x : sigma) vertices += NumberText(x) + ' ';
-    vertices += (one.removed != kNoTimestamp ? "1 " : "0 ") + std::to_string(one.id) + '\n';
+    vertices +=
+        (landmark.removed != kNoTimestamp ? "1 " : "0 ") + std::to_string(landmark.id) + '\n';
   }
   std::string text = "ply\nformat ascii 1.0\ncomment landmarks in the world, m\nelement vertex " +
                      std::to_string(count) + '\n';

@@ -9,23 +9,23 @@ LogFile::LogFile(const OutputFolder& folder) {
   try {
     file_ = folder.Create("log.txt");
   } catch (const Error& error) {
-    Log(LogLevel::kWarning, std::string(error.what()) + "; the run goes on without its log");
+    Log(LogLevel::kWarning, std::string(error.what()) + "; the run continues without a log");
     return;
   }
   subscription_.emplace(LogLevel::kInfo,
-                        [this](LogLevel level, std::string_view text) { Take(level, text); });
+                        [this](LogLevel level, std::string_view text) { Record(level, text); });
 }
 
-void LogFile::Take(LogLevel level, std::string_view text) {
+void LogFile::Record(LogLevel level, std::string_view text) {
   if (file_ == nullptr || std::this_thread::get_id() != thread_) return;
   try {
     file_->Write(std::string(ToString(level)) + ": " + std::string(text) + '\n');
   } catch (const Error& error) {
-    GiveUp(error);
+    RecordFailure(error);
   }
 }
 
-void LogFile::GiveUp(const Error& error) {
+void LogFile::RecordFailure(const Error& error) {
   failure_ = error.what();
   file_.reset();
 }
@@ -36,10 +36,10 @@ void LogFile::Close() {
     if (file_ != nullptr) file_->Close();
     file_.reset();
   } catch (const Error& error) {
-    GiveUp(error);
+    RecordFailure(error);
   }
   const std::string failure = std::exchange(failure_, {});
-  if (!failure.empty()) Log(LogLevel::kWarning, failure + "; the run goes on without its log");
+  if (!failure.empty()) Log(LogLevel::kWarning, failure + "; the run continues without a log");
 }
 
 }  // namespace alidade::internal

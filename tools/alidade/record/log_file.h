@@ -11,22 +11,22 @@
 
 namespace alidade::internal {
 
-/// `log.txt` of a run folder: a line `LEVEL: TEXT` for each message of level info and above, of the
-/// thread that made it alone, so that runs in parallel have a log each. A run goes on without it:
-/// if it cannot be written, a warning says so.
+/// `log.txt` of a run folder: a line `LEVEL: TEXT` for each message of level info and above. It
+/// records only the thread that created it, so that parallel runs have separate logs. If it cannot
+/// be written, a warning reports this and the run continues.
 class LogFile {
  public:
   explicit LogFile(const OutputFolder& folder);
-  /// Writes what is buffered; later messages are left out.
+  /// Flushes the file. Later messages are not recorded.
   void Close();
 
  private:
-  void Take(LogLevel level, std::string_view text);
-  void GiveUp(const Error& error);
+  void Record(LogLevel level, std::string_view text);
+  void RecordFailure(const Error& error);
 
   const std::thread::id thread_ = std::this_thread::get_id();
-  std::unique_ptr<OutputFile> file_;  ///< null: closed, or it could not be written
-  std::string failure_;               ///< why it could not be
+  std::unique_ptr<OutputFile> file_;  ///< null: closed or failed
+  std::string failure_;               ///< reason of the failure
   std::optional<LogSubscription> subscription_;
 };
 

@@ -9,17 +9,18 @@
 
 namespace alidade::internal {
 
-/// A video that exists only if it is complete: it grows as `NAME.partial.avi` next to its place.
+/// Video file that appears only when it is complete. Until then it is `NAME.partial.avi` in the
+/// same folder.
 class PartialFile {
  public:
   PartialFile(std::filesystem::path file, bool force)
       : file_(std::move(file)),
         partial_(file_.parent_path() / (file_.stem().string() + ".partial.avi")) {
     std::error_code ignored;
-    for (const std::filesystem::path& place : {file_, partial_}) {
-      if (force || !std::filesystem::exists(place, ignored)) continue;
+    for (const std::filesystem::path& path : {file_, partial_}) {
+      if (force || !std::filesystem::exists(path, ignored)) continue;
       throw Error(ExitCode::kCannotCreate,
-                  ErrorLine({place.string()}, {}, "is there; --force replaces it"));
+                  ErrorLine({path.string()}, {}, "exists; --force replaces it"));
     }
     OutputFile(partial_).Close();
   }
@@ -31,7 +32,7 @@ class PartialFile {
   PartialFile& operator=(const PartialFile&) = delete;
 
   const std::filesystem::path& partial() const { return partial_; }
-  /// Leaves no file if nothing was written.
+  /// Renames the file to its final name. An empty file is removed.
   void Commit() const {
     std::error_code error;
     if (std::filesystem::file_size(partial_, error) == 0) return;

@@ -17,30 +17,30 @@ constexpr const char* kCovariances = " Pr11 Pr12 Pr13 Pr22 Pr23 Pr33 Pt11 Pt12 P
 constexpr std::array<std::string_view, 5> kAngles = {"orientation", "heading", "yaw", "angle",
                                                      "theta"};
 
-/// Of a whole rotation, or position, and of a planar one its part.
-Eigen::Matrix3d Whole(const Eigen::MatrixXd& covariance) {
+/// Extends a planar covariance to three axes with zeros: 2x2 of a position, 1x1 of the angle.
+Eigen::Matrix3d ExpandToThreeAxes(const Eigen::MatrixXd& covariance) {
   if (covariance.rows() == 3) return covariance;
-  Eigen::Matrix3d whole = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d expanded = Eigen::Matrix3d::Zero();
   if (covariance.rows() == 2) {
-    whole.topLeftCorner<2, 2>() = covariance;
+    expanded.topLeftCorner<2, 2>() = covariance;
   } else {
-    whole(2, 2) = covariance(0, 0);
+    expanded(2, 2) = covariance(0, 0);
   }
-  return whole;
+  return expanded;
 }
 
 void AppendUpper(std::string& row, const Eigen::MatrixXd& covariance) {
-  const Eigen::Matrix3d whole = Whole(covariance);
-  const bool finite = whole.allFinite();
+  const Eigen::Matrix3d expanded = ExpandToThreeAxes(covariance);
+  const bool finite = expanded.allFinite();
   for (int i = 0; i < 3; ++i) {
     for (int j = i; j < 3; ++j) {
       row += ' ';
-      AppendNumber(row, finite ? whole(i, j) : 0.0);
+      AppendNumber(row, finite ? expanded(i, j) : 0.0);
     }
   }
 }
 
-/// Whether `value` is the orientation, of that many numbers, of the body `prefix`.
+/// Returns true if `value` is the orientation of the body `prefix` and has `size` numbers.
 bool IsOrientation(const StreamInfo& value, const std::string& prefix, int size) {
   if (value.size != size || !value.name.starts_with(prefix)) return false;
   const std::string_view name = std::string_view(value.name).substr(prefix.size());
@@ -57,8 +57,8 @@ std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values) {
     if (name != kPosition && !name.ends_with('.' + std::string(kPosition))) continue;
     const bool planar = values[p].size == 2;
     const std::string prefix = name.substr(0, name.size() - kPosition.size());
-    const auto found = std::ranges::find_if(values, [&](const StreamInfo& other) {
-      return IsOrientation(other, prefix, planar ? 1 : 4);
+    const auto found = std::ranges::find_if(values, [&](const StreamInfo& value) {
+      return IsOrientation(value, prefix, planar ? 1 : 4);
     });
     if (found == values.end()) continue;
     return PosePlace{p, static_cast<std::size_t>(found - values.begin()), planar};

@@ -12,33 +12,33 @@
 
 namespace alidade::internal {
 
-/// Indices of a position and of the orientation that belongs to it: three numbers and a quaternion,
-/// or of a planar pose two numbers and an angle about z.
+/// Indices of a position and its orientation: three numbers and a quaternion, or for a planar pose
+/// two numbers and an angle about z.
 struct PosePlace {
   std::size_t position, orientation;
   bool planar = false;
 };
-/// The first value X.position that has an X.orientation: of 3 and 4 numbers, or planar of 2 and 1,
-/// where the angle may be called heading, yaw, angle or theta too. A name may do without X. None if
-/// there is no such pair.
+/// Finds the first value X.position with an X.orientation. They have 3 and 4 numbers, or 2 and 1 if
+/// planar; a planar angle may also be named heading, yaw, angle or theta. The prefix X. is
+/// optional. Returns nullopt if there is no such pair.
 std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values);
 
-/// A file of poses as of TUM, `t x y z qx qy qz qw`, with covariances or without. A planar pose has
-/// z = 0, turns about z, and is exactly known in the other axes.
+/// Writer of a pose file in TUM format, `t x y z qx qy qz qw`, with or without covariances. A
+/// planar pose has z = 0, rotates about z, and has zero variance in the other axes.
 class PoseFile {
  public:
-  /// Creates the file with a line of comment that names the columns. Errors: kCannotCreate, kIo.
+  /// Creates the file with a comment line that names the columns. Errors: kCannotCreate, kIo.
   PoseFile(const OutputFolder& folder, const std::string& name, const PosePlace& place,
            bool with_covariances = false);
 
-  /// The orientation is w x y z, or the angle, rad. Error: kIo.
+  /// Writes a pose. The orientation is w x y z, or the angle, rad. Error: kIo.
   void Add(Timestamp timestamp, const double* position, const double* orientation);
-  /// With covariances in the tangent, m^2 in the world and rad^2 in the body; one that is not
-  /// finite is written as zeros.
+  /// Writes a pose with covariances in the tangent, m^2 in the world and rad^2 in the body. A
+  /// covariance that is not finite is written as zeros.
   void Add(Timestamp timestamp, const double* position, const double* orientation,
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);
-  /// The pose among the truths of a frame; no row where it is not known.
+  /// Writes the true pose of a frame, if it is known.
   void AddTruth(const SourceFrame& frame);
   void Close();
 

@@ -33,13 +33,13 @@ using internal::CsvFile;
 using Clock = std::chrono::steady_clock;
 
 struct Recorder::Impl {
-  Impl(const Options& given, const Config& config);
+  Impl(const Options& recorder_options, const Config& run_config);
 
   internal::RecordedRun CloseFiles();
   void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result);
-  /// Writes all files but run.json. Returns what kept the report from being written; null: it is.
+  /// Writes all files except run.json. Returns the error of writing the report, or null.
   std::exception_ptr WriteResults(const RunResult& result);
 
   Options options;
@@ -48,7 +48,7 @@ struct Recorder::Impl {
   const Config config;
   std::string title, config_text;
   internal::RunFacts facts;
-  std::vector<std::string> subjects;  ///< of the rows, as SubjectsOf
+  std::vector<std::string> subjects;  ///< SubjectsOf the experiment
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
   std::optional<internal::TimingFile> timing;
@@ -63,34 +63,34 @@ namespace {
 
 constexpr const char* kRunFile = "run.json";
 
-/// In timing.json, by FramePart.
+/// Names in timing.json, by FramePart.
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
                                                              "landmarks"};
 
-/// The text of a key where there is one, else `fallback`.
+/// Returns the text of a key if it exists, else `fallback`.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
   const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }
 
-/// An svg file as an element of a page: without its XML prolog.
-std::string AsElement(const std::string& svg) {
-  const std::size_t at = svg.find("<svg");
-  return at == svg.npos ? "" : svg.substr(at);
+/// Returns an SVG file as an element of a page, without its XML prolog.
+std::string SvgElement(const std::string& svg) {
+  const std::size_t start = svg.find("<svg");
+  return start == svg.npos ? "" : svg.substr(start);
 }
 
 }  // namespace
 
-Recorder::Impl::Impl(const Options& given, const Config& read)
-    : options(given),
-      folder(given.folder, given.force),
-      config(read),
+Recorder::Impl::Impl(const Options& recorder_options, const Config& run_config)
+    : options(recorder_options),
+      folder(options.folder, options.force),
+      config(run_config),
       title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
       config_text(config.ToYaml()) {
-  facts.plugins = given.plugins;
+  facts.plugins = options.plugins;
   folder.Write(kRunFile, internal::UnfinishedRunJson("running", ""));
   folder.Write(internal::kResolvedConfig, config_text);
-  if (!given.inputs.empty()) folder.Write(internal::kInputsFile, given.inputs);
+  if (!options.inputs.empty()) folder.Write(internal::kInputsFile, options.inputs);
 }
 
 internal::RecordedRun Recorder::Impl::CloseFiles() {
@@ -120,21 +120,22 @@ void Recorder::Impl::WriteEvents(const EstimatorResult& result) const {
 
 std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   const double wall_s = std::chrono::duration<double>(Clock::now() - started).count();
-  char at[32] = "";
+  char start[32] = "";
   std::tm utc{};
   if (gmtime_r(&started_at, &utc) != nullptr) {
-    std::strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    std::strftime(start, sizeof start, "%Y-%m-%dT%H:%M:%SZ", &utc);
   }
-  internal::Json json = {{"started", at},
+  internal::Json json = {{"started", start},
                          {"command", options.command},
                          {"wall_s", wall_s},
                          {"frames_per_s", static_cast<double>(result.frames) / wall_s}};
   internal::Json& times = json["estimators"] = internal::Json::object();
-  for (const EstimatorResult& one : result.estimators) {
-    internal::Json& entry = times[one.name] = {{"wall_s", one.wall_s}, {"record_s", one.record_s}};
-    if (std::ranges::max(one.parts_s) == 0.0) continue;
+  for (const EstimatorResult& estimator : result.estimators) {
+    internal::Json& entry =
+        times[estimator.name] = {{"wall_s", estimator.wall_s}, {"record_s", estimator.record_s}};
+    if (std::ranges::max(estimator.parts_s) == 0.0) continue;
     for (std::size_t i = 0; i < kPartNames.size(); ++i) {
-      entry["parts_s"][kPartNames[i]] = one.parts_s[i];
+      entry["parts_s"][kPartNames[i]] = estimator.parts_s[i];
     }
   }
   json["arrivals"] = {{"out_of_sequence", result.arrivals.out_of_sequence},
@@ -151,15 +152,15 @@ void Recorder::Impl::WriteReport(const RunResult& result) {
     const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
     report.figures = internal::DrawFigures(folder, facts.recorded, {options.stop, end});
   } else {
-    report.figures.note = "figures were not asked for";
+    report.figures.note = "figures were not requested";
   }
   for (const internal::Figure& figure : report.figures.drawn) {
     const std::string svg = "figures/" + figure.name + ".svg";
-    // The page is the same each time, whatever the clock says.
+    // A figure of wall-clock time is a link, so that the page is reproducible.
     report.svgs[figure.name] =
         internal::HasWallClock(svg)
             ? "<img src=\"" + svg + "\" alt=\"" + figure.title + "\">"
-            : AsElement(internal::ReadFile(folder.partial() / svg, [](ExitCode, int) {}));
+            : SvgElement(internal::ReadFile(folder.partial() / svg, [](ExitCode, int) {}));
   }
   folder.Write("report.html", internal::ReportHtml(result, report));
   highlights = {"report.html"};
@@ -215,12 +216,12 @@ std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
   const std::string timing_json = TimingJson(result);
   internal::RecordedRun& recorded = facts.recorded = CloseFiles();
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
-    const EstimatorResult& one = result.estimators[e];
-    WriteEvents(one);
-    if (!one.landmarks) continue;
-    const std::vector<LandmarkEstimate> map = internal::WholeMap(one);
-    internal::WriteLandmarks(folder, one.name, map);
-    folder.Write(one.name + "/landmarks.ply", internal::LandmarksPly(map));
+    const EstimatorResult& estimator = result.estimators[e];
+    WriteEvents(estimator);
+    if (!estimator.landmarks) continue;
+    const std::vector<LandmarkEstimate> map = internal::AllLandmarks(estimator);
+    internal::WriteLandmarks(folder, estimator.name, map);
+    folder.Write(estimator.name + "/landmarks.ply", internal::LandmarksPly(map));
     if (e >= recorded.estimators.size()) continue;
     recorded.estimators[e].map = internal::DescribeMap(map);
   }

@@ -15,7 +15,7 @@ std::string Element(const std::string& tag, std::string_view text) {
   return '<' + tag + '>' + HtmlEscaped(text) + "</" + tag + ">\n";
 }
 
-/// A table of two columns.
+/// Returns a table of two columns.
 template <class Map, class Print>
 std::string Pairs(const std::string& heading, const Map& values, const Print& print) {
   if (values.empty()) return {};
@@ -44,8 +44,8 @@ std::string Head(const RunResult& result, const Report& report) {
 
 std::string Table(const RunResult& result, const std::vector<TableRow>& rows) {
   std::string html = "<div class=\"scroll\"><table>\n<tr><th></th>";
-  for (const EstimatorResult& one : result.estimators) {
-    html += "<th>" + HtmlEscaped(one.name) + "</th>";
+  for (const EstimatorResult& estimator : result.estimators) {
+    html += "<th>" + HtmlEscaped(estimator.name) + "</th>";
   }
   html += "</tr>\n";
   for (const TableRow& row : rows) {
@@ -60,17 +60,17 @@ std::string Table(const RunResult& result, const std::vector<TableRow>& rows) {
 }
 
 std::string Comparison(const RunResult& result, const std::vector<std::string>& subjects) {
-  const std::vector<TableRow> rows = MainRows(result, subjects), all = ComparisonRows(result);
+  const std::vector<TableRow> rows = MainRows(result, subjects), all_rows = ComparisonRows(result);
   std::string html = "<h2 id=\"comparison\">Comparison</h2>\n" + Table(result, rows);
-  if (all.size() > rows.size()) {
-    html += "<details><summary>all rows</summary>\n" + Table(result, all) + "</details>\n";
+  if (all_rows.size() > rows.size()) {
+    html += "<details><summary>all rows</summary>\n" + Table(result, all_rows) + "</details>\n";
   }
   if (const std::string reference = ReferenceText(result); !reference.empty()) {
     html += Element("p", reference);
   }
   return html +
          "<p class=\"soft\">NEES and NIS are divided by their degrees of freedom: "
-         "1 is consistent, more is too sure of itself. A positive lag is late.</p>\n";
+         "1 is consistent, more is overconfident. A positive lag is a delay.</p>\n";
 }
 
 std::string FiguresOf(const Report& report, const std::string& estimator) {

@@ -13,17 +13,17 @@ namespace alidade::internal {
 
 struct Report {
   std::string title;
-  std::string config;  ///< as YAML
+  std::string config;  ///< config as YAML
   RunFacts facts;
   Figures figures;
-  std::map<std::string, std::string> svgs;  ///< by name of the figure
+  std::map<std::string, std::string> svgs;  ///< SVG elements by name of the figure
   std::vector<std::string> subjects = {};   ///< SubjectsOf the experiment
 };
 
-/// One page with all in it but figure `timing`: no script, no other file, no clock.
+/// Returns a self-contained page without scripts and wall-clock times; figure `timing` is linked.
 std::string ReportHtml(const RunResult& result, const Report& report);
 
-/// `text`, as PrintableUtf8, with the characters that HTML takes for its own replaced.
+/// Returns `text` as PrintableUtf8, with the special characters of HTML escaped.
 std::string HtmlEscaped(std::string_view text);
 
 }  // namespace alidade::internal

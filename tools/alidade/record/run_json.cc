@@ -12,7 +12,7 @@
 namespace alidade::internal {
 namespace {
 
-/// `recorded` is null if the run ended before its files were begun.
+/// `recorded` is null if the run ended before its files were created.
 Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
   Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
   if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;
@@ -72,40 +72,42 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
     plugins.push_back({{"file", file}, {"sha256", hash}});
   }
   Json& estimators = json["estimators"] = Json::object();
-  for (const EstimatorResult& one : result.estimators) {
-    const auto& all = facts.recorded.estimators;
-    const auto recorded = std::ranges::find(all, one.name, &RecordedEstimator::name);
-    estimators[one.name] = JsonOf(one, recorded == all.end() ? nullptr : &*recorded);
+  for (const EstimatorResult& estimator : result.estimators) {
+    const auto& recorded = facts.recorded.estimators;
+    const auto found = std::ranges::find(recorded, estimator.name, &RecordedEstimator::name);
+    estimators[estimator.name] = JsonOf(estimator, found == recorded.end() ? nullptr : &*found);
   }
   return JsonText(json);
 }
 
 std::string ComparisonCsv(const RunResult& result) {
   std::string text = "metric";
-  for (const EstimatorResult& one : result.estimators) text += ',' + CsvQuoted(one.name);
+  for (const EstimatorResult& estimator : result.estimators)
+    text += ',' + CsvQuoted(estimator.name);
   text += '\n';
   for (const std::string& key : OrderedMetrics(result)) {
     text += CsvQuoted(key);
-    for (const EstimatorResult& one : result.estimators) {
+    for (const EstimatorResult& estimator : result.estimators) {
       text += ',';
-      const auto value = one.metrics.find(key);
-      if (value != one.metrics.end()) AppendNumber(text, value->second);
+      const auto value = estimator.metrics.find(key);
+      if (value != estimator.metrics.end()) AppendNumber(text, value->second);
     }
     text += '\n';
   }
   for (const std::string& key : OrderedCounts(result)) {
     text += CsvQuoted(key);
-    for (const EstimatorResult& one : result.estimators) {
-      const auto count = one.counts.find(key);
-      text += ',' + std::to_string(count == one.counts.end() ? 0 : count->second);
+    for (const EstimatorResult& estimator : result.estimators) {
+      const auto count = estimator.counts.find(key);
+      text += ',' + std::to_string(count == estimator.counts.end() ? 0 : count->second);
     }
     text += '\n';
   }
   text += "diverged";
-  for (const EstimatorResult& one : result.estimators) text += one.diverged ? ",true" : ",false";
+  for (const EstimatorResult& estimator : result.estimators)
+    text += estimator.diverged ? ",true" : ",false";
   text += "\ninconsistent";
-  for (const EstimatorResult& one : result.estimators) {
-    text += one.inconsistent ? ",true" : ",false";
+  for (const EstimatorResult& estimator : result.estimators) {
+    text += estimator.inconsistent ? ",true" : ",false";
   }
   return text + '\n';
 }

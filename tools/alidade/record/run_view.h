@@ -13,13 +13,13 @@
 
 namespace alidade {
 
-/// What became of a measurement: its colour.
+/// Result of a measurement in the filter; it determines the colour.
 enum class Mark {
   kAccepted,
-  kRejected,  ///< by the gate, or by outlier rejection
-  kNew,       ///< consumed to initialise, or waiting for that
-  kLost,      ///< it was measured in the frame before, and is not any more
-  kUnused,    ///< by no sensor, or of no use to one
+  kRejected,  ///< rejected by the gate or by outlier rejection
+  kNew,       ///< consumed by an initialisation, or waiting for it
+  kLost,      ///< measured in the previous frame, but not in this one
+  kUnused,    ///< not used by a sensor
 };
 inline constexpr int kMarks = static_cast<int>(Mark::kUnused) + 1;
 
@@ -29,58 +29,58 @@ struct PlaneGaussian {
   double xx, xy, yy;
 };
 
-/// A feature in the image, px; the centre of the upper left pixel is (0, 0).
+/// Feature in the image, px; the centre of the upper left pixel is (0, 0).
 struct ViewFeature {
   Mark mark;
-  std::array<double, 2> at;                      ///< measured; of a lost one, where it was last
-  std::optional<PlaneGaussian> predicted;        ///< h and S
-  std::vector<std::array<double, 2>> tail = {};  ///< where it was in the frames before
+  std::array<double, 2> pixel;                    ///< measured; of a lost feature, the last one
+  std::optional<PlaneGaussian> predicted;         ///< h and S
+  std::vector<std::array<double, 2>> trail = {};  ///< pixels in earlier frames
 };
 
-/// A measurement that is no place in the image.
+/// Measurement that is not a position in the image.
 struct ViewInnovation {
-  std::string name;  ///< of the sensor
+  std::string name;  ///< name of the sensor
   Mark mark;
   double measured;
-  double sigmas;  ///< r / sqrt(S) of its first element; NaN: not reached
+  double sigmas;  ///< r / sqrt(S) of its first element; NaN: not computed
 };
 
-/// One number of the state; its truth is NaN where it is not known.
+/// Element of the state; its truth is NaN if unknown.
 struct ViewElement {
   std::string name, unit;
   double value, sigma, truth;
 };
 
-/// A trajectory and its landmarks from above, m.
+/// Trajectory and landmarks from above, m.
 struct ViewMap {
   std::string right, up;  ///< names of the axes
   std::vector<std::array<double, 2>> path, true_path;
   PlaneGaussian position;
   std::array<double, 2> heading;  ///< the optical axis
   std::vector<PlaneGaussian> landmarks;
-  std::array<double, 4> bounds;  ///< what is shown: least and largest right, up
+  std::array<double, 4> bounds;  ///< shown range: min and max of right, min and max of up
 };
 
-/// One element over time.
+/// Element of the state over time.
 struct ViewSeries {
   std::string name, unit;
   std::vector<double> t_s, value, sigma, truth;
 };
 
-/// One frame of a run, for people to see: its image, and what one estimator made of it.
+/// View of one frame of a run: its image, and the estimate of one estimator.
 struct RunView {
   std::int64_t number = 0;
   Timestamp timestamp = 0;
   std::string title, estimator;
   MeasuredImage image;
-  Mark outline = Mark::kLost;  ///< of the target in the image, if it has one
+  Mark outline = Mark::kLost;  ///< mark of the target in the image, if there is a target
   std::vector<ViewFeature> features;
-  std::array<int, kMarks> counts{};  ///< measurements by what became of them
+  std::array<int, kMarks> counts{};  ///< number of measurements by mark
   std::vector<ViewInnovation> innovations;
   std::vector<ViewElement> elements;
-  int landmarks = -1;  ///< in the state; -1: the estimator has none at all
+  int landmarks = -1;  ///< number of landmarks in the state; -1: the estimator has no landmarks
   std::optional<ViewMap> map;
-  std::optional<ViewSeries> series;  ///< where there is no map
+  std::optional<ViewSeries> series;  ///< shown if there is no map
 };
 
 }  // namespace alidade

@@ -21,20 +21,20 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kMostElements = 8;  // of the state in numbers
-constexpr std::size_t kMostInnovations = 4;
+constexpr std::size_t kMaxElements = 8;
+constexpr std::size_t kMaxInnovations = 4;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// Index of the first estimator whose estimates come with the frames. Error: kBadConfig.
+/// Returns the index of the first online estimator. Error: kBadConfig.
 int FirstOnline(const Experiment& experiment) {
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
     if (!experiment.estimators[e].estimator->offline()) return static_cast<int>(e);
   }
   throw Error(ExitCode::kBadConfig,
               ErrorLine({}, "estimators",
-                        "each waits for the last frame: none has an estimate to "
-                        "show with an image",
-                        "one that is recursive, as ekf"));
+                        "each estimator needs all frames before its first estimate, so no estimate "
+                        "can be shown with an image",
+                        "a recursive estimator, such as ekf"));
 }
 
 }  // namespace
@@ -43,24 +43,24 @@ struct RunViewer::Impl {
   const EstimatorSpec* spec;
   int estimator;
   Source* source;
-  std::vector<int> truth_of;  ///< of each block of the problem, or -1
+  std::vector<int> truth_of;  ///< index of the truth of each block of the problem, or -1
   std::optional<internal::PosePlace> pose;
-  std::vector<std::unique_ptr<internal::PartialFile>> videos;  ///< go after their writers
+  std::vector<std::unique_ptr<internal::PartialFile>> videos;  ///< outlive their writers
   std::vector<std::unique_ptr<ImageWriter>> writers;
   RunView view;
   internal::FeatureTrails trails;
-  internal::MapFromAbove above;
-  std::optional<SourceFrame> pending;  ///< its estimate may come
+  internal::MapFromAbove map_from_above;
+  std::optional<SourceFrame> pending;  ///< frame whose estimate may follow
 
   void Write() {
     for (const auto& writer : writers) writer->Add(view);
   }
   void Show(const SourceFrame& frame, const State* state, const UpdateReport* report);
-  void TakeInnovations(const Frame& frame, const UpdateReport* report);
-  void TakeElements(const State& state, const Truth& truth);
-  void TakeSeries(Timestamp timestamp);
-  void TakeMap(const State& state, const Truth& truth);
-  /// The true value of a block, or null.
+  void UpdateInnovations(const Frame& frame, const UpdateReport* report);
+  void UpdateElements(const State& state, const Truth& truth);
+  void UpdateSeries(Timestamp timestamp);
+  void UpdateMap(const State& state, const Truth& truth);
+  /// Returns the true value of a block, or null.
   const double* TruthOf(std::size_t block, const Truth& truth) const {
     const int t = block < truth_of.size() ? truth_of[block] : -1;
     if (t < 0 || t >= std::ssize(truth)) return nullptr;
@@ -73,13 +73,14 @@ RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
     : impl_(std::make_unique<Impl>()) {
   if (!experiment.source->measures_images() && experiment.source->views() == 0) {
     throw Error(ExitCode::kBadConfig,
-                ErrorLine({}, "source", "it has no images, so there is nothing to show",
+                ErrorLine({}, "source", "the source has no images to show",
                           "a source that measures in images, or draws them from `surfaces`"));
   }
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
     throw Error(ExitCode::kBadConfig,
-                ErrorLine({}, "out_of_sequence.policy", "frames are not taken as their images come",
-                          "'reject' for a run that is shown"));
+                ErrorLine({}, "out_of_sequence.policy",
+                          "frames are not processed in the order of their images",
+                          "'reject' for a run with a view"));
   }
   impl_->estimator = FirstOnline(experiment);
   impl_->spec = &experiment.estimators[static_cast<std::size_t>(impl_->estimator)];
@@ -101,16 +102,16 @@ RunViewer::~RunViewer() = default;
 
 void RunViewer::AddVideo(const std::filesystem::path& file, bool force) {
   impl_->videos.push_back(std::make_unique<internal::PartialFile>(file, force));
-  const internal::PartialFile& made = *impl_->videos.back();
+  const internal::PartialFile& video = *impl_->videos.back();
   impl_->writers.push_back(
-      OpenImageWriter({ImageArguments::Form::kVideo, made.partial(), file.string(), 0, 0}));
+      OpenImageWriter({ImageArguments::Form::kVideo, video.partial(), file.string(), 0, 0}));
 }
 
 void RunViewer::AddWindow() {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) {
     throw Error(ExitCode::kCannotCreate,
                 ErrorLine({}, "--view", "there is no display: DISPLAY is not set",
-                          "a graphical session; --save-video FILE.avi needs none"));
+                          "a graphical session; --save-video FILE.avi does not need it"));
   }
   impl_->writers.push_back(OpenImageWriter(
       {ImageArguments::Form::kWindow, "alidade: " + impl_->view.title, "--view", 0, 0}));
@@ -138,50 +139,53 @@ void RunViewer::Impl::Show(const SourceFrame& frame, const State* state,
                            const UpdateReport* report) {
   ++view.number;
   view.timestamp = frame.timestamp;
-  view.features = trails.Take(frame, report);
-  TakeInnovations(frame, report);
+  view.features = trails.Add(frame, report);
+  UpdateInnovations(frame, report);
   view.counts = {};
-  for (const ViewFeature& one : view.features) ++view.counts[static_cast<std::size_t>(one.mark)];
-  for (const ViewInnovation& one : view.innovations) {
-    ++view.counts[static_cast<std::size_t>(one.mark)];
+  for (const ViewFeature& feature : view.features) {
+    ++view.counts[static_cast<std::size_t>(feature.mark)];
+  }
+  for (const ViewInnovation& innovation : view.innovations) {
+    ++view.counts[static_cast<std::size_t>(innovation.mark)];
   }
   if (state != nullptr) {
-    TakeElements(*state, frame.truth);
+    UpdateElements(*state, frame.truth);
     if (pose) {
-      TakeMap(*state, frame.truth);
+      UpdateMap(*state, frame.truth);
     } else {
-      TakeSeries(frame.timestamp);
+      UpdateSeries(frame.timestamp);
     }
   }
   pending.reset();
   Write();
 }
 
-void RunViewer::Impl::TakeInnovations(const Frame& frame, const UpdateReport* report) {
+void RunViewer::Impl::UpdateInnovations(const Frame& frame, const UpdateReport* report) {
   view.innovations.clear();
   view.outline = Mark::kLost;
   if (report == nullptr) return;
   const std::vector<StreamInfo>& streams = source->streams();
-  for (const MeasurementReport& one : report->measurements()) {
-    if (one.landmark >= 0 || view.innovations.size() == kMostInnovations) continue;
-    const SensorBinding& sensor = spec->problem.sensors[static_cast<std::size_t>(one.sensor)];
-    const auto of_it = [&](const Measurement& m) {
+  for (const MeasurementReport& measurement : report->measurements()) {
+    if (measurement.landmark >= 0 || view.innovations.size() == kMaxInnovations) continue;
+    const SensorBinding& sensor =
+        spec->problem.sensors[static_cast<std::size_t>(measurement.sensor)];
+    const auto is_of_sensor = [&](const Measurement& m) {
       return streams[static_cast<std::size_t>(m.stream)].name == sensor.stream;
     };
-    const auto measured = std::ranges::find_if(frame.measurements, of_it);
+    const auto measured = std::ranges::find_if(frame.measurements, is_of_sensor);
     if (measured == frame.measurements.end() || measured->values.empty()) continue;
     double sigmas = kUnknown;
-    if (!one.innovation.empty() && !one.s.empty() && one.s[0] > 0.0) {
-      sigmas = one.innovation[0] / std::sqrt(one.s[0]);
+    if (!measurement.innovation.empty() && !measurement.s.empty() && measurement.s[0] > 0.0) {
+      sigmas = measurement.innovation[0] / std::sqrt(measurement.s[0]);
     }
     view.innovations.push_back(
-        {sensor.name, internal::MarkOf(one.outcome), measured->values[0], sigmas});
-    // The target is as good as the best that was measured of it.
+        {sensor.name, internal::MarkOf(measurement.outcome), measured->values[0], sigmas});
+    // The outline of the target shows the best mark of its measurements.
     view.outline = std::min(view.outline, view.innovations.back().mark);
   }
 }
 
-void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
+void RunViewer::Impl::UpdateElements(const State& state, const Truth& truth) {
   view.elements.clear();
   const std::size_t system_blocks = spec->problem.layout.blocks().size();
   for (std::size_t b = 0; b < system_blocks; ++b) {
@@ -190,7 +194,7 @@ void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
     if (!block.present || block.geometry().ambient != block.geometry().tangent) continue;
     const std::vector<std::string> names = internal::TangentNames(block.name, block.space);
     const double* const true_value = TruthOf(b, truth);
-    for (std::size_t i = 0; i < names.size() && view.elements.size() < kMostElements; ++i) {
+    for (std::size_t i = 0; i < names.size() && view.elements.size() < kMaxElements; ++i) {
       view.elements.push_back({names[i], internal::UnitOf(spec->problem, id), state.value(id)[i],
                                state.sigma(id, static_cast<int>(i)),
                                true_value == nullptr ? kUnknown : true_value[i]});
@@ -198,7 +202,7 @@ void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
   }
 }
 
-void RunViewer::Impl::TakeSeries(Timestamp timestamp) {
+void RunViewer::Impl::UpdateSeries(Timestamp timestamp) {
   if (view.elements.empty()) return;
   const ViewElement& first = view.elements.front();
   if (view.series && view.series->name != first.name) view.series.reset();
@@ -209,7 +213,7 @@ void RunViewer::Impl::TakeSeries(Timestamp timestamp) {
   view.series->truth.push_back(first.truth);
 }
 
-void RunViewer::Impl::TakeMap(const State& state, const Truth& truth) {
+void RunViewer::Impl::UpdateMap(const State& state, const Truth& truth) {
   const auto p = static_cast<BlockId>(pose->position), q = static_cast<BlockId>(pose->orientation);
   if (!state.layout()[p].present || !state.layout()[q].present) return;
   const double* const w = state.value(q);
@@ -218,10 +222,10 @@ void RunViewer::Impl::TakeMap(const State& state, const Truth& truth) {
     covariance = state.covariance().Block(block.tangent_offset, 3, block.tangent_offset, 3);
   }
   const std::vector<LandmarkEstimate> landmarks = spec->estimator->landmarks();
-  above.Add(Eigen::Map<const Eigen::Vector3d>(state.value(p)), covariance,
-            Eigen::Quaterniond(w[0], w[1], w[2], w[3]).matrix(), TruthOf(pose->position, truth),
-            landmarks);
-  view.map = above.map();
+  map_from_above.Add(Eigen::Map<const Eigen::Vector3d>(state.value(p)), covariance,
+                     Eigen::Quaterniond(w[0], w[1], w[2], w[3]).matrix(),
+                     TruthOf(pose->position, truth), landmarks);
+  view.map = map_from_above.map();
   if (spec->problem.landmarks) view.landmarks = static_cast<int>(landmarks.size());
 }
 

@@ -9,30 +9,29 @@
 
 namespace alidade {
 
-/// Shows a run: each image with the features that were measured in it, 3 sigma of their
-/// innovations, and what became of them; next to it the estimate of the first estimator that gives
-/// one with each frame.
+/// Viewer of a run. It shows each image with its measured features, 3 sigma of their innovations,
+/// and their marks; next to the image it shows the estimate of the first online estimator.
 ///
-/// Errors of the constructor: kBadConfig where the source has no images, frames do not come as the
-/// source gives them, or each estimator waits for the last frame. Later ones: those of ImageWriter.
+/// Errors of the constructor: kBadConfig if the source has no images, if frames are reordered, or
+/// if no estimator is online. Errors of other functions: those of ImageWriter.
 class RunViewer : public RunObserver {
  public:
-  /// The experiment, and `title` above its estimate.
+  /// Shows `title` above the estimate.
   RunViewer(const Experiment& experiment, const std::string& title);
   ~RunViewer() override;
   RunViewer(const RunViewer&) = delete;
   RunViewer& operator=(const RunViewer&) = delete;
 
-  /// Shows it in a video too, a file `.avi` that appears in Close(). Errors: kPlugin where this
-  /// build has no OpenCV; kCannotCreate, also where the file is there without `force`.
+  /// Adds a video as output, a file `.avi` that appears in Close(). Errors: kPlugin if this build
+  /// has no OpenCV; kCannotCreate, also if the file exists and `force` is false.
   void AddVideo(const std::filesystem::path& file, bool force);
-  /// Shows it in a window too. Errors: kPlugin where this build has no window; kCannotCreate where
-  /// there is no display.
+  /// Adds a window as output. Errors: kPlugin if this build has no window; kCannotCreate without a
+  /// display.
   void AddWindow();
   void OnFrame(const SourceFrame& frame) override;
   void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
-  /// Completes what was written, also of a run that ended early. Errors: kIo, kCannotCreate.
+  /// Completes the outputs, also after a run that ended early. Errors: kIo, kCannotCreate.
   void Close();
 
  private:

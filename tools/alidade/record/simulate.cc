@@ -23,7 +23,7 @@ using internal::CsvFile;
 using internal::OutputFolder;
 
 std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host) {
-  const Node entry = config.root().At("source", "a simulation: where measurements come from");
+  const Node entry = config.root().At("source", "the source of the measurements");
   std::uint64_t seed = 1;
   if (const auto node = entry.Find("seed")) {
     seed = static_cast<std::uint64_t>(node->Integer(0, INT64_MAX));
@@ -34,15 +34,15 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
   return source;
 }
 
-/// Names of the columns of a stream without landmarks.
+/// Returns the column names of a stream without landmarks.
 std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
-  if (stream.name == "odometry" && stream.size == 6) {  // as source `tracks` reads it
+  if (stream.name == "odometry" && stream.size == 6) {  // as source `tracks` expects
     return {"vx_m_s", "vy_m_s", "vz_m_s", "wx_rad_s", "wy_rad_s", "wz_rad_s"};
   }
   return internal::NumberedNames(stream.name, static_cast<std::size_t>(stream.size));
 }
 
-/// The files of one simulation.
+/// Writer of the data files of a simulation.
 class DataFiles {
  public:
   DataFiles(const OutputFolder& folder, const Source& source) : folder_(folder), source_(source) {
@@ -115,7 +115,7 @@ class DataFiles {
       file->Numbers(measurement.known.data(), measurement.known.size(), measurement.known.size());
       return file->EndRow();
     }
-    seen_.insert(measurement.landmark);
+    measured_ids_.insert(measurement.landmark);
     for (std::size_t dim = 0; dim < measurement.values.size(); ++dim) {
       file->Integer(number).Integer(measurement.landmark);
       file->Integer(static_cast<std::int64_t>(dim)).Number(measurement.values[dim]).EndRow();
@@ -124,11 +124,11 @@ class DataFiles {
 
   void WriteMap() {
     std::optional<CsvFile> map;
-    for (const std::int64_t id : seen_) {
-      const auto place = source_.TrueLandmark(id);
-      if (!place) continue;
+    for (const std::int64_t id : measured_ids_) {
+      const auto position = source_.TrueLandmark(id);
+      if (!position) continue;
       if (!map) OpenCsv(map, "map.csv", {"feature", "x", "y", "z"});
-      map->Integer(id).Numbers(place->data(), 3, 3).EndRow();
+      map->Integer(id).Numbers(position->data(), 3, 3).EndRow();
     }
     if (map) map->Close();
   }
@@ -138,11 +138,11 @@ class DataFiles {
   std::optional<CsvFile> times_, truth_;
   std::vector<std::optional<CsvFile>> streams_;
   std::optional<internal::PoseFile> tum_;
-  std::set<std::int64_t> seen_;
+  std::set<std::int64_t> measured_ids_;
   std::set<std::string> names_;
 };
 
-/// The images of one simulation: what the source draws, else discs at the landmarks.
+/// Writer of the images of a simulation: drawn by the source, or else discs at the landmarks.
 class ImageFiles {
  public:
   ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder,
@@ -151,10 +151,10 @@ class ImageFiles {
     if (names.video.empty() && names.folder.empty()) return;
     int width = 0, height = 0;
     if (source.views() == 0) {
-      constexpr int kMost = 16384;
+      constexpr int kMaxPixels = 16384;
       const Node camera = config.root().At("camera", "images of a simulation");
-      width = static_cast<int>(camera.At("width").Integer(1, kMost));
-      height = static_cast<int>(camera.At("height").Integer(1, kMost));
+      width = static_cast<int>(camera.At("width").Integer(1, kMaxPixels));
+      height = static_cast<int>(camera.At("height").Integer(1, kMaxPixels));
     }
     writers_.resize(static_cast<std::size_t>(std::max(1, source.views())));
     for (std::size_t view = 0; view < writers_.size(); ++view) {
@@ -189,7 +189,7 @@ class ImageFiles {
     }
   }
 
-  /// Of what is written, in the folder.
+  /// Returns the names of the outputs in the folder.
   const std::vector<std::string>& names() const { return names_; }
   void Close() {
     for (const auto& view : writers_) {
@@ -198,7 +198,8 @@ class ImageFiles {
   }
 
  private:
-  /// `name` as a path that stays in its folder. That is new, and so has no link in it.
+  /// Converts `name` to a path. Throws if it leaves the output folder, which is new and therefore
+  /// contains no links.
   static std::filesystem::path Inside(const std::string& name, const char* option) {
     const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
     if (path.is_absolute() || *path.begin() == "..") {
@@ -216,25 +217,25 @@ class ImageFiles {
   }
 
   Source& source_;
-  std::vector<std::vector<std::unique_ptr<ImageWriter>>> writers_;  ///< of each view
+  std::vector<std::vector<std::unique_ptr<ImageWriter>>> writers_;  ///< writers of each view
   std::vector<std::string> names_;
   std::vector<std::array<double, 2>> pixels_;
 };
 
-/// The config's `camera` alone; "" if it has none.
+/// Returns the config's `camera` section as YAML; "" if there is no such section.
 std::string CameraYaml(const Config& config) {
   const bool source_reads_it = !config.root().HasUnread("camera");
   const auto camera = config.root().Find("camera");
   if (!camera) return {};
   if (source_reads_it) camera->RejectUnread();
-  Config alone = Config::FromText("camera: {}", "calibration.yaml");
+  Config camera_config = Config::FromText("camera: {}", "calibration.yaml");
   for (const auto& [key, value] : camera->Entries()) {
-    alone.Set("camera." + key, value.Text(), "calibration.yaml");
+    camera_config.Set("camera." + key, value.Text(), "calibration.yaml");
   }
-  return alone.ToYaml();
+  return camera_config.ToYaml();
 }
 
-/// Whether the data are all that the source has, for other programs.
+/// Reports to other programs whether the data are complete.
 std::string SimulateJson(const SimulateResult& result) {
   return internal::JsonText(
       {{"status", result.stopped ? "stopped" : "ok"}, {"frames", result.frames}});
@@ -249,17 +250,17 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
   const std::string camera = CameraYaml(config);
   OutputFolder output(folder, force);
   DataFiles files(output, *source);
-  ImageFiles drawn(images, config, output, *source);
+  ImageFiles image_files(images, config, output, *source);
   SimulateResult result;
   for (SourceFrame frame; !result.stopped && source->Next(frame);) {
     files.Add(result.frames, frame);
-    drawn.Add(result.frames++, frame);
+    image_files.Add(result.frames++, frame);
     result.stopped = stop && stop();
   }
   files.Close();
-  drawn.Close();
+  image_files.Close();
   result.files.assign(files.names().begin(), files.names().end());
-  std::ranges::copy(drawn.names(), std::back_inserter(result.files));
+  std::ranges::copy(image_files.names(), std::back_inserter(result.files));
   if (!camera.empty()) {
     output.Write("calibration.yaml", camera);
     result.files.insert(result.files.begin(), "calibration.yaml");

@@ -11,13 +11,13 @@
 namespace alidade::internal {
 namespace {
 
-/// By truth and element.
+/// Returns the columns of truth.csv, by truth and element.
 std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment) {
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   std::vector<std::vector<std::string>> columns;
   for (std::size_t t = 0; t < truths.size(); ++t) {
     std::vector<std::string> names = NumberedNames(truths[t].name, truths[t].size);
-    // Elements are named as in the first state that has this block.
+    // The names of the elements are those of the first state that has this block.
     for (const EstimatorSpec& spec : experiment.estimators) {
       const StateLayout& layout = spec.problem.layout;
       const std::vector<int> match = MatchTruths(layout, truths);
@@ -141,9 +141,9 @@ void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
     if (inverse.stream != m.stream) continue;
     const std::optional<double> value = inverse.state.From(frame.truth, m.values.data());
     if (!value) continue;
-    const std::size_t before = inverse.recorded.cell;
-    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(before).Number(*value);
-    implied_->Empty(blocks_ - before - 1).EndRow();
+    const std::size_t columns_before = inverse.recorded.cell;
+    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(columns_before).Number(*value);
+    implied_->Empty(blocks_ - columns_before - 1).EndRow();
     ++inverse.recorded.rows;
   }
 }

@@ -13,9 +13,9 @@
 
 namespace alidade::internal {
 
-/// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths,
-/// `expected.csv` where these tell what a sensor measures, and `implied_states.csv` where a sensor
-/// can be inverted without knowing anything else, or knowing truth.
+/// Writer of the source's data: `measurements.csv`; `truth.csv` if there are truths;
+/// `expected.csv` if the truths determine a sensor's measurement; `implied_states.csv` if a sensor
+/// can be inverted from the measurement alone or with the truth of its other roles.
 class SourceFiles {
  public:
   SourceFiles(const OutputFolder& folder, const Experiment& experiment);
@@ -23,9 +23,9 @@ class SourceFiles {
   /// Error: kIo.
   void Add(const SourceFrame& frame);
   void Close();
-  /// The columns of truth.csv, by truth and element.
+  /// Returns the columns of truth.csv, by truth and element.
   const std::vector<std::vector<std::string>>& truth_columns() const { return truth_columns_; }
-  /// Fills what the source gave.
+  /// Fills the fields of `run` that describe the source's data.
   void Describe(RecordedRun& run) const;
 
  private:
@@ -34,7 +34,7 @@ class SourceFiles {
     ImpliedState state;
     RecordedImplied recorded;
   };
-  /// The first sensor of a stream whose roles all have a truth.
+  /// First sensor of a stream whose roles all have a truth.
   struct Expectation {
     SharedSensor model;
     std::vector<int> truths;
@@ -46,8 +46,8 @@ class SourceFiles {
 
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<std::string>> truth_columns_;
-  std::vector<std::int64_t> stream_rows_;    ///< in measurements.csv
-  std::vector<std::int64_t> expected_rows_;  ///< in expected.csv, by stream
+  std::vector<std::int64_t> stream_rows_;    ///< rows in measurements.csv, by stream
+  std::vector<std::int64_t> expected_rows_;  ///< rows in expected.csv, by stream
   std::map<int, Expectation> expectations_;  ///< by stream
   std::vector<Inverse> inverses_;
   std::size_t width_ = 1, known_width_ = 0, blocks_ = 0;

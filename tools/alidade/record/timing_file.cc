@@ -41,7 +41,8 @@ void TimingFile::AddTime(int estimator, double wall_s) {
 }
 
 void TimingFile::EndRow() {
-  const Timestamp timestamp = std::exchange(timestamp_, kNoTimestamp);  // once, also where it fails
+  const Timestamp timestamp =
+      std::exchange(timestamp_, kNoTimestamp);  // once, even if writing fails
   if (timestamp == kNoTimestamp) return;
   file_.Time(timestamp);
   for (std::optional<double>& cell : row_) {

@@ -11,13 +11,13 @@
 
 namespace alidade::internal {
 
-/// `timing.csv`: the wall clock that each estimator needed for each frame, s. Those that smooth
-/// have none, as most of their work is not of one frame.
+/// Writer of `timing.csv`: wall-clock time of each estimator for each frame, s. Offline estimators
+/// are omitted, because most of their work does not belong to a frame.
 class TimingFile {
  public:
   TimingFile(const OutputFolder& folder, const Experiment& experiment);
 
-  /// The frame that the next times are of. Error: kIo.
+  /// Starts the row of a frame, which subsequent times belong to. Error: kIo.
   void Add(const SourceFrame& frame);
   void AddTime(int estimator, double wall_s);
   void Close();
@@ -27,14 +27,14 @@ class TimingFile {
   void EndRow();
 
   std::vector<RecordedTimes> times_;
-  std::vector<int> column_of_;              ///< by estimator; -1: none
-  std::vector<std::optional<double>> row_;  ///< by column
-  Timestamp timestamp_ = kNoTimestamp;      ///< of the row
+  std::vector<int> column_of_;              ///< column of each estimator; -1: none
+  std::vector<std::optional<double>> row_;  ///< times by column
+  Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the row
   CsvFile file_;
 };
 
-/// Figure `timing`: the wall clock of each frame over time, with the frame period; the key says
-/// what share of real time that is. Empty where no time is known.
+/// Returns figure `timing`: wall-clock time of each frame over time, with the frame period. The key
+/// reports the share of real time. The figure is empty if no time is known.
 FigureScript TimingFigure(const RecordedRun& run);
 
 }  // namespace alidade::internal

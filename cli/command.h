@@ -63,7 +63,7 @@ void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
 void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help);
 /// Validator of CLI11: rejects an empty path.
 std::string IsNonEmpty(const std::string& path);
-/// Adds the option -o, a folder. `folder` stays "" if the option is absent.
+/// Adds the option -o, a folder. `folder` is "" if the option is absent.
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
 /// Adds the option --seed.
 CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed);

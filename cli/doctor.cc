@@ -149,7 +149,8 @@ void CheckEnvironment(Diagnosis& diagnosis) {
     diagnosis.Warn("gnuplot is not installed: runs have no figures", "apt-get install gnuplot-nox");
   }
   const char* const data = std::getenv("ALIDADE_DATA");
-  const std::string remedy = "export ALIDADE_DATA=FOLDER, the folder that holds kitti-depth-pairs";
+  const std::string remedy =
+      "export ALIDADE_DATA=FOLDER, the folder that contains kitti-depth-pairs";
   std::error_code error;
   if (data == nullptr || *data == '\0') {
     diagnosis.Warn("ALIDADE_DATA is not set: examples on real recordings need it", remedy);

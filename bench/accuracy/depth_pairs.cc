@@ -5,8 +5,8 @@
 //
 //   accuracy_depth_pairs examples/07_depth_pairs/config.yaml FOLDER_OF_SERIES
 //
-// docs/experiments.md, "Real series of depth", states what is tuned, on which series and by which
-// criterion, and what the columns are. Exit code 1 if a parameter lies at the edge of its grid.
+// docs/experiments.md, "Real series of depth", states the tuned parameters, the series, the
+// criterion and the columns. Exit code 1 if a parameter is at the edge of its grid.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -30,7 +30,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 using Names = std::vector<std::string>;
 using RmseByEstimator = std::map<std::string, double>;
 
-/// A parameter and the values that are tried, ascending.
+/// Parameter and its values, ascending.
 struct Axis {
   std::string key;
   Names values;
@@ -50,7 +50,7 @@ const std::vector<Axis> kStereoGrid = {
      {"0.025", "0.05", "0.1", "0.2", "0.4", "0.8", "1.6", "3.2"}}};
 constexpr double kShownLagsS[] = {0.1, 0.4, 0.8, 1.2};  // of the drift of the scale
 
-/// The program's arguments and what all runs share.
+/// Program arguments and common data of all runs.
 struct Bench {
   std::string config_file;
   const alidade::PluginHost& host;
@@ -63,7 +63,8 @@ struct Bench {
     return alidade::BuildExperiment(config, host);
   }
 
-  /// RMSE of depth by estimator: masked, in the blind half; unmasked, over the whole series.
+  /// Returns the RMSE of depth of each estimator: masked in the blind half, else over the whole
+  /// series.
   RmseByEstimator Rmse(const std::string& series, const Settings& settings, bool masked) const {
     alidade::Experiment experiment = Make(series, settings, masked);
     RmseByEstimator rmse;
@@ -74,7 +75,7 @@ struct Bench {
     return rmse;
   }
 
-  /// What the source of the masked run gives, with the calibration in the header of the series.
+  /// Returns the data of the masked run, with the calibration in the header of the series.
   PairSeries Read(const std::string& file) const {
     const alidade::Experiment experiment = Make(file, {}, true);
     return alidade::bench::ReadPairSeries(*experiment.source, std::filesystem::path(file).stem());
@@ -124,7 +125,7 @@ Choice Choose(const Bench& bench, const std::string& estimator, const std::vecto
   return best;
 }
 
-/// Chosen on some series: for the fused filter, and for stereo alone.
+/// Chooses the settings of the fused filter and of stereo alone on some series.
 Choice ChooseAll(const Bench& bench, const Names& series) {
   Choice choice = Choose(bench, "fused", kFusedGrid, series);
   const Choice stereo = Choose(bench, "stereo_only", kStereoGrid, series);
@@ -138,7 +139,7 @@ double Median(std::vector<double> values) {
   return alidade::Quantile(values, 0.5);
 }
 
-/// A table of RMSE [m] with a last row of medians.
+/// Table of RMSE [m] with a last row of medians.
 class Table {
  public:
   explicit Table(Names columns) : columns_(std::move(columns)), values_(columns_.size()) {
@@ -168,7 +169,7 @@ class Table {
   std::vector<std::vector<double>> values_;
 };
 
-/// Prints RMSE and floors by series. Returns log(RMSE of fused / RMSE of the line), masked.
+/// Prints RMSE and baselines of each series. Returns log(RMSE of fused / RMSE of the line), masked.
 std::vector<double> Report(const char* title, const Bench& bench, const Settings& settings,
                            const Names& files) {
   std::printf("\n%s:\n", title);
@@ -195,7 +196,7 @@ void PrintDifference(const char* title, const std::vector<double>& differences) 
               differences.size(), Mean(differences), interval.low, interval.high);
 }
 
-/// The white noise of both sensors and the drift of the scale.
+/// Prints the white noise of both sensors and the drift of the scale.
 void ReportNoise(const Bench& bench, const Names& files) {
   double disparity = 0.0, log_scale = 0.0;
   std::printf("\nrms growth of log(s Z), %%, over\n");
@@ -242,9 +243,10 @@ int Main(const std::string& config, const std::string& folder) {
 
   std::printf("\nthe halves exchanged:\n");
   const Choice exchanged = ChooseAll(bench, reported);
-  const std::vector<double> others = Report("the first half", bench, exchanged.settings, tuning);
-  differences.insert(differences.end(), others.begin(), others.end());
-  PrintDifference("each series with what was chosen on the other half", differences);
+  const std::vector<double> exchanged_differences =
+      Report("the first half", bench, exchanged.settings, tuning);
+  differences.insert(differences.end(), exchanged_differences.begin(), exchanged_differences.end());
+  PrintDifference("each series with the settings of the other half", differences);
   return choice.at_edge ? 1 : 0;
 }
 

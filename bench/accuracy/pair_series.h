@@ -8,63 +8,64 @@
 
 namespace alidade::bench {
 
-/// One row of a series: two image points at one depth.
+/// Row of a series: two image points at one depth.
 struct PairRow {
   double t_s;
   double disparity_px;
-  double scale;    ///< their distance in the left image relative to the first row
-  double depth_m;  ///< of the reference
+  double scale;    ///< distance of the points in the left image, relative to the first row
+  double depth_m;  ///< reference depth
 };
 
-/// An approach, of whose rows stereo sees the first `seen`; the others are the blind half.
+/// Approach to a target. Stereo sees the first `seen_count` rows; the others are the blind half.
 struct PairSeries {
   std::string name;
-  double bf_px_m = 0.0;  ///< focal length times baseline, of the header of this series
+  double bf_px_m = 0.0;  ///< focal length times baseline, from the header of the series
   std::vector<PairRow> rows;
-  std::size_t seen = 0;
+  std::size_t seen_count = 0;
 };
 
-/// Slope c [px] of the line d = c s, least squares over the rows that stereo sees:
+/// Returns the slope c [px] of the line d = c s, by least squares over the rows that stereo sees:
 ///
 ///   c = sum d s / sum s^2
 ///
-/// Without noise c = f B / Z0, Z0 the depth of the first row.
+/// Without noise c = f B / Z0, with the depth Z0 of the first row.
 inline double LineSlope(const PairSeries& series) {
   double ds = 0.0, ss = 0.0;
-  for (std::size_t i = 0; i < series.seen; ++i) {
+  for (std::size_t i = 0; i < series.seen_count; ++i) {
     ds += series.rows[i].disparity_px * series.rows[i].scale;
     ss += series.rows[i].scale * series.rows[i].scale;
   }
   return ds / ss;
 }
 
-/// RMSE [m] in the blind half of the depth Z = k / s, k in m.
+/// Returns the RMSE [m] of the depth Z = k / s in the blind half, k in m.
 inline double BlindRmse(const PairSeries& series, double k_m) {
   double sum = 0.0;
-  for (std::size_t i = series.seen; i < series.rows.size(); ++i) {
+  for (std::size_t i = series.seen_count; i < series.rows.size(); ++i) {
     const double error = k_m / series.rows[i].scale - series.rows[i].depth_m;
     sum += error * error;
   }
-  return std::sqrt(sum / static_cast<double>(series.rows.size() - series.seen));
+  return std::sqrt(sum / static_cast<double>(series.rows.size() - series.seen_count));
 }
 
-/// RMSE [m] in the blind half of the depth that the line d = c s predicts, Z = f B / (c s).
+/// Returns the RMSE [m] in the blind half of the depth that d = c s predicts, Z = f B / (c s).
 inline double LineRmse(const PairSeries& series) {
   return BlindRmse(series, series.bf_px_m / LineSlope(series));
 }
 
-/// RMSE [m] in the blind half of Z = Za sa / s, Za and sa the reference depth and the scale of the
-/// last row that stereo sees: what the drift of the scale leaves of depth that was known exactly.
+/// Returns the RMSE [m] in the blind half of Z = Za sa / s, with the reference depth Za and the
+/// scale sa of the last row that stereo sees: the error that the drift of the scale adds to an
+/// exact depth.
 inline double AnchoredRmse(const PairSeries& series) {
-  const PairRow& last = series.rows[series.seen - 1];
+  const PairRow& last = series.rows[series.seen_count - 1];
   return BlindRmse(series, last.depth_m * last.scale);
 }
 
-/// RMSE [m] in the blind half of Z = k / s with the k that makes it least, taken from the reference
-/// there: no value of lambda that stays does better.
+/// Returns the RMSE [m] in the blind half of Z = k / s for the best k, computed from the reference
+/// there: no constant lambda has a smaller error.
 inline double BestConstantRmse(const PairSeries& series) {
   double z_over_s = 0.0, one_over_ss = 0.0;
-  for (std::size_t i = series.seen; i < series.rows.size(); ++i) {
+  for (std::size_t i = series.seen_count; i < series.rows.size(); ++i) {
     const PairRow& row = series.rows[i];
     z_over_s += row.depth_m / row.scale;
     one_over_ss += 1.0 / (row.scale * row.scale);
@@ -72,9 +73,9 @@ inline double BestConstantRmse(const PairSeries& series) {
   return BlindRmse(series, z_over_s / one_over_ss);
 }
 
-/// Mean square [-] of the growth of log(s Z) over `lag` rows. s Z is Z0, a constant, where points
-/// are at one depth and tracked exactly. A random walk has lag times the value of lag 1; a drift at
-/// a constant rate lag^2 times.
+/// Returns the mean square [-] of the growth of log(s Z) over `lag` rows. s Z is the constant Z0 if
+/// both points have the same depth and exact tracks. A random walk has lag times the value of lag
+/// 1, a drift at a constant rate lag^2 times.
 inline double DriftVariance(const PairSeries& series, std::size_t lag) {
   const std::vector<PairRow>& rows = series.rows;
   double sum = 0.0;
@@ -86,17 +87,17 @@ inline double DriftVariance(const PairSeries& series, std::size_t lag) {
   return sum / static_cast<double>(rows.size() - lag);
 }
 
-/// Variance of the white noise of value(row), from its second differences over the rows that stereo
-/// sees, which a ramp does not change: mean (y[i-1] - 2 y[i] + y[i+1])^2 / 6.
+/// Returns the variance of the white noise of value(row) from second differences over the rows that
+/// stereo sees, which a ramp does not change: mean (y[i-1] - 2 y[i] + y[i+1])^2 / 6.
 template <class Value>
 double WhiteVariance(const PairSeries& series, const Value& value) {
   double sum = 0.0;
-  for (std::size_t i = 1; i + 1 < series.seen; ++i) {
-    const double bend =
+  for (std::size_t i = 1; i + 1 < series.seen_count; ++i) {
+    const double second_difference =
         value(series.rows[i - 1]) - 2.0 * value(series.rows[i]) + value(series.rows[i + 1]);
-    sum += bend * bend;
+    sum += second_difference * second_difference;
   }
-  return sum / 6.0 / static_cast<double>(series.seen - 2);
+  return sum / 6.0 / static_cast<double>(series.seen_count - 2);
 }
 
 }  // namespace alidade::bench

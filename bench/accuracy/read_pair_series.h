@@ -9,8 +9,8 @@
 
 namespace alidade::bench {
 
-/// All rows of a source with the streams `disparity` and `inverse_scale` and depth as its first
-/// truth, and f B of the calibration that it brings; `seen` ends with the last disparity.
+/// Reads all rows of a source with the streams `disparity` and `inverse_scale`, depth as its first
+/// truth, and f B in its calibration. `seen_count` ends with the last disparity.
 inline PairSeries ReadPairSeries(Source& source, const std::string& name) {
   PairSeries series{name, 0.0, {}, 0};
   const Config calibration = source.Calibration().value();
@@ -28,7 +28,7 @@ inline PairSeries ReadPairSeries(Source& source, const std::string& name) {
       }
     }
     series.rows.push_back(row);
-    if (std::isfinite(row.disparity_px)) series.seen = series.rows.size();
+    if (std::isfinite(row.disparity_px)) series.seen_count = series.rows.size();
   }
   return series;
 }

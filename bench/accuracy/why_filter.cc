@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same
-// trajectory with fewer or more points, and with fewer or more of its frames used.
+// Accuracy and cost of a filter and of the batch, in the manner of [Strasdat2012]: the same
+// trajectory with different numbers of points and of frames.
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //
 // writes FOLDER/why_filter.csv and FOLDER/figures/why_filter.svg, over the seeds 1001, 1002, ...:
 //
 //   rmse      sqrt(mean |e|^2) of the position at the last frame
-//   bits      E = 1/2 log2(det C_0 / det C), C the covariance of the last pose, 6 x 6, C_0 that of
-//             the smallest filter: mean
-//   cpu       time of the whole trajectory in units of the smallest filter's: median
+//   bits      mean of E = 1/2 log2(det C_0 / det C), with the 6 x 6 covariance C of the last pose,
+//             and C_0 of the smallest filter
+//   cpu       median time of the whole trajectory, relative to the smallest filter
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -34,13 +34,13 @@ const std::vector<int> kFrames = {10, 19, 38, 75, kAllFrames};
 const std::vector<int> kPoints = {10, 20, 40, 80};
 const std::vector<std::string> kEstimators = {"ekf", "batch"};
 
-/// One run of one estimator.
+/// Result of one run of one estimator.
 struct Outcome {
-  bool whole = false;  ///< neither failed nor diverged
+  bool is_valid = false;  ///< neither failed nor diverged
   double error_m = 0.0, log2_det = 0.0, cpu_ns = 0.0;
 };
 
-/// log2 det of the covariance of position and orientation.
+/// Returns log2 det of the covariance of position and orientation.
 double Log2Det(const alidade::State& state) {
   const alidade::StateLayout& layout = state.layout();
   const int p = layout[layout.Find("cam.position")].tangent_offset;
@@ -51,8 +51,9 @@ double Log2Det(const alidade::State& state) {
   return 2.0 * c.llt().matrixLLT().diagonal().array().log2().sum();
 }
 
-/// The trajectory with so many points and frames. The noise of the motion is scaled so that a
-/// velocity is as uncertain after a second, however many steps that took.
+/// Returns the config with the given numbers of points and frames. The noise of the motion is
+/// scaled so that the uncertainty of the velocity after a second does not depend on the number of
+/// steps.
 alidade::Config ConfigOf(const std::string& file, int points, int frames, int seed) {
   alidade::Config config = alidade::Config::FromFile(file);
   const auto set = [&](const char* key, double value) {
@@ -61,57 +62,60 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   config.Set("source.seed", std::to_string(seed), "bench");
   config.Set("source.points.count", std::to_string(points), "bench");
   config.Set("source.max_frames", std::to_string(frames), "bench");
-  const double share = (frames - 1.0) / (kAllFrames - 1.0);  // of the steps of the same duration
-  set("source.rate_hz", kAllRateHz * share);
+  const double fraction = (frames - 1.0) / (kAllFrames - 1.0);  // of the number of steps
+  set("source.rate_hz", kAllRateHz * fraction);
   for (const char* key : {"linear_acceleration", "angular_acceleration"}) {
     const std::string path = std::string("state.cam.noise.") + key;
-    const double all = config.root().At("state").At("cam").At("noise").At(key).Number();
-    set(path.c_str(), all * std::sqrt(share));
+    const double reference_noise = config.root().At("state").At("cam").At("noise").At(key).Number();
+    set(path.c_str(), reference_noise * std::sqrt(fraction));
   }
   return config;
 }
 
-/// The estimator alone over frames that were made before, so that its own time is taken.
-Outcome RunOne(alidade::EstimatorSpec& named, const std::vector<alidade::SourceFrame>& frames,
+/// Runs an estimator over frames that were simulated before, so that only its own time is measured.
+Outcome RunOne(alidade::EstimatorSpec& spec, const std::vector<alidade::SourceFrame>& frames,
                std::size_t truth) {
   Outcome outcome;
-  alidade::Estimator& estimator = *named.estimator;
+  alidade::Estimator& estimator = *spec.estimator;
   const double start = alidade::bench::CpuNs();
   for (const alidade::SourceFrame& frame : frames) estimator.Process(frame);
-  const auto take = [&](const alidade::State& state) {
+  const auto record = [&](const alidade::State& state) {
     outcome.cpu_ns = alidade::bench::CpuNs() - start;
     outcome.log2_det = Log2Det(state);
     const double* const position = state.value(state.layout().Find("cam.position"));
-    const std::vector<double>& is = frames.back().truth[truth];
-    outcome.error_m = std::hypot(position[0] - is[0], position[1] - is[1], position[2] - is[2]);
+    const std::vector<double>& true_position = frames.back().truth[truth];
+    outcome.error_m = std::hypot(position[0] - true_position[0], position[1] - true_position[1],
+                                 position[2] - true_position[2]);
   };
   if (estimator.offline()) {
     estimator.Smooth([&](std::size_t k, const alidade::State& state, const auto&) {
-      if (k + 1 == frames.size()) take(state);
+      if (k + 1 == frames.size()) record(state);
     });
   } else {
-    take(estimator.state());
+    record(estimator.state());
   }
-  outcome.whole = !estimator.failed() && !estimator.diverged() && std::isfinite(outcome.log2_det);
+  outcome.is_valid =
+      !estimator.failed() && !estimator.diverged() && std::isfinite(outcome.log2_det);
   return outcome;
 }
 
-/// By estimator.
+/// Runs all estimators. Returns the outcomes by name.
 std::map<std::string, Outcome> RunAll(const alidade::Config& config,
                                       const alidade::PluginHost& host) {
   alidade::Experiment experiment = alidade::BuildExperiment(config, host);
   std::vector<alidade::SourceFrame> frames;
   for (alidade::SourceFrame frame; experiment.source->Next(frame);) frames.push_back(frame);
   const auto& truths = experiment.source->truths();
-  const auto at = std::ranges::find(truths, "cam.position", &alidade::StreamInfo::name);
+  const auto position_truth = std::ranges::find(truths, "cam.position", &alidade::StreamInfo::name);
   std::map<std::string, Outcome> outcomes;
-  for (alidade::EstimatorSpec& named : experiment.estimators) {
-    outcomes[named.name] = RunOne(named, frames, static_cast<std::size_t>(at - truths.begin()));
+  for (alidade::EstimatorSpec& spec : experiment.estimators) {
+    outcomes[spec.name] =
+        RunOne(spec, frames, static_cast<std::size_t>(position_truth - truths.begin()));
   }
   return outcomes;
 }
 
-/// One estimator with so many points and frames.
+/// Results of one estimator with given numbers of points and frames.
 struct Row {
   std::string estimator;
   int points = 0, frames = 0;
@@ -148,21 +152,21 @@ std::vector<Row> Measure(const std::string& config, int seeds) {
     for (Row& row : rows) {
       if (row.estimator != kEstimators[0]) continue;
       const auto outcomes = RunAll(ConfigOf(config, row.points, row.frames, seed), host);
-      for (Row& same : rows) {
-        if (same.points != row.points || same.frames != row.frames) continue;
-        const auto found = outcomes.find(same.estimator);
+      for (Row& candidate : rows) {
+        if (candidate.points != row.points || candidate.frames != row.frames) continue;
+        const auto found = outcomes.find(candidate.estimator);
         if (found == outcomes.end()) {
           throw alidade::Error(alidade::ExitCode::kBadConfig,
-                               config + ": wants estimators 'ekf' and 'batch'");
+                               config + ": needs the estimators 'ekf' and 'batch'");
         }
-        if (found->second.whole) same.runs.push_back(found->second);
+        if (found->second.is_valid) candidate.runs.push_back(found->second);
       }
     }
   }
   return rows;
 }
 
-/// The csv, and the same as a table on standard output.
+/// Writes the csv file, and prints the same table on standard output.
 void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
   std::ofstream csv(file);
   csv << "estimator,points,frames,runs,rmse_m,bits,cpu\n";
@@ -174,7 +178,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
     throw alidade::Error(alidade::ExitCode::kDiverged,
                          "no run of '" + smallest.estimator + "' with " +
                              std::to_string(smallest.points) + " points and " +
-                             std::to_string(smallest.frames) + " frames came to its end");
+                             std::to_string(smallest.frames) + " frames finished");
   }
   for (const Row& row : rows) {
     if (row.runs.empty()) continue;
@@ -190,7 +194,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
   }
 }
 
-/// A curve for each number of points; its marks are numbers of frames.
+/// Draws a curve for each number of points; its marks are numbers of frames.
 void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
   using alidade::internal::FigureScript;
   FigureScript script("why_filter", "accuracy against cost: filter and batch",
@@ -219,7 +223,7 @@ void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
   };
   panel("final position, RMSE; frames used from left to right: 10, 19, 38, 75, 150", "[mm]",
         "set logscale y", "1e3 * column('rmse_m')");
-  panel("entropy of the last pose, reduced against the smallest filter", "[bits]",
+  panel("entropy of the last pose, reduction compared with the smallest filter", "[bits]",
         "unset logscale y", "column('bits')");
   std::filesystem::create_directories(folder / "figures");
   std::ofstream(folder / "figures" / "why_filter.gp") << script.Text();

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of the sparse batch: a camera of 12 unknowns a frame, 40 observations in
-// each, tracks of 20 to 40 frames and a tenth of them of 80 to 120, the depth known to 1 m at first
-// observation; noise of rank 6 in 12, and an exact first pose. Beside the same observations written
-// by hand for Ceres, with analytic Jacobians and, for it needs one, noise of full rank (white
-// acceleration): the same structure, a peer in time alone.
+// Time of an iteration of the sparse batch: a camera with 12 unknowns per frame and 40 observations
+// per frame. Tracks have 20 to 40 frames, a tenth of them 80 to 120. Depth is known to 1 m at the
+// first observation, the noise has rank 6 of 12, and the first pose is exact. The peer is Ceres
+// with hand-written costs for the same observations, with analytic Jacobians and with noise of full
+// rank (white acceleration), which Ceres needs: it has the same structure, and only its time is
+// compared.
 //
 //   bench_batch [--frames N]... [--iterations N]
 //
-//   ratio batch/ceres VALUE     iteration of the batch over that of the faster of Ceres' solvers
-//   exponent VALUE              of the time of an iteration, from the fewest to the most frames
+//   ratio batch/ceres VALUE     iteration of the batch / iteration of the faster solver of Ceres
+//   exponent VALUE              of the time of an iteration over the number of frames
 #include <ceres/cost_function.h>
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
@@ -57,7 +58,7 @@ struct Pose {
   Vector3d v, omega;
 };
 
-struct Seen {
+struct Observed {
   int frame, landmark;
   double u, v, depth;
   bool first;
@@ -79,44 +80,47 @@ Vector3d Log(const Quaterniond& q) {
                   : Vector3d(2.0 * sign * std::atan2(n, sign * q.w()) / n * q.vec());
 }
 
-/// What both solve, with a start near the truth.
+/// Simulated data of both solvers, with a start near the truth.
 struct Scene {
   std::vector<Pose> truth, start;
   std::vector<Vector3d> landmarks;
-  std::vector<Seen> seen;  ///< frame by frame
+  std::vector<Observed> observations;  ///< ordered by frame
 
   explicit Scene(int frames) {
     Random random(1);
     for (int k = 0; k < frames; ++k) truth.push_back(PoseAt(kDt * k));
-    std::vector<int> landmark(kTracks, -1), left(kTracks, 0);
+    std::vector<int> landmark(kTracks, -1), remaining_frames(kTracks, 0);
     for (int k = 0; k < frames; ++k) {
       for (std::size_t s = 0; s < kTracks; ++s) {
-        const bool first = left[s] == 0;
+        const bool first = remaining_frames[s] == 0;
         if (first) {
           const bool is_long = random.Uniform() < 0.1;
-          left[s] =
+          remaining_frames[s] =
               static_cast<int>(is_long ? 80 + 41 * random.Uniform() : 20 + 21 * random.Uniform());
-          if (k == 0) left[s] = std::max(3, static_cast<int>(left[s] * random.Uniform()));
+          if (k == 0)
+            remaining_frames[s] =
+                std::max(3, static_cast<int>(remaining_frames[s] * random.Uniform()));
           landmark[s] = static_cast<int>(landmarks.size());
           const Pose& middle =
-              truth[static_cast<std::size_t>(std::min(k + left[s] / 2, frames - 1))];
+              truth[static_cast<std::size_t>(std::min(k + remaining_frames[s] / 2, frames - 1))];
           const double z = is_long ? 15 + 15 * random.Uniform() : 5 + 7 * random.Uniform();
           const Vector3d in_cam((random.Uniform() - 0.5) * 0.7 * z,
                                 (random.Uniform() - 0.5) * 0.5 * z, z);
           landmarks.push_back(middle.q * in_cam + middle.r);
         }
-        --left[s];
-        const Pose& at = truth[static_cast<std::size_t>(k)];
+        --remaining_frames[s];
+        const Pose& pose = truth[static_cast<std::size_t>(k)];
         const Vector3d h =
-            at.q.conjugate() * (landmarks[static_cast<std::size_t>(landmark[s])] - at.r);
+            pose.q.conjugate() * (landmarks[static_cast<std::size_t>(landmark[s])] - pose.r);
         if (h[2] < 1.0) {
-          left[s] = 0;
+          remaining_frames[s] = 0;
           if (first) landmarks.pop_back();
           continue;
         }
-        seen.push_back({k, landmark[s], kFocal * h[0] / h[2] + kCentre + kPixel * random.Normal(),
-                        kFocal * h[1] / h[2] + kCentre + kPixel * random.Normal(),
-                        h[2] + 0.3 * kDepth * random.Normal(), first});
+        observations.push_back({k, landmark[s],
+                                kFocal * h[0] / h[2] + kCentre + kPixel * random.Normal(),
+                                kFocal * h[1] / h[2] + kCentre + kPixel * random.Normal(),
+                                h[2] + 0.3 * kDepth * random.Normal(), first});
       }
     }
     const auto noise = [&](double sigma) {
@@ -133,9 +137,9 @@ struct Scene {
 
   static Pose PoseAt(double t) {
     const auto q = [](double s) {
-      Matrix3d ahead;  // the axis of the camera is y of the world
-      ahead << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-      return Quaterniond(ahead) *
+      Matrix3d camera_axes;  // the camera looks along y of the world
+      camera_axes << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+      return Quaterniond(camera_axes) *
              Exp({0.1 * std::sin(0.6 * s), 0.1 * std::sin(0.4 * s + 1.0), 0.1 * std::sin(0.5 * s)});
     };
     const auto r = [](double s) {
@@ -147,7 +151,7 @@ struct Scene {
 
 // The batch.
 
-Problem SystemOf(const Scene& scene) {
+Problem BuildProblem(const Scene& scene) {
   Problem problem;
   const SharedMotion motion = MakeMotion(
       QuaternionPose({kAcceleration, kAcceleration, kAcceleration}, {kAngular, kAngular, kAngular}),
@@ -190,24 +194,26 @@ Problem SystemOf(const Scene& scene) {
   return problem;
 }
 
-/// Stands for the filter that goes along: says what each measurement is, and gives the start.
-class StartOf : public Estimator {
+/// Estimator that reports the kind of each measurement, and provides the start in place of a
+/// filter.
+class StartEstimator : public Estimator {
  public:
-  StartOf(const Problem& problem, const Scene& scene)
+  StartEstimator(const Problem& problem, const Scene& scene)
       : scene_(scene), state_(problem.InitialState(/*reserved=*/true)) {}
   void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
     for (const Measurement& m : frame.measurements) {
-      MeasurementReport& one = report_.Add();
-      one.sensor = m.stream;
-      one.landmark = m.landmark;
-      one.dof = m.stream == 1 ? 3 : 2;
-      if (m.stream == 1) one.outcome = Outcome::kInitialised;
+      MeasurementReport& report = report_.Add();
+      report.sensor = m.stream;
+      report.landmark = m.landmark;
+      report.dof = m.stream == 1 ? 3 : 2;
+      if (m.stream == 1) report.outcome = Outcome::kInitialised;
     }
-    const Pose& at = scene_.start[next_++];
-    const double x[13] = {at.r[0], at.r[1], at.r[2], at.q.w(),    at.q.x(),    at.q.y(),   at.q.z(),
-                          at.v[0], at.v[1], at.v[2], at.omega[0], at.omega[1], at.omega[2]};
+    const Pose& pose = scene_.start[next_++];
+    const double x[13] = {pose.r[0],     pose.r[1],     pose.r[2],    pose.q.w(), pose.q.x(),
+                          pose.q.y(),    pose.q.z(),    pose.v[0],    pose.v[1],  pose.v[2],
+                          pose.omega[0], pose.omega[1], pose.omega[2]};
     state_.values().assign(x, x + 13);
     return report_;
   }
@@ -231,45 +237,47 @@ struct Times {
 double NowS() { return 1e-9 * CpuNs(); }
 
 Times TimeBatch(const Scene& scene, int iterations) {
-  const Problem problem = SystemOf(scene);
+  const Problem problem = BuildProblem(scene);
   ceres_batch::CondensedRun run(problem, {{"pixels", 2}, {"depth", 3}},
                                 std::numeric_limits<double>::infinity(),
                                 std::numeric_limits<int>::max());
-  StartOf start(problem, scene);
-  ceres_batch::Trajectory about;
-  std::size_t at = 0;
+  StartEstimator start(problem, scene);
+  ceres_batch::Trajectory linearisation_trajectory;
+  std::size_t next_observed = 0;
   for (std::size_t k = 0; k < scene.start.size(); ++k) {
     Frame frame;
     frame.timestamp = TimestampFromSeconds(kDt * static_cast<double>(k));
-    for (; at < scene.seen.size() && scene.seen[at].frame == static_cast<int>(k); ++at) {
-      const Seen& s = scene.seen[at];
+    for (; next_observed < scene.observations.size() &&
+           scene.observations[next_observed].frame == static_cast<int>(k);
+         ++next_observed) {
+      const Observed& s = scene.observations[next_observed];
       std::vector<double> z{s.u, s.v};
       if (s.first) z.push_back(s.depth);
       frame.measurements.push_back({frame.timestamp, s.first ? 1 : 0, s.landmark, z, {}});
     }
-    if (!run.Add(frame, start.Process(frame), start, about)) {
+    if (!run.Add(frame, start.Process(frame), start, linearisation_trajectory)) {
       throw std::runtime_error(run.problem());
     }
   }
   ceres_batch::KktSystem kkt(run);
   Eigen::VectorXd z = kkt.Join(Eigen::VectorXd::Zero(run.shape().inputs));
-  const auto must = [&](bool done) {
+  const auto require = [&](bool done) {
     if (!done) throw std::runtime_error("the batch failed: " + run.problem());
   };
-  must(kkt.LineariseAbout(about, z) && kkt.Solve());
+  require(kkt.LineariseAbout(linearisation_trajectory, z) && kkt.Solve());
   z += kkt.step().dz;
-  must(kkt.Freeze(z).has_value());
+  require(kkt.Freeze(z).has_value());
   Times times;
   const double begin = NowS();
   for (int i = 0; i < iterations; ++i) {
     double now = NowS();
-    must(kkt.Linearise(z, 0.0));
+    require(kkt.Linearise(z, 0.0));
     times.linearise_s += (NowS() - now) / iterations;
     now = NowS();
-    must(kkt.Solve());
+    require(kkt.Solve());
     times.solve_s += (NowS() - now) / iterations;
     z += kkt.step().dz;
-    must(kkt.Cost(z).has_value());
+    require(kkt.Cost(z).has_value());
   }
   times.iteration_s = (NowS() - begin) / iterations;
   const double end = NowS();
@@ -283,7 +291,7 @@ Times TimeBatch(const Scene& scene, int iterations) {
 
 // The peer.
 
-/// r and q by tangents: d/d(tangent) is written into the first six columns.
+/// Manifold of r and q by tangents. A cost writes d/d(tangent) into the first six columns.
 struct PoseManifold : ceres::Manifold {
   int AmbientSize() const override { return 7; }
   int TangentSize() const override { return 6; }
@@ -305,35 +313,36 @@ struct PoseManifold : ceres::Manifold {
 
 template <int kRows>
 struct Observation : ceres::SizedCostFunction<kRows, 7, 3> {
-  Seen seen;
-  explicit Observation(const Seen& s) : seen(s) {}
+  Observed observed;
+  explicit Observation(const Observed& s) : observed(s) {}
   bool Evaluate(double const* const* x, double* r, double** j) const override {
-    const Eigen::Map<const Vector3d> at(x[0]), y(x[1]);
-    const Matrix3d back = Eigen::Map<const Quaterniond>(x[0] + 3).conjugate().toRotationMatrix();
-    const Vector3d h = back * (y - at);
+    const Eigen::Map<const Vector3d> position(x[0]), y(x[1]);
+    const Matrix3d cam_from_world =
+        Eigen::Map<const Quaterniond>(x[0] + 3).conjugate().toRotationMatrix();
+    const Vector3d h = cam_from_world * (y - position);
     if (h[2] < 1e-3) return false;
     const double f = kFocal / (h[2] * kPixel);
     Matrix3d d;
     d << f, 0, -f * h[0] / h[2], 0, f, -f * h[1] / h[2], 0, 0, 1.0 / kDepth;
-    r[0] = f * h[0] - (seen.u - kCentre) / kPixel;
-    r[1] = f * h[1] - (seen.v - kCentre) / kPixel;
-    if (kRows > 2) r[kRows - 1] = (h[2] - seen.depth) / kDepth;
+    r[0] = f * h[0] - (observed.u - kCentre) / kPixel;
+    r[1] = f * h[1] - (observed.v - kCentre) / kPixel;
+    if (kRows > 2) r[kRows - 1] = (h[2] - observed.depth) / kDepth;
     if (j == nullptr) return true;
     const auto rows = d.topRows<kRows>();
     if (j[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, kRows, 7, Eigen::RowMajor>> j_x(j[0]);
       j_x.setZero();
-      j_x.template leftCols<3>() = -rows * back;
+      j_x.template leftCols<3>() = -rows * cam_from_world;
       j_x.template middleCols<3>(3) = rows * Hat(h);
     }
     if (j[1] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, kRows, 3, Eigen::RowMajor>>{j[1]} = rows * back;
+      Eigen::Map<Eigen::Matrix<double, kRows, 3, Eigen::RowMajor>>{j[1]} = rows * cam_from_world;
     }
     return true;
   }
 };
 
-/// White acceleration: Q of full rank. d Exp is taken at zero: a peer in time.
+/// White acceleration with Q of full rank. d Exp is taken at zero, because only the time matters.
 struct Step : ceres::SizedCostFunction<12, 7, 6, 7, 6> {
   Matrix12d whiten;
   Step() {
@@ -354,17 +363,18 @@ struct Step : ceres::SizedCostFunction<12, 7, 6, 7, 6> {
     c << r1 - r0 - kDt * v0.head<3>(), Log(q0.conjugate() * q1) - kDt * v0.tail<3>(), v1 - v0;
     Eigen::Map<Vector12d>{r} = whiten * c;
     if (j == nullptr) return true;
-    Matrix12d before = -Matrix12d::Identity(), after = Matrix12d::Identity();
-    before.topRightCorner<6, 6>() = -kDt * Eigen::Matrix<double, 6, 6>::Identity();
-    before.block<3, 3>(3, 3) = -(q1.conjugate() * q0).toRotationMatrix();
-    const Matrix12d j_before = whiten * before, j_after = whiten * after;
+    Matrix12d j_previous_state = -Matrix12d::Identity(), j_next_state = Matrix12d::Identity();
+    j_previous_state.topRightCorner<6, 6>() = -kDt * Eigen::Matrix<double, 6, 6>::Identity();
+    j_previous_state.block<3, 3>(3, 3) = -(q1.conjugate() * q0).toRotationMatrix();
+    const Matrix12d j_previous = whiten * j_previous_state, j_next = whiten * j_next_state;
     for (int b = 0; b < 4; ++b) {
       if (j[b] == nullptr) continue;
-      const auto columns = (b < 2 ? j_before : j_after).middleCols<6>(b % 2 == 0 ? 0 : 6);
+      const auto columns = (b < 2 ? j_previous : j_next).middleCols<6>(b % 2 == 0 ? 0 : 6);
       const int width = b % 2 == 0 ? 7 : 6;
-      Eigen::Map<Eigen::Matrix<double, 12, Eigen::Dynamic, Eigen::RowMajor>> to(j[b], 12, width);
-      to.setZero();
-      to.leftCols<6>() = columns;
+      Eigen::Map<Eigen::Matrix<double, 12, Eigen::Dynamic, Eigen::RowMajor>> jacobian(j[b], 12,
+                                                                                      width);
+      jacobian.setZero();
+      jacobian.leftCols<6>() = columns;
     }
     return true;
   }
@@ -375,27 +385,28 @@ struct VelocityPrior : ceres::SizedCostFunction<6, 6> {
   bool Evaluate(double const* const* x, double* r, double** j) const override {
     for (int i = 0; i < 6; ++i) r[i] = (x[0][i] - mean[i]) / (i < 3 ? 1.0 : 0.5);
     if (j == nullptr || j[0] == nullptr) return true;
-    Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> to(j[0]);
-    to.setZero();
-    for (int i = 0; i < 6; ++i) to(i, i) = i < 3 ? 1.0 : 2.0;
+    Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> jacobian(j[0]);
+    jacobian.setZero();
+    for (int i = 0; i < 6; ++i) jacobian(i, i) = i < 3 ? 1.0 : 2.0;
     return true;
   }
 };
 
-/// CPU seconds of an iteration.
+/// Returns the CPU seconds of an iteration.
 double TimeCeres(const Scene& scene, ceres::LinearSolverType type, int iterations) {
   std::vector<std::array<double, 7>> poses;
   std::vector<Vector6d> velocities;
   std::vector<Vector3d> landmarks = scene.landmarks;
-  for (const Pose& at : scene.start) {
-    poses.push_back({at.r[0], at.r[1], at.r[2], at.q.x(), at.q.y(), at.q.z(), at.q.w()});
+  for (const Pose& pose : scene.start) {
+    poses.push_back(
+        {pose.r[0], pose.r[1], pose.r[2], pose.q.x(), pose.q.y(), pose.q.z(), pose.q.w()});
     velocities.emplace_back();
-    velocities.back() << at.v, at.omega;
+    velocities.back() << pose.v, pose.omega;
   }
   PoseManifold manifold;
-  ceres::Problem::Options of_problem;
-  of_problem.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(of_problem);
+  ceres::Problem::Options problem_options;
+  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
   auto* ordering = new ceres::ParameterBlockOrdering;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     problem.AddParameterBlock(poses[k].data(), 7, &manifold);
@@ -406,7 +417,7 @@ double TimeCeres(const Scene& scene, ceres::LinearSolverType type, int iteration
     problem.AddResidualBlock(new Step, nullptr, poses[k - 1].data(), velocities[k - 1].data(),
                              poses[k].data(), velocities[k].data());
   }
-  for (const Seen& s : scene.seen) {
+  for (const Observed& s : scene.observations) {
     double* const pose = poses[static_cast<std::size_t>(s.frame)].data();
     double* const landmark = landmarks[static_cast<std::size_t>(s.landmark)].data();
     if (s.first) {
@@ -437,23 +448,23 @@ double TimeCeres(const Scene& scene, ceres::LinearSolverType type, int iteration
   ceres::Solver::Summary summary;
   const double begin = NowS();
   ceres::Solve(options, &problem, &summary);
-  const double all = NowS() - begin;
+  const double total_s = NowS() - begin;
   const int count = summary.num_successful_steps + summary.num_unsuccessful_steps - 1;
-  return all * summary.minimizer_time_in_seconds / summary.total_time_in_seconds / count;
+  return total_s * summary.minimizer_time_in_seconds / summary.total_time_in_seconds / count;
 }
 
-void Run(const std::vector<int>& frames, int iterations, int most_of_ceres) {
-  std::printf("%7s %9s | %9s %9s %9s %9s %8s | %9s %9s | CPU s of an iteration\n", "frames", "obs",
+void Run(const std::vector<int>& frames, int iterations, int max_ceres_frames) {
+  std::printf("%7s %9s | %9s %9s %9s %9s %8s | %9s %9s | CPU s per iteration\n", "frames", "obs",
               "batch", "linearise", "solve", "P, all", "flops", "normal", "schur");
   std::vector<double> time;
   for (const int count : frames) {
     const Scene scene(count);
     const Times batch = TimeBatch(scene, iterations);
     time.push_back(batch.iteration_s);
-    std::printf("%7d %9zu | %9.4f %9.4f %9.4f %9.4f %8.1e | ", count, scene.seen.size(),
+    std::printf("%7d %9zu | %9.4f %9.4f %9.4f %9.4f %8.1e | ", count, scene.observations.size(),
                 batch.iteration_s, batch.linearise_s, batch.solve_s, batch.covariances_s,
                 batch.flops);
-    if (count > most_of_ceres) {
+    if (count > max_ceres_frames) {
       std::printf("%9s %9s | %s\n", "-", "-",
                   batch.in_time_order ? "time order" : "minimum degree");
       continue;
@@ -475,13 +486,13 @@ void Run(const std::vector<int>& frames, int iterations, int most_of_ceres) {
 }  // namespace alidade::bench
 
 int main(int argc, char** argv) {
-  CLI::App app{"Time of an iteration of the sparse batch beside Ceres"};
+  CLI::App app{"Time of an iteration of the sparse batch compared with Ceres"};
   std::vector<int> frames{500, 1000, 5000, 20000};
-  int iterations = 5, most_of_ceres = 5000;
+  int iterations = 5, max_ceres_frames = 5000;
   app.add_option("--frames", frames, "lengths of the series");
-  app.add_option("--iterations", iterations, "of each, timed");
-  app.add_option("--ceres", most_of_ceres, "frames up to which Ceres is timed");
+  app.add_option("--iterations", iterations, "number of timed iterations");
+  app.add_option("--ceres", max_ceres_frames, "maximum number of frames for Ceres");
   CLI11_PARSE(app, argc, argv);
-  alidade::bench::Run(frames, iterations, most_of_ceres);
+  alidade::bench::Run(frames, iterations, max_ceres_frames);
   return 0;
 }

@@ -6,22 +6,22 @@
 #include <numbers>
 #include <vector>
 
-/// The work that all contenders do: the depth filter of [Ekf2017], state (Z, Zdot, lambda), by
-/// prediction, disparity B F / Z with 1 px, inverse scale lambda Z with noise propagated from 1 px
-/// on a template of 300 px. Start: Z 0.35 +- 0.1 m, Zdot 0 +- 0.5 m/s, lambda 3.3 +- 0.5 1/m.
+/// Work of all contenders: the depth filter of [Ekf2017] with state (Z, Zdot, lambda): prediction,
+/// disparity B F / Z with 1 px, inverse scale lambda Z with noise propagated from 1 px on a
+/// template of 300 px. Start: Z 0.35 +- 0.1 m, Zdot 0 +- 0.5 m/s, lambda 3.3 +- 0.5 1/m.
 namespace alidade::bench {
 
 inline constexpr double kDt = 0.033;            ///< s
 inline constexpr double kBf = 26.0;             ///< px m
 inline constexpr double kAcceleration = 1.0;    ///< m/s^2, sigma
-inline constexpr double kRelative = 2.0 / 300;  ///< sigma of the inverse scale / its cube
+inline constexpr double kRelative = 2.0 / 300;  ///< sigma of the inverse scale s / s^3
 
-/// Measurements of a target that swings about 0.3 m, periodic.
-struct Swing {
+/// Periodic measurements of a target that oscillates about 0.3 m.
+struct TargetMeasurements {
   static constexpr int kPeriod = 1024;
   std::vector<double> disparity, inverse_scale;
 
-  Swing() {
+  TargetMeasurements() {
     for (int i = 0; i < kPeriod; ++i) {
       const double depth = 0.3 + 0.1 * std::sin(2.0 * std::numbers::pi * 13.0 * i / kPeriod);
       disparity.push_back(kBf / depth + 0.7 * std::sin(1.7 * i));
@@ -30,7 +30,7 @@ struct Swing {
   }
 };
 
-/// Another library's filter. It has no gate.
+/// Filter of another library, without a gate.
 class Peer {
  public:
   virtual ~Peer() = default;
@@ -38,7 +38,7 @@ class Peer {
   virtual double depth() const = 0;
 };
 
-// Each in a source of its own, built where the library is installed.
+// Each function has its own source file, which is built if its library is installed.
 std::unique_ptr<Peer> MakeOpenCv();
 std::unique_ptr<Peer> MakeBfl();
 std::unique_ptr<Peer> MakeMrpt();

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// CPU time of a frame of monocular SLAM from images, relative to the optical flow of OpenCV alone,
+// CPU time per frame of monocular SLAM from images, relative to the optical flow of OpenCV alone,
 // cv::calcOpticalFlowPyrLK on the same features in the same images:
 //
 //   bench_image_tracks examples/25_slam_images
 //
-// The images are those of the example, drawn here and kept as files. Source `image_tracks` reads
-// them and gives its features to the EKF of the example, once guided by it and once not. What it
-// does inside is measured by the same calls, made apart from it; that it aligns features, and
-// searches for new ones, is the rest.
+// The images are those of the example, which this program draws and stores as files. The source
+// `image_tracks` reads them for the EKF of the example, with and without guidance by it. The parts
+// of the source are measured by separate calls. The remaining time belongs to the alignment and to
+// the search for new features.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
@@ -43,7 +43,7 @@ std::string FileOf(const fs::path& folder, int number) {
   return (folder / name).string();
 }
 
-/// An image as source `image_tracks` reads it.
+/// Reads an image as the source `image_tracks` does.
 cv::Mat ReadImage(const std::string& name) {
   const std::string bytes = internal::ReadFile(
       name, [&](ExitCode code, int) { throw Error(code, name + ": cannot be read"); });
@@ -52,17 +52,18 @@ cv::Mat ReadImage(const std::string& name) {
       cv::IMREAD_GRAYSCALE);
 }
 
-/// CPU times of one part of a frame: of each frame, once in each round.
+/// CPU times of one part, for each frame and round.
 struct Part {
   std::map<int, std::vector<double>> ns = {};
 
   template <class Work>
-  void Take(int frame, const Work& work) {
+  void Measure(int frame, const Work& work) {
     const double start = CpuNs();
     work();
     ns[frame].push_back(CpuNs() - start);
   }
-  /// Of the medians over rounds: frames differ, for not every one is searched for features.
+  /// Returns the mean over frames of the medians over rounds. Frames differ, because some of them
+  /// are not searched for features.
   double Mean() const {
     double sum = 0.0;
     for (const auto& [frame, times] : ns) {
@@ -74,56 +75,58 @@ struct Part {
   }
 };
 
-/// What a frame takes, and cv::calcOpticalFlowPyrLK on what the frame before it had.
+/// CPU times of a frame, and of cv::calcOpticalFlowPyrLK on the features of the previous frame.
 class Times {
  public:
-  /// Goes through the images of a folder once: each part in turn, frame by frame.
+  /// Processes the images of a folder once: each part in turn, frame by frame.
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
     is_guided_ = experiment.guide != nullptr;
     const internal::EstimatorGuide guide(experiment);
     Estimator& filter = *experiment.estimators[0].estimator;
     SourceFrame frame;
-    std::vector<cv::Point2f> from, to, back;
+    std::vector<cv::Point2f> points, next_points, returned;
     std::vector<std::int64_t> ids;
     std::vector<unsigned char> found;
     std::vector<float> error;
-    std::vector<cv::Mat> pyramid_before, pyramid;
-    cv::Mat before, image;
+    std::vector<cv::Mat> previous_pyramid, pyramid;
+    cv::Mat previous_image, image;
     Timestamp step = 0;
     const auto size = static_cast<int>(experiment.source->size());
     for (int k = 0; k < size; ++k) {
-      // The first image has nothing to follow: it is left out, and so is its search.
+      // The first image is omitted: it has no features to track, and its search is longer.
       Times unused;
       Times& times = k == 0 ? unused : *this;
-      times.read_.Take(k, [&] { image = ReadImage(FileOf(folder, k)); });
-      if (!from.empty()) {
-        times.lk_.Take(k, [&] { cv::calcOpticalFlowPyrLK(before, image, from, to, found, error); });
+      times.read_.Measure(k, [&] { image = ReadImage(FileOf(folder, k)); });
+      if (!points.empty()) {
+        times.lk_.Measure(k, [&] {
+          cv::calcOpticalFlowPyrLK(previous_image, image, points, next_points, found, error);
+        });
       }
       if (!is_guided_) {
-        times.pyramid_.Take(k, [&] {
+        times.pyramid_.Measure(k, [&] {
           cv::buildOpticalFlowPyramid(image, pyramid, {21, 21}, 3, false);
         });
       }
-      if (!from.empty() && is_guided_) {
-        times.expect_.Take(k, [&] { guide.Expect(0, frame.timestamp + step, ids); });
-      } else if (!from.empty()) {
-        times.Flow(k, pyramid_before, pyramid, from, to);
+      if (!points.empty() && is_guided_) {
+        times.prediction_.Measure(k, [&] { guide.Expect(0, frame.timestamp + step, ids); });
+      } else if (!points.empty()) {
+        times.Flow(k, previous_pyramid, pyramid, points, next_points);
       }
       const Timestamp last = frame.timestamp;
-      times.next_.Take(k, [&] { experiment.source->Next(frame); });
+      times.next_.Measure(k, [&] { experiment.source->Next(frame); });
       step = frame.timestamp - last;
-      times.filter_.Take(k, [&] { filter.Process(frame); });
-      from.clear();
+      times.filter_.Measure(k, [&] { filter.Process(frame); });
+      points.clear();
       ids.clear();
       for (const Measurement& m : frame.measurements) {
-        from.emplace_back(static_cast<float>(m.values[0]), static_cast<float>(m.values[1]));
+        points.emplace_back(static_cast<float>(m.values[0]), static_cast<float>(m.values[1]));
         ids.push_back(m.landmark);
       }
       ++times.frames_;
-      times.features_ += static_cast<double>(from.size());
-      std::swap(before, image);
-      std::swap(pyramid_before, pyramid);
+      times.features_ += static_cast<double>(points.size());
+      std::swap(previous_image, image);
+      std::swap(previous_pyramid, pyramid);
     }
   }
 
@@ -131,70 +134,70 @@ class Times {
     const double lk = lk_.Mean(), front_end = next_.Mean() - read_.Mean();
     const double both = front_end + filter_.Mean();
     const char* const name = is_guided_ ? "guided" : "not guided";
-    std::printf("%s, %.0f features a frame\n", name, features_ / frames_);
-    std::printf("%-40s %8s %8s\n", "CPU time of a frame", "ms", "to LK");
+    std::printf("%s, %.0f features per frame\n", name, features_ / frames_);
+    std::printf("%-40s %8s %8s\n", "CPU time per frame", "ms", "to LK");
     const auto line = [lk](const char* part, double ns) {
       std::printf("%-40s %8.3f %8.2f\n", part, 1e-6 * ns, ns / lk);
     };
     line("calcOpticalFlowPyrLK alone", lk);
     line("read and decode, PGM", read_.Mean());
     line("front end", front_end);
-    double rest = front_end;
-    const auto part = [&](const char* of, const Part& times) {
-      line(of, times.Mean());
-      rest -= times.Mean();
+    double remaining_ns = front_end;
+    const auto part = [&](const char* label, const Part& times) {
+      line(label, times.Mean());
+      remaining_ns -= times.Mean();
     };
     if (is_guided_) {
-      part("  what the filter expects", expect_);
+      part("  predictions of the filter", prediction_);
     } else {
       part("  pyramid", pyramid_);
-      part("  follow forward", forward_);
-      part("  follow back", back_);
+      part("  track forward", forward_);
+      part("  track backward", back_);
     }
-    line("  align, check, search for new ones", rest);
+    line("  align, check, search for new ones", remaining_ns);
     line("filter", filter_.Mean());
     line("front end and filter", both);
-    const std::string label = is_guided_ ? "guided_" : "";
-    std::printf("ratio %sfront_end/lk %.3f\n", label.c_str(), front_end / lk);
-    std::printf("ratio %sfilter/lk %.3f\n", label.c_str(), filter_.Mean() / lk);
-    std::printf("ratio %sfront_end_and_filter/lk %.3f\n", label.c_str(), both / lk);
+    const std::string prefix = is_guided_ ? "guided_" : "";
+    std::printf("ratio %sfront_end/lk %.3f\n", prefix.c_str(), front_end / lk);
+    std::printf("ratio %sfilter/lk %.3f\n", prefix.c_str(), filter_.Mean() / lk);
+    std::printf("ratio %sfront_end_and_filter/lk %.3f\n", prefix.c_str(), both / lk);
   }
 
  private:
-  /// As PyramidFlow does it.
+  /// Measures the optical flow as PyramidFlow does it.
   void Flow(int k, const std::vector<cv::Mat>& last, const std::vector<cv::Mat>& next,
-            const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to) {
+            const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end) {
     const cv::TermCriteria stop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01};
-    std::vector<cv::Point2f> half, back = from;
+    std::vector<cv::Point2f> half, returned = start;
     std::vector<unsigned char> found;
     std::vector<float> error;
-    for (const cv::Point2f& at : from) half.push_back(0.5F * at);
-    to = half;
-    forward_.Take(k, [&] {
+    for (const cv::Point2f& point : start) half.push_back(0.5F * point);
+    end = half;
+    forward_.Measure(k, [&] {
       cv::calcOpticalFlowPyrLK(std::vector(last.begin() + 1, last.end()),
-                               std::vector(next.begin() + 1, next.end()), half, to, found, error,
+                               std::vector(next.begin() + 1, next.end()), half, end, found, error,
                                {21, 21}, 2, stop, cv::OPTFLOW_USE_INITIAL_FLOW);
     });
-    for (cv::Point2f& at : to) at *= 2.0F;
-    back_.Take(k, [&] {
-      cv::calcOpticalFlowPyrLK(next, last, to, back, found, error, {21, 21}, 0, stop,
+    for (cv::Point2f& point : end) point *= 2.0F;
+    back_.Measure(k, [&] {
+      cv::calcOpticalFlowPyrLK(next, last, end, returned, found, error, {21, 21}, 0, stop,
                                cv::OPTFLOW_USE_INITIAL_FLOW);
     });
   }
 
   bool is_guided_ = false;
-  Part read_, lk_, pyramid_, forward_, back_, expect_, next_, filter_;
+  Part read_, lk_, pyramid_, forward_, back_, prediction_, next_, filter_;
   double features_ = 0.0, frames_ = 0.0;
 };
 
 int Main(int argc, char** argv) {
-  CLI::App app("A frame of SLAM from images, relative to the optical flow of OpenCV alone");
+  CLI::App app("Time per frame of SLAM from images, relative to the optical flow of OpenCV");
   std::string example;
   std::vector<std::string> settings;
   int rounds = 5;
-  app.add_option("example", example, "the folder examples/25_slam_images")->required();
+  app.add_option("example", example, "folder examples/25_slam_images")->required();
   app.add_option("--set", settings, "KEY=VALUE of the config");
-  app.add_option("--rounds", rounds, "times through the images")->capture_default_str();
+  app.add_option("--rounds", rounds, "number of passes over the images")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   cv::setNumThreads(1);
 
@@ -211,7 +214,7 @@ int Main(int argc, char** argv) {
   config.Set("source.path", temporary.path().string(), "bench");
   for (const std::string& setting : settings) {
     const std::size_t equals = setting.find('=');
-    if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
+    if (equals == setting.npos) throw std::runtime_error("--set expects KEY=VALUE");
     config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
   }
   for (const char* guide : {"ekf", "none"}) {

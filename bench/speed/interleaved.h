@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
-/// Times contenders side by side: one short chunk of each in turn, again and again, so that what
-/// disturbs the machine disturbs all of them alike. Only ratios mean anything.
+/// Timing of contenders in turn: one short chunk of each, repeatedly, so that disturbances of the
+/// machine affect all of them equally. Only ratios are meaningful.
 namespace alidade::bench {
 
 struct Contender {
   std::string name;
   std::function<void()> chunk;  ///< about 0.4 ms
-  double steps = 1.0;           ///< in a chunk
-  std::vector<double> ns;       ///< CPU time of a step, by chunk
+  double steps = 1.0;           ///< steps in a chunk
+  std::vector<double> ns;       ///< CPU time of a step, for each chunk
 
-  /// q-quantile of the time of a step.
+  /// Returns the q-quantile of the time of a step.
   double Quantile(double q) const {
     std::vector<double> sorted = ns;
     std::sort(sorted.begin(), sorted.end());
@@ -34,25 +34,25 @@ inline double CpuNs() {
 
 inline void Interleave(std::vector<Contender>& contenders, int rounds) {
   for (int round = 0; round < rounds; ++round) {
-    for (Contender& one : contenders) {
+    for (Contender& contender : contenders) {
       const double start = CpuNs();
-      one.chunk();
-      one.ns.push_back((CpuNs() - start) / one.steps);
+      contender.chunk();
+      contender.ns.push_back((CpuNs() - start) / contender.steps);
     }
   }
 }
 
-/// Prints each contender's times in units of the first's: 1st percentile and median.
+/// Prints the times of the contenders relative to the first one: 1st percentile and median.
 inline void PrintTable(const std::vector<Contender>& contenders) {
   std::printf("%-36s %8s %8s\n", "relative to the first, CPU time", "p01", "median");
-  for (const Contender& one : contenders) {
-    std::printf("%-36s %8.2f %8.2f\n", one.name.c_str(),
-                one.Quantile(0.01) / contenders[0].Quantile(0.01),
-                one.Quantile(0.5) / contenders[0].Quantile(0.5));
+  for (const Contender& contender : contenders) {
+    std::printf("%-36s %8.2f %8.2f\n", contender.name.c_str(),
+                contender.Quantile(0.01) / contenders[0].Quantile(0.01),
+                contender.Quantile(0.5) / contenders[0].Quantile(0.5));
   }
 }
 
-/// `ratio A/B VALUE`, of the 1st percentiles.
+/// Prints `ratio A/B VALUE` of the 1st percentiles.
 inline void PrintRatio(const std::string& name, const Contender& a, const Contender& b) {
   std::printf("ratio %s %.3f\n", name.c_str(), a.Quantile(0.01) / b.Quantile(0.01));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a frame of the EKF that measures 20 of 1000 landmarks, with a bias that is estimated, and
-// with one that is considered, relative to P - W W' of that size alone.
+// Time of a frame of the EKF that measures 20 of 1000 landmarks, with an estimated bias and with a
+// considered bias, relative to P - W W' of the same size alone.
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
@@ -46,9 +46,9 @@ struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>, Vec<3>> {
   }
 };
 
-double PlaceOf(int landmark, int axis) { return std::sin(1.0 + landmark * (axis + 1)); }
+double Coordinate(int landmark, int axis) { return std::sin(1.0 + landmark * (axis + 1)); }
 
-Problem MapSystem(BlockStatus bias) {
+Problem BuildMapProblem(BlockStatus bias) {
   Problem problem;
   const SharedMotion walk = MakeMotion(Walk(), "walk");
   for (const char* owner : {"cam", "bias"}) {
@@ -69,16 +69,16 @@ Problem MapSystem(BlockStatus bias) {
   problem.sensors.push_back(sensor);
   LandmarkOptions landmarks;
   for (int i = 0; i < kLandmarks; ++i) {
-    landmarks.known.push_back({i, {PlaceOf(i, 0), PlaceOf(i, 1), PlaceOf(i, 2)}, 0.1});
+    landmarks.known.push_back({i, {Coordinate(i, 0), Coordinate(i, 1), Coordinate(i, 2)}, 0.1});
   }
   problem.landmarks = landmarks;
   return problem;
 }
 
-/// Processes one frame after the other.
+/// Run that processes one frame per call.
 class Run {
  public:
-  explicit Run(BlockStatus bias) : filter_(MapSystem(bias), {}, {{"tracks", 3}}) {}
+  explicit Run(BlockStatus bias) : filter_(BuildMapProblem(bias), {}, {{"tracks", 3}}) {}
 
   void operator()() {
     Frame frame;
@@ -86,22 +86,22 @@ class Run {
     for (int i = 0; i < kMeasured; ++i) {
       const int id = (kMeasured * count_ + i) % kLandmarks;
       frame.measurements.push_back(
-          {frame.timestamp, 0, id, {PlaceOf(id, 0), PlaceOf(id, 1), PlaceOf(id, 2)}, {}});
+          {frame.timestamp, 0, id, {Coordinate(id, 0), Coordinate(id, 1), Coordinate(id, 2)}, {}});
     }
     ++count_;
     for (const MeasurementReport& entry : filter_.Process(frame).measurements()) {
-      used_ += entry.outcome == Outcome::kAccepted;
+      used_count_ += entry.outcome == Outcome::kAccepted;
     }
   }
-  bool used_all() const { return used_ == kMeasured * count_; }
+  bool has_used_all() const { return used_count_ == kMeasured * count_; }
 
  private:
   Ekf filter_;
-  int count_ = 0, used_ = 0;
+  int count_ = 0, used_count_ = 0;
 };
 
 int Main(int argc, char** argv) {
-  CLI::App app("A frame of an EKF with 1000 landmarks, relative to P - W W' alone");
+  CLI::App app("Time per frame of an EKF with 1000 landmarks, relative to P - W W' alone");
   int rounds = 20;
   app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
@@ -118,7 +118,7 @@ int Main(int argc, char** argv) {
       {"EKF, the bias estimated", [&] { estimated(); }, 1.0, {}},
       {"EKF, the bias considered", [&] { considered(); }, 1.0, {}}};
   Interleave(contenders, rounds);
-  if (!estimated.used_all() || !considered.used_all()) {
+  if (!estimated.has_used_all() || !considered.has_used_all()) {
     std::fprintf(stderr, "error: not every measurement was accepted\n");
     return 1;
   }

@@ -6,7 +6,7 @@
 namespace alidade::bench {
 namespace {
 
-/// Both measurements as one observation of two numbers: the fastest way that this class has.
+/// Filter of MRPT with both measurements as one observation of two numbers, its fastest way.
 class Mrpt : public Peer, public mrpt::bayes::CKalmanFilterCapable<3, 2, 0, 0> {
  public:
   Mrpt() {

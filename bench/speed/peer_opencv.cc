@@ -6,8 +6,8 @@
 namespace alidade::bench {
 namespace {
 
-/// cv::KalmanFilter as an extended one: H at the prediction, z + H x - h(x) in place of z, one
-/// correction for each sensor.
+/// cv::KalmanFilter as an extended Kalman filter: H at the prediction, z + H x - h(x) in place of
+/// z, and one correction for each sensor.
 class OpenCv : public Peer {
  public:
   OpenCv() : filter_(3, 1, 0, CV_64F), z_(1, 1, CV_64F) {
@@ -36,14 +36,14 @@ class OpenCv : public Peer {
   double depth() const override { return filter_.statePost.at<double>(0); }
 
  private:
-  void Correct(double z, double h, double by_depth, double by_lambda, double variance) {
+  void Correct(double z, double h, double d_depth, double d_lambda, double variance) {
     double* const row = filter_.measurementMatrix.ptr<double>(0);
-    row[0] = by_depth;
+    row[0] = d_depth;
     row[1] = 0.0;
-    row[2] = by_lambda;
+    row[2] = d_lambda;
     filter_.measurementNoiseCov.at<double>(0) = variance;
     const double* const x = filter_.statePre.ptr<double>(0);
-    z_.at<double>(0) = z - h + by_depth * x[0] + by_lambda * x[2];
+    z_.at<double>(0) = z - h + d_depth * x[0] + d_lambda * x[2];
     filter_.correct(z_);
   }
 

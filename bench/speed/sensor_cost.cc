@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of Ceres on one bundle adjustment, where the costs are made of a sensor
-// model, relative to cost functions written by hand for it. 50 cameras, 2000 points, 20 000 pixels.
+// Time of an iteration of Ceres on one bundle adjustment. Its costs are made from a sensor model;
+// the reference is cost functions written by hand. 50 cameras, 2000 points, 20 000 pixels.
 #include "plugins/ceres/bundle/sensor_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -36,16 +36,16 @@ using ceres_batch::SensorCost;
 constexpr double kFocal = 500.0;  // px
 constexpr int kPose = 7;          // position, world_from_cam
 
-/// z = f (hx, hy) / hz,  h = R_CW (p - r): the model, without analytic Jacobians.
+/// z = f (hx, hy) / hz,  h = R_CW (p - r): model without analytic Jacobians.
 struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position"}, Quantity{"orientation"},
                                      Quantity{"point"}};
   static constexpr Quantity kMeasurement{"pixel", "px", "", "u,v"};
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* point, T* z) const {
-    const T along[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
+    const T offset[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
     T h[3];
-    UnitQuaternion::RotateBack(orientation, along, h);
+    UnitQuaternion::RotateBack(orientation, offset, h);
     if (!(h[2] > T(0.0))) return false;
     const T inverse = 1.0 / h[2];  // as in the Jacobian: a compiler divides once for both
     z[0] = kFocal * (h[0] * inverse);
@@ -58,7 +58,8 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   }
 };
 
-/// A row of dz/dh by all, as the author of a model and the author of a cost both write it.
+/// Computes a row of dz/dh with respect to all roles, as the authors of a model and of a cost write
+/// it.
 inline void Row(const double* orientation, const double* h, double ax, double ay, double x,
                 double y, double* J_r, double* J_q, double* J_p) {
   const double a[3] = {ax, ay, -(ax * x + ay * y)};
@@ -69,31 +70,31 @@ inline void Row(const double* orientation, const double* h, double ax, double ay
   J_q[2] = a[0] * h[1] - a[1] * h[0];
 }
 
-/// The same with analytic Jacobians.
-struct PinholeClosed : Pinhole {
+/// The same model with analytic Jacobians.
+struct PinholeAnalytic : Pinhole {
   void Jacobian(const double* position, const double* orientation, const double* point,
                 MatrixRef J_r, MatrixRef J_q, MatrixRef J_p) const {
-    const double along[3] = {point[0] - position[0], point[1] - position[1],
-                             point[2] - position[2]};
+    const double offset[3] = {point[0] - position[0], point[1] - position[1],
+                              point[2] - position[2]};
     double h[3];
-    UnitQuaternion::RotateBack(orientation, along, h);
+    UnitQuaternion::RotateBack(orientation, offset, h);
     const double inverse = 1.0 / h[2], a = kFocal * inverse, x = h[0] * inverse, y = h[1] * inverse;
     Row(orientation, h, a, 0.0, x, y, &J_r(0, 0), &J_q(0, 0), &J_p(0, 0));
     Row(orientation, h, 0.0, a, x, y, &J_r(1, 0), &J_q(1, 0), &J_p(1, 0));
   }
 };
 
-/// r = z - h by hand, for this manifold: [J | 0].
-class ByHand final : public ceres::SizedCostFunction<2, kPose, 3> {
+/// r = z - h, written by hand for this manifold: [J | 0].
+class HandWrittenCost final : public ceres::SizedCostFunction<2, kPose, 3> {
  public:
-  explicit ByHand(const double* z) : u_(z[0]), v_(z[1]) {}
+  explicit HandWrittenCost(const double* z) : u_(z[0]), v_(z[1]) {}
   bool Evaluate(const double* const* blocks, double* r, double** j) const override {
     const double* const pose = blocks[0];
     const double* const q = pose + 3;
-    const double along[3] = {blocks[1][0] - pose[0], blocks[1][1] - pose[1],
-                             blocks[1][2] - pose[2]};
+    const double offset[3] = {blocks[1][0] - pose[0], blocks[1][1] - pose[1],
+                              blocks[1][2] - pose[2]};
     double h[3];
-    UnitQuaternion::RotateBack(q, along, h);
+    UnitQuaternion::RotateBack(q, offset, h);
     if (!(h[2] > 0.0)) return false;
     const double inverse = 1.0 / h[2], x = h[0] * inverse, y = h[1] * inverse;
     r[0] = u_ - kFocal * x;
@@ -118,10 +119,10 @@ struct Functor {
   double u, v;
   template <class T>
   bool operator()(const T* pose, const T* point, T* r) const {
-    const T along[3] = {point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]};
-    const T back[4] = {pose[3], -pose[4], -pose[5], -pose[6]};
+    const T offset[3] = {point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]};
+    const T cam_from_world[4] = {pose[3], -pose[4], -pose[5], -pose[6]};
     T h[3];
-    ceres::UnitQuaternionRotatePoint(back, along, h);
+    ceres::UnitQuaternionRotatePoint(cam_from_world, offset, h);
     if (!(h[2] > T(0.0))) return false;
     const T inverse = kFocal / h[2];
     r[0] = u - inverse * h[0];
@@ -130,9 +131,9 @@ struct Functor {
   }
 };
 
-/// Cameras on a circle that look at points in a ball; values 1 % off the truth, pixels 0.5 px.
+/// Cameras on a circle that look at points in a ball. Values start 1 % off the truth; noise 0.5 px.
 struct Scene {
-  static constexpr int kCameras = 50, kPoints = 2000, kSeen = 10;
+  static constexpr int kCameras = 50, kPoints = 2000, kViewsPerPoint = 10;
   struct Pixel {
     int camera, point;
     double z[2];
@@ -156,7 +157,7 @@ struct Scene {
     }
     const Pinhole model;
     for (int i = 0; i < kPoints; ++i) {
-      for (int k = 0; k < kSeen; ++k) {
+      for (int k = 0; k < kViewsPerPoint; ++k) {
         Pixel pixel{(7 * i + 5 * k) % kCameras, i, {}};
         const double* const pose = &poses[static_cast<std::size_t>(kPose * pixel.camera)];
         if (!model.Predict(pose, pose + 3, &points[static_cast<std::size_t>(3 * i)], pixel.z))
@@ -169,13 +170,13 @@ struct Scene {
   }
 };
 
-/// One way to make costs, and its problem. The values are its own.
+/// Problem with one way to make costs, and with its own values.
 class Adjustment {
  public:
-  using Make = std::function<ceres::CostFunction*(const double* z)>;
+  using MakeCost = std::function<ceres::CostFunction*(const double* z)>;
   using MakeManifold = std::function<ceres::Manifold*()>;
 
-  Adjustment(const Scene& scene, ceres::LinearSolverType solver, const Make& make,
+  Adjustment(const Scene& scene, ceres::LinearSolverType solver, const MakeCost& make,
              const MakeManifold& manifold)
       : scene_(scene), solver_(solver), poses_(scene.poses), points_(scene.points) {
     for (const Scene::Pixel& pixel : scene.pixels) {
@@ -189,8 +190,9 @@ class Adjustment {
     problem_.SetParameterBlockConstant(poses_.data());
   }
 
-  /// Three iterations from the start, ms of CPU time each: further on, at the minimum, rounding
-  /// decides whether a step succeeds and so asks for Jacobians.
+  /// Runs three iterations from the start, and returns ms of CPU time per iteration. More
+  /// iterations would reach the minimum, at which rounding decides whether a step succeeds and
+  /// needs Jacobians.
   double Iterate() {
     poses_ = scene_.poses;
     points_ = scene_.points;
@@ -214,12 +216,13 @@ class Adjustment {
     jacobian_evaluations_ = summary.num_jacobian_evaluations;
     return ms / static_cast<double>(summary.iterations.size() - 1);
   }
-  /// Residuals and Jacobians of all pixels once; ns each.
+  /// Evaluates residuals and Jacobians of all pixels once, and returns ns per pixel.
   double Evaluate() {
     double r[2], pose[2 * kPose], point[6];
     double* jacobians[] = {pose, point};
     const double start = CpuNs();
-    for (const Cost& one : costs_) sum_ += one.cost->Evaluate(one.blocks, r, jacobians) ? r[0] : 0;
+    for (const Cost& cost : costs_)
+      sum_ += cost.cost->Evaluate(cost.blocks, r, jacobians) ? r[0] : 0;
     return (CpuNs() - start) / static_cast<double>(costs_.size());
   }
   double cost() const { return cost_; }
@@ -244,75 +247,79 @@ double QuantileOf(std::vector<double> values, double q) {
   return Quantile(values, q);
 }
 
-/// The ways to make costs: each adaptor and what it is compared with.
-struct Ways {
-  PinholeClosed analytic;
+/// Contenders: each way to make costs, and its peer.
+struct Contenders {
+  PinholeAnalytic analytic;
   Pinhole automatic;
   SharedSensor abi_analytic = MakeSensor(analytic, "analytic");
   SharedSensor abi_automatic = MakeSensor(automatic, "automatic");
   std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
-  std::vector<double> plain{1.0, 0.0, 0.0, 1.0};  // W of 1 px
-  CostKind<PinholeClosed> analytic_kind{analytic, places, {kPose, 3}, plain};
-  CostKind<Pinhole> automatic_kind{automatic, places, {kPose, 3}, plain};
-  CostKind<SensorModel> abi_analytic_kind{*abi_analytic, places, {kPose, 3}, plain};
-  CostKind<SensorModel> abi_automatic_kind{*abi_automatic, places, {kPose, 3}, plain};
+  std::vector<double> identity_weight{1.0, 0.0, 0.0, 1.0};  // W of 1 px
+  CostKind<PinholeAnalytic> analytic_kind{analytic, places, {kPose, 3}, identity_weight};
+  CostKind<Pinhole> automatic_kind{automatic, places, {kPose, 3}, identity_weight};
+  CostKind<SensorModel> abi_analytic_kind{*abi_analytic, places, {kPose, 3}, identity_weight};
+  CostKind<SensorModel> abi_automatic_kind{*abi_automatic, places, {kPose, 3}, identity_weight};
 
-  static ceres::Manifold* Tangent() {
+  static ceres::Manifold* TangentManifold() {
     return new GeometryManifold(
         {{Geometry::Vector(3), false}, {Geometry::UnitQuaternion(), false}});
   }
-  static ceres::Manifold* Ambient() {
+  static ceres::Manifold* AmbientManifold() {
     return new ceres::ProductManifold<ceres::EuclideanManifold<3>, ceres::QuaternionManifold>();
   }
-  struct Way {
+  struct Contender {
     const char* name;
-    std::size_t peer;  ///< the way it is compared with
-    Adjustment::Make make;
+    std::size_t peer;  ///< the contender it is compared with
+    Adjustment::MakeCost make;
     Adjustment::MakeManifold manifold;
   };
-  std::vector<Way> all = {
-      {"by hand", 0, [](const double* z) { return new ByHand(z); }, Tangent},
+  std::vector<Contender> all = {
+      {"by hand", 0, [](const double* z) { return new HandWrittenCost(z); }, TangentManifold},
       {"analytic, static", 0, [this](const double* z) { return new SensorCost(analytic_kind, z); },
-       Tangent},
+       TangentManifold},
       {"analytic, plugin", 0,
-       [this](const double* z) { return new SensorCost(abi_analytic_kind, z); }, Tangent},
-      {"by hand, again", 0, [](const double* z) { return new ByHand(z); }, Tangent},
+       [this](const double* z) { return new SensorCost(abi_analytic_kind, z); }, TangentManifold},
+      {"by hand, again", 0, [](const double* z) { return new HandWrittenCost(z); },
+       TangentManifold},
       {"ceres::AutoDiffCostFunction", 4,
        [](const double* z) {
          return new ceres::AutoDiffCostFunction<Functor, 2, kPose, 3>(new Functor{z[0], z[1]});
        },
-       Ambient},
+       AmbientManifold},
       {"automatic, static", 4,
-       [this](const double* z) { return new SensorCost(automatic_kind, z); }, Tangent},
+       [this](const double* z) { return new SensorCost(automatic_kind, z); }, TangentManifold},
       {"automatic, plugin", 4,
-       [this](const double* z) { return new SensorCost(abi_automatic_kind, z); }, Tangent},
+       [this](const double* z) { return new SensorCost(abi_automatic_kind, z); }, TangentManifold},
   };
 };
 
-/// What was measured of one way.
+/// Times of one contender.
 struct Times {
   std::vector<double> ms;      ///< of an iteration
   std::vector<double> ns;      ///< of an evaluation
-  std::vector<double> ratios;  ///< of iterations to the peer's
+  std::vector<double> ratios;  ///< of iterations, relative to the peer
 };
 
 int Main(int rounds) {
   const Scene scene;
-  const Ways ways;
+  const Contenders contenders;
   for (const auto solver : {ceres::DENSE_SCHUR, ceres::SPARSE_SCHUR}) {
     std::vector<std::unique_ptr<Adjustment>> adjustments;
-    for (const Ways::Way& way : ways.all)
-      adjustments.push_back(std::make_unique<Adjustment>(scene, solver, way.make, way.manifold));
-    std::vector<Times> times(ways.all.size());
+    for (const Contenders::Contender& contender : contenders.all)
+      adjustments.push_back(
+          std::make_unique<Adjustment>(scene, solver, contender.make, contender.manifold));
+    std::vector<Times> times(contenders.all.size());
     const auto iterate = [&](std::size_t i) {
       times[i].ms.push_back(adjustments[i]->Iterate());
       return times[i].ms.back();
     };
     for (int round = 0; round < rounds; ++round) {
       for (std::size_t i = 0; i < times.size(); ++i) {
-        // Twice between two of the peer: a machine that becomes slower or faster cancels.
-        const double before = iterate(ways.all[i].peer), first = iterate(i), second = iterate(i);
-        times[i].ratios.push_back((first + second) / (before + iterate(ways.all[i].peer)));
+        // Two iterations between two of the peer, so that changes of the machine's speed cancel.
+        const double peer_before = iterate(contenders.all[i].peer), first = iterate(i),
+                     second = iterate(i);
+        times[i].ratios.push_back((first + second) /
+                                  (peer_before + iterate(contenders.all[i].peer)));
       }
       for (std::size_t i = 0; i < times.size(); ++i)
         times[i].ns.push_back(adjustments[i]->Evaluate());
@@ -321,17 +328,17 @@ int Main(int rounds) {
                 "ms/iteration", "ns/cost", "ratio (10 % to 90 %)");
     for (std::size_t i = 0; i < times.size(); ++i) {
       if (std::abs(adjustments[i]->cost() / adjustments[0]->cost() - 1.0) > 1e-6) {
-        std::fprintf(stderr, "error: %s ends at cost %.12g, by hand at %.12g\n", ways.all[i].name,
-                     adjustments[i]->cost(), adjustments[0]->cost());
+        std::fprintf(stderr, "error: %s ends at cost %.12g, by hand at %.12g\n",
+                     contenders.all[i].name, adjustments[i]->cost(), adjustments[0]->cost());
         return 1;
       }
       if (adjustments[i]->jacobian_evaluations() != adjustments[0]->jacobian_evaluations()) {
         std::fprintf(stderr, "error: %s evaluates Jacobians %d times, by hand %d times\n",
-                     ways.all[i].name, adjustments[i]->jacobian_evaluations(),
+                     contenders.all[i].name, adjustments[i]->jacobian_evaluations(),
                      adjustments[0]->jacobian_evaluations());
         return 1;
       }
-      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
+      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", contenders.all[i].name,
                   QuantileOf(times[i].ms, 0.5), QuantileOf(times[i].ns, 0.5),
                   QuantileOf(times[i].ratios, 0.5), QuantileOf(times[i].ratios, 0.1),
                   QuantileOf(times[i].ratios, 0.9));
@@ -344,7 +351,8 @@ int Main(int rounds) {
 }  // namespace alidade::bench
 
 int main(int argc, char** argv) {
-  CLI::App app{"Time of an iteration of Ceres on costs made of sensor models, relative to others."};
+  CLI::App app{
+      "Time of an iteration of Ceres on costs made from sensor models, relative to others."};
   int rounds = 15;
   app.add_option("--rounds", rounds,
                  "Comparisons of each contender with its peer: two solves of three iterations each")

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a whole frame of the EKF at the size of SLAM: a camera of 13 numbers, N landmarks in
-// inverse depth, of which some are observed, beside
+// Time of a whole frame of the EKF at the size of SLAM: a camera with 13 numbers and N landmarks in
+// inverse depth, some of which are observed, compared with
 //
 //   peak      the operations of the update alone, at the rate at which this processor multiplies
-//             and adds, measured in turns with frames and nothing else
-//   mrpt      mrpt::bayes::CKalmanFilterCapable, where it is installed, to 300 landmarks
-//   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
+//             and adds, measured in turn with frames and nothing else
+//   mrpt      mrpt::bayes::CKalmanFilterCapable, if it is installed, up to 300 landmarks
+//   textbook  the update with dense H in Eigen, as compiled by this build: K = P H' S^-1,
 //             P = (I - K H) P
 //   joseph    the same with P = (I - K H) P (I - K H)' + K R K'
-//   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, where it is installed; none
-//             of what else there is to a frame. OPENBLAS_CORETYPE tells it a processor that it does
-//             not know.
+//   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, if it is installed, without
+//             the other parts of a frame. OPENBLAS_CORETYPE selects the type of a processor that
+//             OpenBLAS does not detect.
 //
-// The others are measured in turns with frames too, which find the caches emptied by them.
+// The others are also measured in turn with frames, so that frames find the caches emptied by them.
 //
-// Then the exponents of time over states: of a step, of a frame that measures 20 landmarks, and of
-// dropping a landmark and initialising another.
+// Then it prints the exponents of time over the number of states: for a step, for a frame that
+// measures 20 landmarks, and for removing a landmark and initialising another.
 //
 //   bench_slam [--size N/observed ...] [--no-exponents]
 #include <CLI/CLI.hpp>
@@ -79,8 +79,8 @@ sensors:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// The filter, and frames of a camera that sways before a box of points. It looks at `observed` of
-/// them, from one frame to the next at as many others.
+/// Filter, and frames of a camera that oscillates in front of a box of points. Each frame observes
+/// the next `observed` points.
 class Slam {
  public:
   Slam(const PluginHost& host, const Config& config, int landmarks, int observed)
@@ -91,21 +91,21 @@ class Slam {
                          2.0 + 2.0 * random.Uniform()});
     }
     stream_ = filter_->stream("tracks");
-    Take(landmarks);
-    for (int i = 0; i < 3; ++i) Take(observed_);
+    ProcessFrame(landmarks);
+    for (int i = 0; i < 3; ++i) ProcessFrame(observed_);
   }
 
-  void operator()() { Take(observed_); }
+  void operator()() { ProcessFrame(observed_); }
   void Step() { filter_->Push(NextTime(), {}); }
   long size() const { return filter_->state().covariance().size(); }
-  bool used_all() const { return used_ == taken_; }
+  bool has_used_all() const { return used_count_ == measured_; }
   const Filter& filter() const { return *filter_; }
 
  private:
   Timestamp NextTime() { return TimestampFromSeconds(count_++ / 30.0); }
-  void Take(int count) {
-    const Timestamp at = NextTime();
-    const double t = Seconds(at);
+  void ProcessFrame(int count) {
+    const Timestamp timestamp = NextTime();
+    const double t = Seconds(timestamp);
     const double x = 0.2 * std::sin(t), y = 0.1 * std::sin(1.3 * t);
     const long first = static_cast<long>(observed_) * count_;
     std::vector<Reading> readings;
@@ -116,26 +116,26 @@ class Slam {
                           {320.0 + 525.0 * (p[0] - x) / p[2], 240.0 + 525.0 * (p[1] - y) / p[2]},
                           static_cast<std::int64_t>(i)});
     }
-    const UpdateReport& report = filter_->Push(at, readings);
+    const UpdateReport& report = filter_->Push(timestamp, readings);
     for (const MeasurementReport& entry : report.measurements()) {
-      taken_ += 1;
-      used_ += entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised;
+      measured_ += 1;
+      used_count_ += entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised;
     }
   }
 
   std::unique_ptr<Filter> filter_;
   std::vector<std::array<double, 3>> points_;
   int observed_, stream_ = 0, count_ = 0;
-  long taken_ = 0, used_ = 0;
+  long measured_ = 0, used_count_ = 0;
 };
 
-/// Operations, multiplications and additions, of an update of n states by m rows whose H has 12
-/// numbers each: P H', S, its factor, W = P H' L^-T, the lower triangle of P - W W'.
+/// Returns the number of multiplications and additions of an update of n states by m rows whose H
+/// has 12 numbers each: P H', S, its factor, W = P H' L^-T, the lower triangle of P - W W'.
 double UpdateOperations(double n, double m) {
   return 2.0 * 12.0 * n * m + 12.0 * m * m + m * m * m / 3.0 + n * m * m + n * n * m;
 }
 
-/// Multiplications with additions in registers.
+/// Multiplications and additions in registers.
 template <int kLanes>
 struct Multiply {
   using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -173,7 +173,7 @@ Peak PeakOf(const std::string& kernels) {
   return {};
 }
 
-/// The update as books write it.
+/// Update as in textbooks.
 struct Dense {
   Eigen::MatrixXd p, h, r;
   Dense(long n, long m)
@@ -196,7 +196,7 @@ struct Dense {
 };
 
 #ifdef ALIDADE_BENCH_OPENBLAS
-/// Of an update by m rows of n states: the factor, the division and the product.
+/// Update of n states by m rows: the factor, the division and the product.
 struct OpenBlas {
   Eigen::MatrixXd p, pht, s, w, l;
   OpenBlas(long n, long m)
@@ -209,14 +209,14 @@ struct OpenBlas {
     const auto n = static_cast<int>(w.rows()), m = static_cast<int>(w.cols());
     int info = 0;
     dpotrf_("L", &m, l.data(), &m, &info);
-    const double one = 1.0, minus = -1.0;
-    dtrsm_("R", "L", "T", "N", &n, &m, &one, l.data(), &m, w.data(), &n);
-    dsyrk_("L", "N", &n, &m, &minus, w.data(), &n, &one, p.data(), &n);
+    const double plus_one = 1.0, minus_one = -1.0;
+    dtrsm_("R", "L", "T", "N", &n, &m, &plus_one, l.data(), &m, w.data(), &n);
+    dsyrk_("L", "N", &n, &m, &minus_one, w.data(), &n, &plus_one, p.data(), &n);
   }
 };
 #endif
 
-/// A camera and N landmarks, of which one is dropped and another initialised, in turn.
+/// State of a camera and N landmarks. Each call removes one landmark and initialises another.
 class Exchange {
  public:
   explicit Exchange(int landmarks) : landmarks_(static_cast<std::size_t>(landmarks)) {
@@ -236,7 +236,7 @@ class Exchange {
   static constexpr int kCamera = 12, kLandmark = 6;
   BlockId Initialise() {
     const BlockId id = state_.Declare("landmarks." + std::to_string(names_++), "landmarks", space_);
-    state_.Initialise({&id, 1}, value_.data(), {&camera_, 1}, jacobian_, own_);
+    state_.Initialise({&id, 1}, value_.data(), {&camera_, 1}, jacobian_, block_covariance_);
     return id;
   }
 
@@ -248,10 +248,10 @@ class Exchange {
   const Space space_{"landmark", "", "", {}, Geometry::Vector(kLandmark)};
   const std::array<double, kLandmark> value_{};
   const RowMajor jacobian_ = RowMajor::Random(kLandmark, kCamera);
-  const Eigen::MatrixXd own_ = Eigen::MatrixXd::Identity(kLandmark, kLandmark);
+  const Eigen::MatrixXd block_covariance_ = Eigen::MatrixXd::Identity(kLandmark, kLandmark);
 };
 
-/// The update of n states by m rows in other ways.
+/// Returns other implementations of the update of n states by m rows.
 std::vector<Contender> PeersOf([[maybe_unused]] int landmarks, [[maybe_unused]] int observed,
                                long n, long m) {
   std::vector<Contender> peers;
@@ -282,13 +282,13 @@ void CompareSize(const PluginHost& host, const Config& config, const std::string
   volatile double sink = 0.0;
   std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
                                        {"frame", [&] { slam(); }, 1.0, {}}};
-  // By themselves: dense matrices leave nothing in the caches.
+  // Without peers: their dense matrices would empty the caches.
   Interleave(contenders, 4 * rounds);
-  const double least = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
-                       peak.operations * contenders[0].Quantile(0.01);
-  std::printf("%s: %ld states, %ld rows, %.3f ms a frame\n", size.c_str(), n, m,
+  const double peak_ns = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
+                         peak.operations * contenders[0].Quantile(0.01);
+  std::printf("%s: %ld states, %ld rows, %.3f ms per frame\n", size.c_str(), n, m,
               1e-6 * contenders[1].Quantile(0.5));
-  std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / least);
+  std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / peak_ns);
   contenders[1].ns.clear();
   if (peers) {
     for (Contender& peer : PeersOf(landmarks, observed, n, m)) {
@@ -296,13 +296,13 @@ void CompareSize(const PluginHost& host, const Config& config, const std::string
     }
   }
   if (contenders.size() > 2) Interleave(contenders, rounds);
-  if (!slam.used_all()) throw std::runtime_error("not every measurement was used");
+  if (!slam.has_used_all()) throw std::runtime_error("not every measurement was used");
   for (std::size_t i = 2; i < contenders.size(); ++i) {
     PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
   }
 }
 
-/// The slope of log(time) over log(states), by least squares.
+/// Prints the slope of log(time) over log(states), by least squares.
 void PrintExponent(const char* name, const std::vector<long>& states,
                    const std::vector<Contender>& contenders) {
   const auto count = static_cast<double>(states.size());
@@ -327,15 +327,16 @@ void CompareSizes(const PluginHost& host, const Config& config, int rounds) {
   for (const int size : kSizes) {
     Slam* const slam =
         slams.emplace_back(std::make_unique<Slam>(host, config, size, kObserved)).get();
-    Exchange* const one = exchanges.emplace_back(std::make_unique<Exchange>(size)).get();
+    Exchange* const landmark_exchange =
+        exchanges.emplace_back(std::make_unique<Exchange>(size)).get();
     states.push_back(slam->size());
     step.push_back({"step", [slam] { slam->Step(); }, 1.0, {}});
     frame.push_back({"frame", [slam] { (*slam)(); }, 1.0, {}});
-    exchange.push_back({"exchange", [one] { (*one)(); }, 1.0, {}});
+    exchange.push_back({"exchange", [landmark_exchange] { (*landmark_exchange)(); }, 1.0, {}});
   }
   Interleave(frame, rounds);
   for (const auto& slam : slams) {
-    if (!slam->used_all()) throw std::runtime_error("not every measurement was used");
+    if (!slam->has_used_all()) throw std::runtime_error("not every measurement was used");
   }
   Interleave(step, 10 * rounds);
   Interleave(exchange, 10 * rounds);
@@ -345,7 +346,8 @@ void CompareSizes(const PluginHost& host, const Config& config, int rounds) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("A frame of an EKF at the size of SLAM, relative to the peak of the processor");
+  CLI::App app(
+      "Time per frame of an EKF at the size of SLAM, relative to the peak of the processor");
   int rounds = 15;
   bool peers = true;
   std::vector<std::string> sizes = {"30/20", "100/20", "300/20", "1000/20", "100/100", "300/300"};
@@ -353,9 +355,10 @@ int Main(int argc, char** argv) {
   app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
   std::vector<std::string> settings;
   app.add_option("--set", settings, "KEY=VALUE of the config");
-  app.add_flag("--peers,!--no-peers", peers, "the dense update and other libraries too");
+  app.add_flag("--peers,!--no-peers", peers, "also measure the dense update and other libraries");
   bool exponents = true;
-  app.add_flag("--exponents,!--no-exponents", exponents, "of time over states too");
+  app.add_flag("--exponents,!--no-exponents", exponents,
+               "also measure the exponents of time over states");
   CLI11_PARSE(app, argc, argv);
 
   const testing::TemporaryFolder temporary;
@@ -364,7 +367,7 @@ int Main(int argc, char** argv) {
   Config config = Config::FromFile(file);
   for (const std::string& setting : settings) {
     const std::size_t equals = setting.find('=');
-    if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
+    if (equals == setting.npos) throw std::runtime_error("--set expects KEY=VALUE");
     config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
   }
   const PluginHost host;

@@ -5,16 +5,16 @@
 
 namespace alidade::bench {
 
-/// Another library's EKF with a camera of 12 and landmarks of 6 rows in its covariance. Its models
-/// are constants, which cost nothing: what it takes is its own arithmetic.
+/// EKF of another library with 12 rows for the camera and 6 for each landmark in its covariance.
+/// Its models are constants, which take no time: only its own arithmetic is measured.
 class SlamPeer {
  public:
   virtual ~SlamPeer() = default;
-  /// A prediction and an update by two numbers of each of the landmarks that are observed.
+  /// Runs a prediction, and an update by two numbers of each observed landmark.
   virtual void Frame() = 0;
 };
 
-// Where the library is installed. The faster of its modes of updating.
+// Built if the library is installed. Uses the faster one of its modes of updating.
 std::unique_ptr<SlamPeer> MakeMrptSlam(int landmarks, int observed);
 
 }  // namespace alidade::bench

@@ -33,36 +33,36 @@ class Mrpt : public SlamPeer, public mrpt::bayes::CKalmanFilterCapable<12, 2, 6,
   }
   void OnGetObservationNoise(KFMatrix_OxO& r) const override { r.setIdentity(); }
   void OnPreComputingPredictions(const vector_KFArray_OBS&,
-                                 std::vector<std::size_t>& seen) const override {
-    seen.clear();
+                                 std::vector<std::size_t>& observed) const override {
+    observed.clear();
     for (int i = 0; i < observed_; ++i) {
-      seen.push_back(static_cast<std::size_t>((first_ + i) % landmarks_));
+      observed.push_back(static_cast<std::size_t>((first_ + i) % landmarks_));
     }
   }
   void OnGetObservationsAndDataAssociation(vector_KFArray_OBS& z, std::vector<int>& association,
                                            const vector_KFArray_OBS&, const KFMatrix&,
-                                           const std::vector<std::size_t>& seen,
+                                           const std::vector<std::size_t>& observed,
                                            const KFMatrix_OxO&) override {
     z.clear();
     association.clear();
-    for (const std::size_t landmark : seen) {
+    for (const std::size_t landmark : observed) {
       KFArray_OBS zero;
       zero[0] = zero[1] = 0.0;
       z.push_back(zero);
       association.push_back(static_cast<int>(landmark));
     }
   }
-  void OnObservationModel(const std::vector<std::size_t>& seen,
+  void OnObservationModel(const std::vector<std::size_t>& observed,
                           vector_KFArray_OBS& predictions) const override {
-    predictions.resize(seen.size());
-    for (KFArray_OBS& one : predictions) one[0] = one[1] = 0.1;
+    predictions.resize(observed.size());
+    for (KFArray_OBS& prediction : predictions) prediction[0] = prediction[1] = 0.1;
   }
   void OnObservationJacobians(std::size_t landmark, KFMatrix_OxV& h,
-                              KFMatrix_OxF& own) const override {
+                              KFMatrix_OxF& landmark_jacobian) const override {
     const auto number = [&](int i) { return std::sin(1.0 + static_cast<double>(landmark) + i); };
     h.setZero();
     for (int i = 0; i < 14; ++i) h(i / 7, i % 7) = number(i);
-    for (int i = 0; i < 12; ++i) own(i / 6, i % 6) = number(20 + i);
+    for (int i = 0; i < 12; ++i) landmark_jacobian(i / 6, i % 6) = number(20 + i);
   }
 
   int landmarks_, observed_, first_ = 0;

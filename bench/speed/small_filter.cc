@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of one step of a small filter, prediction and two scalar measurements with gates (the other
-// libraries have none), relative to hand-unrolled code. See depth_step.h.
+// Time of one step of a small filter: a prediction and two scalar measurements with gates, relative
+// to hand-unrolled code. The other libraries have no gates. See depth_step.h.
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 
@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kGate = 0.999;
 
-/// Everything by hand, as nobody wants to write it: the baseline.
+/// Baseline: every operation unrolled by hand, a form that is tedious to write.
 class HandUnrolled {
  public:
   void Step(double disparity, double inverse_scale) {
@@ -53,7 +53,7 @@ class HandUnrolled {
     const double al = plz_ * lambda_ + pll_ * z_;
     Correct(az, av, al, 1.0 / (az * lambda_ + al * z_ + sigma * sigma), inverse_scale - s);
   }
-  /// a = P H', 1/S, innovation.
+  /// Corrects the state, given a = P H', 1/S and the innovation.
   void Correct(double az, double av, double al, double inverse_s, double r) {
     if (!(r * r * inverse_s <= gate_)) return;
     const double k = r * inverse_s;
@@ -76,7 +76,7 @@ class HandUnrolled {
   double pzz_ = 0.01, pvz_ = 0.0, pvv_ = 0.25, plz_ = 0.0, plv_ = 0.0, pll_ = 0.25;
 };
 
-/// The textbook's matrices of fixed size, written with care.
+/// Textbook filter with carefully written matrices of fixed size.
 class FixedEigen {
  public:
   FixedEigen() {
@@ -113,10 +113,10 @@ class FixedEigen {
   Eigen::Matrix3d f_, q_, p_ = Eigen::Matrix3d::Zero();
 };
 
-/// The shipped models composed at compile time.
-class Static {
+/// Shipped models composed at compile time.
+class StaticFilter {
  public:
-  Static() {
+  StaticFilter() {
     filter_.Set<0>(0.35, 0.1);
     filter_.Set<1>(0.0, 0.5);
     filter_.Set<2>(3.3, 0.5);
@@ -136,7 +136,7 @@ class Static {
       ConstantVelocity<1, false>(kAcceleration), Constant<1>(1)};
 };
 
-/// The engine: frames in, a report of every measurement out.
+/// Filter engine: its input are frames, its output reports of all measurements.
 class Engine {
  public:
   explicit Engine(Problem problem) {
@@ -160,8 +160,8 @@ class Engine {
   Frame frame_;
 };
 
-/// The models behind the plugin ABI, as a config composes them.
-Problem ByPlugins() {
+/// Returns the problem with models behind the plugin ABI, as a config composes them.
+Problem PluginProblem() {
   Problem problem = testing::DepthFilter();
   problem.motions[0].model =
       testing::AbiMotion<ConstantVelocity<1, false>>({{"noise.acceleration", {kAcceleration}}});
@@ -173,65 +173,70 @@ Problem ByPlugins() {
   return problem;
 }
 
-/// A contender of which a chunk takes about 0.4 ms, with its depth at the end of one period.
+/// Makes a contender whose chunk takes about 0.4 ms. Appends its depth at the end of one period.
 template <class Filter>
-Contender Enter(const std::string& name, std::shared_ptr<Filter> filter, const Swing& swing,
-                std::vector<double>& depths) {
-  const auto steps = [filter, &swing, at = 0](int count) mutable {
+Contender MakeContender(const std::string& name, std::shared_ptr<Filter> filter,
+                        const TargetMeasurements& target, std::vector<double>& depths) {
+  const auto steps = [filter, &target, index = 0](int count) mutable {
     for (int i = 0; i < count; ++i) {
-      filter->Step(swing.disparity[static_cast<std::size_t>(at)],
-                   swing.inverse_scale[static_cast<std::size_t>(at)]);
-      at = (at + 1) % Swing::kPeriod;
+      filter->Step(target.disparity[static_cast<std::size_t>(index)],
+                   target.inverse_scale[static_cast<std::size_t>(index)]);
+      index = (index + 1) % TargetMeasurements::kPeriod;
     }
   };
   auto run = std::make_shared<std::decay_t<decltype(steps)>>(steps);
-  (*run)(Swing::kPeriod);
+  (*run)(TargetMeasurements::kPeriod);
   depths.push_back(filter->depth());
   const double start = CpuNs();
-  (*run)(Swing::kPeriod);
-  const double ns = (CpuNs() - start) / Swing::kPeriod;
+  (*run)(TargetMeasurements::kPeriod);
+  const double ns = (CpuNs() - start) / TargetMeasurements::kPeriod;
   const int count = std::max(1, static_cast<int>(4e5 / ns));
   return {name, [run, count] { (*run)(count); }, static_cast<double>(count), {}};
 }
 
 int Main(int rounds) {
-  const Swing swing;
+  const TargetMeasurements target;
   std::vector<double> depths;
-  std::vector<Contender> all;
-  all.push_back(Enter("hand-unrolled (baseline)", std::make_shared<HandUnrolled>(), swing, depths));
-  all.push_back(Enter("Eigen, fixed size, by hand", std::make_shared<FixedEigen>(), swing, depths));
-  all.push_back(Enter("alidade, static", std::make_shared<Static>(), swing, depths));
-  all.push_back(Enter("alidade, models in process",
-                      std::make_shared<Engine>(testing::DepthFilter()), swing, depths));
-  all.push_back(Enter("alidade, plugins", std::make_shared<Engine>(ByPlugins()), swing, depths));
+  std::vector<Contender> contenders;
+  contenders.push_back(
+      MakeContender("hand-unrolled (baseline)", std::make_shared<HandUnrolled>(), target, depths));
+  contenders.push_back(
+      MakeContender("Eigen, fixed size, by hand", std::make_shared<FixedEigen>(), target, depths));
+  contenders.push_back(
+      MakeContender("alidade, static", std::make_shared<StaticFilter>(), target, depths));
+  contenders.push_back(MakeContender("alidade, models in process",
+                                     std::make_shared<Engine>(testing::DepthFilter()), target,
+                                     depths));
+  contenders.push_back(
+      MakeContender("alidade, plugins", std::make_shared<Engine>(PluginProblem()), target, depths));
   std::vector<std::string> peers;
-  const auto enter = [&](const char* name, const char* text, std::shared_ptr<Peer> peer) {
+  const auto add_peer = [&](const char* name, const char* text, std::shared_ptr<Peer> peer) {
     peers.emplace_back(name);
-    all.push_back(Enter(text, std::move(peer), swing, depths));
+    contenders.push_back(MakeContender(text, std::move(peer), target, depths));
   };
 #if defined(ALIDADE_BENCH_OPENCV)
-  enter("opencv", "OpenCV KalmanFilter, two corrections", MakeOpenCv());
+  add_peer("opencv", "OpenCV KalmanFilter, two corrections", MakeOpenCv());
 #endif
 #if defined(ALIDADE_BENCH_BFL)
-  enter("bfl", "Orocos BFL, two updates", MakeBfl());
+  add_peer("bfl", "Orocos BFL, two updates", MakeBfl());
 #endif
 #if defined(ALIDADE_BENCH_MRPT)
-  enter("mrpt", "MRPT, one observation of two", MakeMrpt());
+  add_peer("mrpt", "MRPT, one observation of two numbers", MakeMrpt());
 #endif
-  // All solve the same problem; joint and sequential updates linearise at points of their own.
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  // All solve the same problem, but joint and sequential updates linearise at different points.
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
     if (std::abs(depths[i] - depths[0]) < 1e-3) continue;
     std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the baseline at %.9f m\n",
-                 all[i].name.c_str(), depths[i], depths[0]);
+                 contenders[i].name.c_str(), depths[i], depths[0]);
     return 1;
   }
-  Interleave(all, rounds);
-  PrintTable(all);
-  PrintRatio("static/baseline", all[2], all[0]);
-  PrintRatio("direct/baseline", all[3], all[0]);
-  PrintRatio("plugin/baseline", all[4], all[0]);
+  Interleave(contenders, rounds);
+  PrintTable(contenders);
+  PrintRatio("static/baseline", contenders[2], contenders[0]);
+  PrintRatio("direct/baseline", contenders[3], contenders[0]);
+  PrintRatio("plugin/baseline", contenders[4], contenders[0]);
   for (std::size_t i = 0; i < peers.size(); ++i) {
-    PrintRatio(peers[i] + "/plugin", all[5 + i], all[4]);
+    PrintRatio(peers[i] + "/plugin", contenders[5 + i], contenders[4]);
   }
   return 0;
 }

@@ -256,8 +256,8 @@ class TargetTracker {
     return std::abs((in_rays * (ray * (1.0 / ray[2])))[2]) / values.at<double>(1);
   }
 
-  /// Records a new template if none has fitted well for some images, or if the target is much
-  /// larger or smaller than in the current template. A blurred template is not used.
+  /// Records a new template if no template has fitted well for some images, or if the target is
+  /// much larger or smaller than in the current template. A blurred template is not used.
   void Refresh(const Fit& fit) {
     constexpr int kMisfits = 3;
     constexpr double kSharp = 0.4;

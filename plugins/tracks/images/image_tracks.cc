@@ -58,8 +58,8 @@ class ImageTracks : public Source {
     if (const auto known = arguments.entry.Find("known")) {
       ReadKnown(arguments.folder / known->Text(), *known);
     }
-    guided_by_ = text("guide", "none");
-    if (guided_by_ == "none") guided_by_.clear();
+    guide_name_ = text("guide", "none");
+    if (guide_name_ == "none") guide_name_.clear();
     const std::string state = text("state_entry", "cam");
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
     camera_ = CameraSize(arguments, *this);
@@ -81,7 +81,7 @@ class ImageTracks : public Source {
     return ReadCalibrationFile(*calibration_);
   }
 
-  std::string guide_name() const override { return guided_by_; }
+  std::string guide_name() const override { return guide_name_; }
   void SetGuide(const Guide* guide) override { guide_ = guide; }
 
   bool Next(SourceFrame& frame) override {
@@ -244,7 +244,7 @@ class ImageTracks : public Source {
   Timestamp tolerance_ = 0;
   std::vector<StreamInfo> streams_ = {{"tracks", 2}}, truths_;
   std::vector<Known> known_;
-  std::string known_file_, guided_by_;
+  std::string known_file_, guide_name_;
   const Guide* guide_ = nullptr;
   std::optional<ImageReader> images_;
   std::optional<ImageTimes> times_;

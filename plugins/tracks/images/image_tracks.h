@@ -13,7 +13,7 @@ namespace alidade {
 /// These files are in the folder of the images or of the video:
 ///
 ///   times        `timestamps.csv` (`frame,t_s`, frames counted from 0), or a table that
-///                ImageTimes::FindNextTo() knows; else image k has the time k / rate_hz
+///                ImageTimes::FindNextTo() reads; else image k has the time k / rate_hz
 ///   true poses   `groundtruth.tum` or `truth.tum` (world_from_cam), or TUM's `groundtruth.txt`
 ///   calibration  `calibration.yaml`, or EuRoC's `sensor.yaml`, see ReadCalibrationFile()
 ///

@@ -87,9 +87,9 @@ class Gauge {
       if (points_[i]) add(problem.points[i]);
     }
     if (distances.empty()) return 0.0;
-    const auto middle = distances.begin() + std::ssize(distances) / 2;
-    std::ranges::nth_element(distances, middle);
-    return *middle;
+    const auto median = distances.begin() + std::ssize(distances) / 2;
+    std::ranges::nth_element(distances, median);
+    return *median;
   }
   /// Scales the used cameras and points about the first camera. No pixel changes.
   void Scale(double factor, BundleProblem& problem) const {
@@ -135,28 +135,28 @@ const char* ToString(BundleEnd end) {
 
 BundleRoles RolesOf(const SensorModel& sensor) {
   constexpr std::size_t kNone = SIZE_MAX;
-  BundleRoles found{kNone, kNone, kNone};
+  BundleRoles roles{kNone, kNone, kNone};
   for (std::size_t i = 0; i < sensor.roles().size(); ++i) {
     const Space& role = sensor.roles()[i];
     if (role.name == "position") {
-      found.position = i;
+      roles.position = i;
     } else if (role.name == "orientation") {
-      found.orientation = i;
+      roles.orientation = i;
     } else if (role.name == "intrinsics") {
-      found.intrinsics = static_cast<int>(i);
-    } else if (found.point == kNone && role.geometry == Geometry::Vector(3)) {
-      found.point = i;
+      roles.intrinsics = static_cast<int>(i);
+    } else if (roles.point == kNone && role.geometry == Geometry::Vector(3)) {
+      roles.point = i;
     } else {
       FailRoles(sensor, "it has the additional role '" + role.name + "'");
     }
   }
-  if (std::max({found.position, found.orientation, found.point}) == kNone)
+  if (std::max({roles.position, roles.orientation, roles.point}) == kNone)
     FailRoles(sensor, "it lacks one of position, orientation and a point");
   const Geometry& z = sensor.measurement().geometry;
   if (z.kind != GeometryKind::kVector || z.ambient > 4)
     FailRoles(sensor, "it measures " + ToString(z));
-  if (sensor.known_size() > 0) FailRoles(sensor, "it takes known numbers with each measurement");
-  return found;
+  if (sensor.known_size() > 0) FailRoles(sensor, "it needs known numbers with each measurement");
+  return roles;
 }
 
 std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,

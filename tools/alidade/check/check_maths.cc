@@ -140,15 +140,15 @@ std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedSta
   const Values inputs = Context::Inputs(context.main(), state);
   const Values blocks(inputs.begin(),
                       inputs.begin() + static_cast<std::ptrdiff_t>(context.main().outputs.size()));
-  std::optional<PartsDefect> least;
+  std::optional<PartsDefect> smallest;
   for (const double scale : {1e-3, 1e-6, 1e-9}) {
     const auto defect = DefectOfParts(context, inputs, blocks, scale * inputs.back()[0]);
     if (!defect) continue;
-    if (!least) least = defect;
-    least->discrete = std::min(least->discrete, defect->discrete);
-    least->continuous = std::min(least->continuous, defect->continuous);
+    if (!smallest) smallest = defect;
+    smallest->discrete = std::min(smallest->discrete, defect->discrete);
+    smallest->continuous = std::min(smallest->continuous, defect->continuous);
   }
-  return least;
+  return smallest;
 }
 
 /// Describes the remedy for noise that is not of the declared kind.
@@ -290,14 +290,14 @@ Finding CheckStep(Context& context) {
     }
     const auto split = TestAdditivity(context, f, inputs, blocks, dt_s);
     if (!split) continue;
-    const double before = additive.ratio;
+    const double previous_ratio = additive.ratio;
     additive.Add(split->defect, kRounding * split->size, [&] {
       return context.CallText(f, state) +
              ", w = 0: one step over dt and two steps over its parts end " +
              RoundedText(split->defect) + " apart in " +
              names[static_cast<std::size_t>(split->row)];
     });
-    if (additive.ratio > before) order = OrderOf(context, f, inputs, blocks);
+    if (additive.ratio > previous_ratio) order = OrderOf(context, f, inputs, blocks);
   }
   if (!identity.failure.empty()) return Fail(identity.failure);
   if (additive.failure.empty()) return Ok("additive in dt, and the identity for dt = 0");
@@ -327,8 +327,8 @@ Finding CheckNoiseKind(Context& context) {
     const auto defect = LimitOfParts(context, state);
     if (!defect) continue;
     has_noise = true;
-    const double before = discrete ? worst.discrete : worst.continuous;
-    if ((discrete ? defect->discrete : defect->continuous) > before) {
+    const double previous_worst = discrete ? worst.discrete : worst.continuous;
+    if ((discrete ? defect->discrete : defect->continuous) > previous_worst) {
       worst_call = context.CallText(context.main(), state);
     }
     worst.discrete = std::max(worst.discrete, defect->discrete);

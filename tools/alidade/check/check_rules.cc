@@ -63,10 +63,10 @@ struct NumberSettings {
 };
 
 /// Describes a changed setting; "" if none has changed.
-std::string ChangeBetween(const NumberSettings& before, const NumberSettings& now) {
-  if (now.rounding != before.rounding) return "changed the rounding mode";
-  if (now.locale != before.locale || now.thread_locale != before.thread_locale) {
-    return "changed the locale from '" + before.locale + "' to '" + now.locale + "'";
+std::string ChangeBetween(const NumberSettings& previous, const NumberSettings& current) {
+  if (current.rounding != previous.rounding) return "changed the rounding mode";
+  if (current.locale != previous.locale || current.thread_locale != previous.thread_locale) {
+    return "changed the locale from '" + previous.locale + "' to '" + current.locale + "'";
   }
   return {};
 }
@@ -178,9 +178,9 @@ Finding CheckBounds(Context& context) {
 }
 
 Finding CheckEnvironment(Context& context) {
-  const NumberSettings before;
+  const NumberSettings previous;
   const auto changed = [&](const std::string& call) {
-    const std::string change = ChangeBetween(before, NumberSettings());
+    const std::string change = ChangeBetween(previous, NumberSettings());
     return change.empty() ? change : call + ' ' + change;
   };
   std::unique_ptr<ModelUnderTest> second_instance = context.Create();

@@ -164,9 +164,9 @@ std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
 /// Returns a header, and a row for each evaluation.
 std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evaluations) {
   internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
-  for (const char* what : {"ATE", "RPE"}) {
+  for (const char* kind : {"ATE", "RPE"}) {
     for (const PoseRelation relation : evaluations.front().options.relations) {
-      header.push_back(WithUnit(std::string(what) + ' ' + ToString(relation), UnitOf(relation)));
+      header.push_back(WithUnit(std::string(kind) + ' ' + ToString(relation), UnitOf(relation)));
     }
   }
   const bool nees = std::ranges::any_of(evaluations, [](const Evaluation& evaluation) {

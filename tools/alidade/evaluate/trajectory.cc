@@ -44,9 +44,9 @@ struct TimeUnit {
 /// Returns the lower median; 0 if there are no values.
 double Median(std::vector<double> values) {
   if (values.empty()) return 0.0;
-  const auto middle = values.begin() + (std::ssize(values) - 1) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto median = values.begin() + (std::ssize(values) - 1) / 2;
+  std::nth_element(values.begin(), median, values.end());
+  return *median;
 }
 
 /// Determines the unit of timestamps from the medians of their values t and differences d. It is

@@ -33,8 +33,9 @@ void AppendCovariance(const State& state, std::size_t blocks, std::vector<double
   }
   for (std::size_t i = 0; i < indices.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      const bool known = indices[i] >= 0 && indices[j] >= 0;
-      cells.push_back(known ? state.covariance().Block(indices[i], 1, indices[j], 1)(0, 0) : kNan);
+      const bool has_covariance = indices[i] >= 0 && indices[j] >= 0;
+      cells.push_back(has_covariance ? state.covariance().Block(indices[i], 1, indices[j], 1)(0, 0)
+                                     : kNan);
     }
   }
 }
@@ -79,8 +80,9 @@ void Series::Append(Timestamp timestamp, const State& state) {
       values.insert(values.end(), size, kNan);
     }
     for (int i = 0; !joint && i < block.geometry().tangent; ++i) {
-      const bool known = block.has_covariance();
-      covariances.push_back(known ? state.covariance().Variance(block.tangent_offset + i) : kNan);
+      const bool has_covariance = block.has_covariance();
+      covariances.push_back(has_covariance ? state.covariance().Variance(block.tangent_offset + i)
+                                           : kNan);
     }
   }
   if (joint) AppendCovariance(state, blocks.size(), covariances);

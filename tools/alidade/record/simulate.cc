@@ -68,8 +68,8 @@ class DataFiles {
     truth_->Time(frame.timestamp);
     for (std::size_t i = 0; i < source_.truths().size(); ++i) {
       const auto size = static_cast<std::size_t>(source_.truths()[i].size);
-      const bool known = i < frame.truth.size() && !frame.truth[i].empty();
-      truth_->Numbers(known ? frame.truth[i].data() : nullptr, known ? size : 0, size);
+      const bool is_known = i < frame.truth.size() && !frame.truth[i].empty();
+      truth_->Numbers(is_known ? frame.truth[i].data() : nullptr, is_known ? size : 0, size);
     }
     truth_->EndRow();
     if (tum_) tum_->AddTruth(frame);

@@ -91,16 +91,16 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_scale_error,
             const T* u, const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1,
             T* speed_scale_error1) const {
-    T phi[3], way[3], t[3], turned[3], displacement[3], turn[3], step[3];
+    T phi[3], way[3], t[3], rotated_t[3], displacement[3], turn[3], step[3];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
     for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_scale_error[0]) * u[i] + w[i]);
     for (std::size_t i = 0; i < 3; ++i) t[i] = mount[i] + shift[i];
     T rotation[4], mounted[4];
     UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
     UnitQuaternion::Exp(phi, rotation);
-    UnitQuaternion::Rotate(rotation, t, turned);
+    UnitQuaternion::Rotate(rotation, t, rotated_t);
     IntegrateTurn(phi, way, displacement);
-    for (int i = 0; i < 3; ++i) displacement[i] += turned[i] - t[i];
+    for (int i = 0; i < 3; ++i) displacement[i] += rotated_t[i] - t[i];
     UnitQuaternion::RotateBack(mounted, displacement, step);
     UnitQuaternion::RotateBack(mounted, phi, turn);
     UnitQuaternion::Rotate(q, step, displacement);
@@ -136,10 +136,10 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
       a = (1.0 - cos(angle)) / angle2;
       b = (angle - sin(angle)) / (angle2 * angle);
     }
-    T once[3], twice[3];
-    Cross(phi, way, once);
-    Cross(phi, once, twice);
-    for (int i = 0; i < 3; ++i) displacement[i] = way[i] + a * once[i] + b * twice[i];
+    T phi_x[3], phi_phi_x[3];
+    Cross(phi, way, phi_x);
+    Cross(phi, phi_x, phi_phi_x);
+    for (int i = 0; i < 3; ++i) displacement[i] = way[i] + a * phi_x[i] + b * phi_phi_x[i];
   }
   template <class T>
   static void Cross(const T* x, const T* y, T* z) {

@@ -159,10 +159,10 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
       a = (1.0 - std::cos(angle)) / angle2;
       b = (angle - std::sin(angle)) / (angle2 * angle);
     }
-    double once[3], twice[3];
-    Cross(phi, x, once);
-    Cross(phi, once, twice);
-    for (int i = 0; i < 3; ++i) product[i] = x[i] - a * once[i] + b * twice[i];
+    double phi_x[3], phi_phi_x[3];
+    Cross(phi, x, phi_x);
+    Cross(phi, phi_x, phi_phi_x);
+    for (int i = 0; i < 3; ++i) product[i] = x[i] - a * phi_x[i] + b * phi_phi_x[i];
   }
   static void Cross(const double* x, const double* y, double* z) {
     z[0] = x[1] * y[2] - x[2] * y[1];

@@ -5,10 +5,10 @@
 
 namespace alidade {
 
-/// Pose of a landmark relative to the body. The landmark is a fiducial tag, an object or a station,
-/// or a keyframe: the body itself at an earlier time, relative to which odometry and loop closures
-/// measure. A landmark that is first seen at the neutral pose, without noise, is such a keyframe.
-/// Its pose is then a clone of the body's pose, with all correlations.
+/// Pose of a landmark relative to the body. The landmark is a fiducial tag, an object, a station or
+/// a keyframe. A keyframe is the body itself at an earlier time, and the target of odometry and
+/// loop closures. A landmark that is first seen at the neutral pose, without noise, is a keyframe:
+/// its pose is then a clone of the body's pose, with all correlations.
 ///
 ///   model      z = (R_BW (p - r) + n_r, (q^-1 s) (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   automatic differentiation               6 x 12

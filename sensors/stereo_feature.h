@@ -34,10 +34,10 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
   double baseline_m;
   std::array<double, 2> sigma_px;
 
-  StereoFeature(const Camera& left, double baseline, const std::array<double, 2>& sigma)
-      : camera(left), baseline_m(baseline), sigma_px(sigma) {}
-  StereoFeature(const Camera& left, double baseline, double sigma)
-      : StereoFeature(left, baseline, std::array{sigma, sigma}) {}
+  StereoFeature(const Camera& left_camera, double baseline, const std::array<double, 2>& sigma)
+      : camera(left_camera), baseline_m(baseline), sigma_px(sigma) {}
+  StereoFeature(const Camera& left_camera, double baseline, double sigma)
+      : StereoFeature(left_camera, baseline, std::array{sigma, sigma}) {}
   explicit StereoFeature(Params& p)
       : StereoFeature(Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
                       p.PerAxis<2>("sigma_px", "px",

@@ -18,9 +18,11 @@ namespace alidade {
 
 /// Reader of a file, pipe or standard input, line by line, in constant memory.
 ///
-/// A byte order mark and carriage returns before line feeds are dropped. Errors: kBadData for a
-/// line longer than kMaxLine, kIo for a read that fails or a regular file that changed meanwhile,
-/// kStopped if a signal interrupts the wait for data.
+/// A byte order mark and carriage returns before line feeds are dropped. Errors:
+///
+///   kBadData   a line is longer than kMaxLine
+///   kIo        a read failed, or a regular file changed meanwhile
+///   kStopped   a signal interrupted the wait for data
 class LineReader {
  public:
   static constexpr std::size_t kMaxLine = 4096;  ///< bytes, without the line end

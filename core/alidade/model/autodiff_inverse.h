@@ -65,10 +65,10 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 
 }  // namespace detail
 
-/// Computes y from the other roles, z and prior (inverse measurement model), with the Jacobians
-/// jx[i] = d y / d role_i, jz = d y / d z and jp = d y / d prior, each of which may be null. y is
-/// the role Model::kInitialises; for a landmark, y is its roles one after the other. Returns
-/// kInvalid if the model needs a prior and `prior` is null. `known`: see Evaluate.
+/// Computes y from the other roles, z and prior (inverse measurement model). y is the role
+/// Model::kInitialises; for a landmark, y is its roles one after the other. Also computes the
+/// Jacobians jx[i] = d y / d role_i, jz = d y / d z and jp = d y / d prior; each may be null.
+/// Returns kInvalid if the model needs a prior and `prior` is null. `known`: see Evaluate.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,

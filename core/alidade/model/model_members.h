@@ -16,8 +16,8 @@ namespace detail {
 
 struct Nothing {};
 
-/// DeclaresNAME<Model>::value is true if the model has a member NAME of any kind: NAME is then
-/// ambiguous in a struct that derives from the model and from another struct with that name.
+/// DeclaresNAME<Model>::value is true if the model has a member NAME of any kind. A struct derives
+/// from the model and from another struct with a member NAME, so that NAME is then ambiguous.
 #define ALIDADE_DECLARES(NAME)                                                         \
   struct With##NAME {                                                                  \
     int NAME;                                                                          \

@@ -24,11 +24,11 @@ struct Range {
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true, false};
 inline constexpr Range kNonNegative{0.0, std::numeric_limits<double>::infinity(), false, false};
 
-/// Parameters of a model, read from its entry in the config. Each read also declares the parameter:
-/// the keys, units, ranges, defaults and docs of all reads form the model's schema
-/// (`alidade plugins info`), and other keys are refused. A bad value does not stop the constructor.
-/// The read returns a valid stand-in, and the host refuses the model afterwards with all its errors
-/// at once.
+/// Parameters of a model, read from its entry in the config. Each read also declares the parameter.
+/// The keys, units, ranges, defaults and docs of all reads form the model's schema
+/// (`alidade plugins info`). Other keys are refused. A bad value does not stop the constructor. The
+/// read returns a valid stand-in, and the host refuses the model afterwards with all its errors at
+/// once.
 class Params {
  public:
   explicit Params(const AlidadeHost* host) : host_(host) {}

@@ -276,9 +276,9 @@ enum {
   ALIDADE_HAS_VALIDITY = 1 << 17,
   ALIDADE_RESIDUAL_ONLY = 1 << 18, /* recursive estimators refuse it */
   ALIDADE_NEEDS_PAYLOAD = 1 << 19, /* needs the payload: an image patch, a scan */
-  /* motion: w is constant between two updates of the state by measurements, however many steps lie
-   * between them (discrete white noise); else w of each step is independent of all other steps
-   * (continuous white noise) */
+  /* motion: discrete white noise: w is constant between two updates of the state by measurements,
+   * however many steps lie between them. Without this bit: continuous white noise, whose w of each
+   * step is independent of all other steps. */
   ALIDADE_DISCRETE_NOISE = 1 << 20
 };
 

@@ -173,9 +173,9 @@ const double* KnownOf(const AlidadeObservation* observation) {
   return kHasKnown<Model> ? observation->known : nullptr;
 }
 
-/// Functions of a sensor for the ABI. Hidden, like MotionCalls: if its table were exported, two
-/// plugins with a struct of the same name would share the table of the first (STB_GNU_UNIQUE),
-/// whatever the flags of dlopen.
+/// Functions of a sensor for the ABI. Hidden, like MotionCalls. If its table were exported, two
+/// plugins with a struct of the same name would share the table of the first (STB_GNU_UNIQUE). The
+/// flags of dlopen cannot prevent this.
 template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;

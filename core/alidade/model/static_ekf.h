@@ -226,16 +226,16 @@ class StaticEkf {
   void ApplyCorrection(const double* dx) {
     const auto apply = [&](auto index) {
       constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
-      double moved[Space<b>::kAmbient];
-      Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
-      Normalise<Space<b>>(moved);
+      double corrected[Space<b>::kAmbient];
+      Space<b>::Plus(value<b>(), dx + TangentOffset(b), corrected);
+      Normalise<Space<b>>(corrected);
       if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
         double j[n * n];
-        Space<b>::Transport(value<b>(), moved, j);
+        Space<b>::Transport(value<b>(), corrected, j);
         const Transition<n> transport{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
         Propagate<TangentOffset(b)>(transport);
       }
-      std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
+      std::copy_n(corrected, Space<b>::kAmbient, x_ + AmbientOffset(b));
     };
     detail::ForEach(apply, Indices{});
   }

@@ -10,8 +10,8 @@
 
 namespace alidade::internal {
 
-/// Returns the covariance that replaces the model's noise in the config entry of a model of `kind`
-/// (ALIDADE_KIND_*): `covariance` of a sensor, `noise.covariance` of a motion model.
+/// Returns the covariance that replaces the model's noise in the config entry of a model:
+/// `covariance` of a sensor, `noise.covariance` of a motion model. `kind`: ALIDADE_KIND_*.
 std::optional<Node> FindNoiseCovariance(const Node& entry, std::uint32_t kind);
 
 /// Returns L of the covariance L L', n x n row-major and lower triangular. The covariance is R of a

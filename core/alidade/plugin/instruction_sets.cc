@@ -107,9 +107,9 @@ std::string InstructionSetNames(std::uint32_t isa) {
   std::string names;
   for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
     if ((isa & bit) == 0) continue;
-    const auto* const known = std::ranges::find(kKnown, bit, &InstructionSet::isa);
+    const auto* const entry = std::ranges::find(kKnown, bit, &InstructionSet::isa);
     if (!names.empty()) names += ", ";
-    names += known != std::end(kKnown) ? known->name
+    names += entry != std::end(kKnown) ? entry->name
                                        : "unknown to this version, bit " + std::to_string(bit);
   }
   return names;

@@ -547,13 +547,13 @@ std::vector<ParamInfo> ParamRecorder::Result() const {
   for (const Trial& trial : trials_) {
     for (const Request& request : trial.requests) {
       const auto is_same = [&](const ParamInfo& info) { return info.key == request.info.key; };
-      const auto known = std::find_if(result.begin(), result.end(), is_same);
-      if (known == result.end()) {
+      const auto existing = std::find_if(result.begin(), result.end(), is_same);
+      if (existing == result.end()) {
         result.push_back(request.info);
         result.back().condition = ConditionOf(request.info.key);
-      } else if (known->unit != request.info.unit &&
-                 !known->unit.ends_with(" or " + request.info.unit)) {
-        known->unit += " or " + request.info.unit;
+      } else if (existing->unit != request.info.unit &&
+                 !existing->unit.ends_with(" or " + request.info.unit)) {
+        existing->unit += " or " + request.info.unit;
       }
     }
   }

@@ -32,14 +32,14 @@ void Covariance::Reserve(int rows) {
 /// Removes `rows` rows from the smallest gap that is large enough, and returns their offset.
 /// Returns -1 if no gap is large enough.
 int Covariance::UseGap(int rows) {
-  auto best = gaps_.end();
+  auto smallest_gap = gaps_.end();
   for (auto gap = gaps_.begin(); gap != gaps_.end(); ++gap) {
     if (gap->second < rows) continue;
-    if (best == gaps_.end() || gap->second < best->second) best = gap;
+    if (smallest_gap == gaps_.end() || gap->second < smallest_gap->second) smallest_gap = gap;
   }
-  if (best == gaps_.end()) return -1;
-  const auto [offset, size] = *best;
-  gaps_.erase(best);
+  if (smallest_gap == gaps_.end()) return -1;
+  const auto [offset, size] = *smallest_gap;
+  gaps_.erase(smallest_gap);
   if (rows < size) gaps_.emplace_back(offset + rows, size - rows);
   return offset;
 }

@@ -53,9 +53,9 @@ double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eige
   root = ldlt.matrixL();
   for (Eigen::Index i = 0; i < d.size(); ++i) root.col(i) *= std::sqrt(std::max(d[i], 0.0));
   root = ldlt.transpositionsP().transpose() * root;
-  const double least = d.minCoeff(), largest = p.diagonal().maxCoeff();
-  if (!(least < 0.0)) return 0.0;
-  return largest > 0.0 ? least / largest : -1.0;
+  const double smallest = d.minCoeff(), largest = p.diagonal().maxCoeff();
+  if (!(smallest < 0.0)) return 0.0;
+  return largest > 0.0 ? smallest / largest : -1.0;
 }
 
 double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {

@@ -366,8 +366,9 @@ struct Arithmetic {
     return worst;
   }
 
-  /// Subtracts the part of columns [first, last) of W from a tile of P: kTile panels of rows from i
-  /// on, one panel of columns from j on. `scaled`: D^-1 times W of the panel at j.
+  /// Subtracts the part of columns [first, last) of W from a tile of P. The tile has kTile panels
+  /// of rows from i on and one panel of columns from j on. `scaled`: D^-1 times W of the panel at
+  /// j.
   template <int kTile>
   ALIDADE_KERNEL void Tile(const Update& u, int first, int last, int i, int j,
                            const double* scaled) {

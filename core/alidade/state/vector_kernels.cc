@@ -178,8 +178,8 @@ struct Loops {
     }
   }
 
-  /// Subtracts the product of columns [begin, end) of a panel and kCount rows of L, which begin at
-  /// `l`, from kCount columns `target` of the panel, in its first kHeight vectors.
+  /// Subtracts a product from kCount columns `target` of a panel, in its first kHeight vectors. Its
+  /// factors are the columns [begin, end) of the panel and kCount rows of L, which begin at `l`.
   template <int kHeight, int kCount>
   [[gnu::always_inline]] static void SubtractColumns(long begin, long end, const double* l,
                                                      long ldl, const double* panel,

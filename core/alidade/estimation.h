@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// All of alidade::estimation: problems, filters, late measurements and the smoother.
+/// All headers of estimation: problems, filters, out-of-sequence measurements and the smoother.
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"

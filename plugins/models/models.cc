@@ -136,7 +136,7 @@ class Models : public Source {
         block.geometry().Normalise(x.data());
         continue;
       }
-      if (!prior.from.empty()) {
+      if (!prior.sensor.empty()) {
         entry.Fail(
             "block '" + block.name + "' starts from a measurement: its true value is unknown",
             "source.initial: {" + block.owner + ": {" + name + ": value}}");

@@ -12,7 +12,8 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
   return role.block >= 0 && !f.state.layout()[role.block].present;
 }
 
-/// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
+/// Returns whether a measurement initialises a block: the only block of its sensor without a value,
+/// with a prior that names this sensor.
 bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
   const SensorBinding& sensor = *pending.binding;
   const int index = sensor.model->inverse().role;
@@ -20,7 +21,7 @@ bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
   const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
   const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
   const auto waits = [&](const Prior& prior) {
-    return prior.block == target.block && prior.from == sensor.name;
+    return prior.block == target.block && prior.sensor == sensor.name;
   };
   return missing(target) && std::ranges::count_if(sensor.roles, missing) == 1 &&
          std::ranges::any_of(f.problem_index->problem.priors, waits);
@@ -35,20 +36,21 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   const auto first = static_cast<std::size_t>(model.inverse().role);
   const auto count = static_cast<std::size_t>(model.inverse().count);
   const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
-  int rows = 0, size = 0, columns = 0, most = 0;
+  int rows = 0, size = 0, columns = 0, max_columns = 0;
   for (const Space& target : targets) {
     rows += target.geometry.tangent;
     size += target.geometry.ambient;
   }
-  for (const Space& role : model.roles()) most += role.geometry.tangent;
+  for (const Space& role : model.roles()) max_columns += role.geometry.tangent;
   std::fill_n(roles.begin() + model.inverse().role, count, nullptr);
   inverse.from.clear();
-  inverse.by_role.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most));
-  inverse.of_role.assign(place.values.size(), nullptr);
+  inverse.role_jacobians.resize(static_cast<std::size_t>(rows) *
+                                static_cast<std::size_t>(max_columns));
+  inverse.role_jacobian_starts.assign(place.values.size(), nullptr);
   for (std::size_t i = 0; i < place.values.size(); ++i) {
     if (roles[i] == nullptr || place.columns[i] < 0) continue;
     inverse.from.push_back(sensor.roles[i].block);
-    inverse.of_role[i] = inverse.by_role.data() + rows * columns;
+    inverse.role_jacobian_starts[i] = inverse.role_jacobians.data() + rows * columns;
     columns += model.roles()[i].geometry.tangent;
   }
   inverse.y.resize(static_cast<std::size_t>(size));
@@ -57,17 +59,17 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   const Status status =
       model.Initialise(roles.data(), {measurement.values.data(), measurement.known.data()}, prior,
                        {.y = inverse.y.data(),
-                        .jx = inverse.of_role.data(),
+                        .jx = inverse.role_jacobian_starts.data(),
                         .jz = inverse.by_z.data(),
                         .jp = inverse.by_prior.data()});
   if (status != Status::kOk) return OutcomeOf(status);
   inverse.by_x.resize(rows, columns);
   Eigen::Index column = 0;
   for (std::size_t i = 0; i < place.values.size(); ++i) {
-    if (inverse.of_role[i] == nullptr) continue;
+    if (inverse.role_jacobian_starts[i] == nullptr) continue;
     const int width = model.roles()[i].geometry.tangent;
     inverse.by_x.middleCols(column, width) =
-        Eigen::Map<const RowMajor>(inverse.of_role[i], rows, width);
+        Eigen::Map<const RowMajor>(inverse.role_jacobian_starts[i], rows, width);
     column += width;
   }
   double* y = inverse.y.data();
@@ -89,11 +91,11 @@ bool IsReady(const FilterState& f, const PendingMeasurement& pending) {
 Outcome Invert(FilterState& f, PendingMeasurement& pending, const LandmarkOptions::Prior* prior,
                InverseMeasurement& inverse) {
   RolesAt(f, pending, f.state.values());
-  Roles roles = pending.roles;  // then with y
+  Roles roles = pending.roles;  // InvertAt adds y
   Outcome outcome = InvertAt(*pending.binding, *pending.place, *pending.measurement,
                              prior == nullptr ? nullptr : &prior->inverse_distance, roles, inverse);
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(pending, roles.data());
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, pending);
+  if (outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
   }
@@ -101,11 +103,11 @@ Outcome Invert(FilterState& f, PendingMeasurement& pending, const LandmarkOption
   const Eigen::Map<const RowMajor> r(pending.R.data(), m, m);
   const RowMajor& jp = inverse.by_prior;
   inverse.by_z_r.noalias() = inverse.by_z * r;
-  inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
+  inverse.noise_covariance.noalias() = inverse.by_z_r * inverse.by_z.transpose();
   if (prior != nullptr) {
-    inverse.own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
+    inverse.noise_covariance.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
   }
-  return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
+  return inverse.noise_covariance.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
 [[gnu::noinline]] void InitialiseWaiting(FilterState& f, std::span<PendingMeasurement> rows) {
@@ -131,7 +133,8 @@ void Initialise(FilterState& f, const PendingMeasurement& pending,
                 const InverseMeasurement& inverse) {
   const SensorBinding& sensor = *pending.binding;
   const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model->inverse().role)].block;
-  f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
+  f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x,
+                     inverse.noise_covariance);
   f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();
   f.motions.EndInterval();

@@ -9,39 +9,40 @@
 /// Initialisation of blocks from a measurement, by the inverse measurement model.
 namespace alidade::internal {
 
-/// The inverse measurement model y = g(other roles, z, prior) of one measurement: the values of the
-/// roles that its sensor initialises, and the Jacobians. It keeps its memory for the next one.
+/// Result of the inverse measurement model y = g(other roles, z, prior) for one measurement: the
+/// values of the roles that its sensor initialises, and the Jacobians. Its memory can be reused for
+/// the next measurement.
 struct InverseMeasurement {
   std::vector<double> y;      ///< values, one role after the other
-  std::vector<BlockId> from;  ///< the blocks of the other roles
-  RowMajor by_x;              ///< dy/d from, their columns side by side
+  std::vector<BlockId> from;  ///< the blocks of the other roles, x
+  RowMajor by_x;              ///< J_x = dy/dx, the columns of the blocks side by side
   RowMajor by_z, by_prior;    ///< J_z, J_p
-  RowMajor own;               ///< J_z R J_z' + J_p sigma^2 J_p', p the prior
+  RowMajor noise_covariance;  ///< J_z R J_z' + J_p sigma^2 J_p', p the prior
 
-  std::vector<double> by_role;   ///< dy/d from, one after the other
-  std::vector<double*> of_role;  ///< where the Jacobian of each role lies there
-  RowMajor by_z_r;               ///< J_z R
+  std::vector<double> role_jacobians;         ///< J_x, block after block
+  std::vector<double*> role_jacobian_starts;  ///< by role: its block in role_jacobians, or null
+  RowMajor by_z_r;                            ///< J_z R
 };
-/// Computes y and its Jacobians, and writes y to the initialised ones of `roles`. `prior` may be
-/// null if the model needs none.
+/// Computes y and its Jacobians, and writes y to the initialised roles in `roles`. `prior` may be
+/// null if the model does not need a prior.
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
                  const Measurement& measurement, const double* prior, Roles& roles,
                  InverseMeasurement& inverse);
 
-/// Whether all blocks that the sensor is bound to have a value.
+/// Returns whether all blocks that the sensor is bound to have a value.
 bool IsReady(const FilterState& f, const PendingMeasurement& pending);
 
-/// The inverse measurement model at the state. `prior` may be null if the model needs none. Returns
-/// kAccepted, or the reason for a failure.
+/// Evaluates the inverse measurement model at the state. `prior` may be null if the model does not
+/// need a prior. Returns kAccepted, or the reason for a failure.
 Outcome Invert(FilterState& f, PendingMeasurement& pending, const LandmarkOptions::Prior* prior,
                InverseMeasurement& inverse);
 
-/// Initialises the blocks that wait for one of these measurements. Each consumes its measurement. A
-/// measurement that still needs a block without a value gets the outcome kNotReady.
+/// Initialises the blocks that wait for one of these measurements. Each consumes its measurement.
+/// The outcome of a measurement that still needs a block without a value is kNotReady.
 void InitialiseWaiting(FilterState& f, std::span<PendingMeasurement> rows);
 
-/// Sets the block of the role that the sensor initialises to the result of Invert: the value, its
-/// covariance and its correlations, which replace those that it has.
+/// Sets the block of the role that the sensor initialises to the result of Invert. Value,
+/// covariance and correlations of the block are replaced.
 void Initialise(FilterState& f, const PendingMeasurement& pending,
                 const InverseMeasurement& inverse);
 

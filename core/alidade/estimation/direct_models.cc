@@ -7,7 +7,7 @@
 namespace alidade::detail {
 namespace {
 
-/// n x n row-major; empty for no elements.
+/// Returns the diagonal matrix of the elements, row-major.
 std::vector<double> Diagonal(const std::vector<double>& elements) {
   const std::size_t n = elements.size();
   std::vector<double> matrix(n * n, 0.0);

@@ -15,10 +15,10 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/model_members.h"
 
-/// Models of a program itself: the structs of authors (alidade/model/model.h) without a plugin.
+/// Models that are structs of the program itself (alidade/model/model.h), without a plugin.
 namespace alidade {
 
-/// A struct on the base Sensor, and on Motion (alidade/model/model.h).
+/// Structs derived from Sensor and from Motion (alidade/model/model.h).
 template <class Model>
 concept SensorStruct = requires {
   Model::kInitialises;
@@ -30,7 +30,7 @@ concept MotionStruct = requires {
 
 namespace detail {
 
-/// The names and flags of a quantity that has this geometry; `parts`: of a product.
+/// Returns the space of a quantity with this geometry. `parts` are the factors of a product.
 Space SpaceOf(const Quantity& quantity, const Geometry& geometry,
               const std::vector<Space>& parts = {});
 
@@ -58,7 +58,7 @@ Space MeasurementSpace() {
   }
 }
 
-/// Errors: kPlugin.
+/// Converts the prior and dynamics of a role. Throws Error kPlugin if they are invalid.
 OwnedRole OwnedRoleOf(const Owned& owned, const Space& role);
 
 template <class Model>
@@ -125,19 +125,19 @@ MotionModel::Description DescribeMotion(const Model& model, std::string name) {
   return description;
 }
 
-/// Runs `call` of a model; an exception becomes its error text.
+/// Runs `call` of a model. Records the text of an exception as its error text.
 template <class Call>
 Status Guarded(const void* model, const Call& call) {
   try {
     return call();
   } catch (const std::exception& e) {
-    return internal::NoteModelError(model, e.what());
+    return internal::RecordModelError(model, e.what());
   }
 }
 
 }  // namespace detail
 
-/// A sensor by its author's struct.
+/// Sensor model that calls a struct derived from Sensor.
 template <class Model>
 class DirectSensor final : public SensorModel {
  public:
@@ -148,37 +148,40 @@ class DirectSensor final : public SensorModel {
  private:
   using Indices = typename detail::Blocks<Model>::Indices;
 
-  ALIDADE_FLATTEN Status DoEvaluate(const Observation& seen, const double* const* roles,
+  ALIDADE_FLATTEN Status DoEvaluate(const Observation& observation, const double* const* roles,
                                     const Output& out) const override {
     return detail::Guarded(this, [&] {
       Status status = Status::kOk;
       if (out.h != nullptr) {
-        status = alidade::Evaluate(model_, roles, out.h, out.jacobians, out.strides, seen.known);
+        status =
+            alidade::Evaluate(model_, roles, out.h, out.jacobians, out.strides, observation.known);
       }
       if (status == Status::kOk && out.sqrt_noise != nullptr) {
         constexpr int m = Model::Measurement::kTangent;
         std::fill_n(out.sqrt_noise, m * m, 0.0);
-        detail::CallSqrtNoise(model_, roles, seen.known, seen.z, out.sqrt_noise, Indices{});
+        detail::CallSqrtNoise(model_, roles, observation.known, observation.z, out.sqrt_noise,
+                              Indices{});
       }
       return status;
     });
   }
-  Status DoValid(const Observation& seen) const override {
+  Status DoValid(const Observation& observation) const override {
     if constexpr (detail::HasValid<Model>::value) {
       return detail::Guarded(this, [&] {
-        return detail::CallValid(model_, seen.known, seen.z) ? Status::kOk : Status::kInvalid;
+        return detail::CallValid(model_, observation.known, observation.z) ? Status::kOk
+                                                                           : Status::kInvalid;
       });
     } else {
       return Status::kOk;
     }
   }
-  Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
-                      const InverseOutput& out) const override {
+  Status DoInitialise(const double* const* roles, const Observation& observation,
+                      const double* prior, const InverseOutput& out) const override {
     if constexpr (Model::kInitialises >= 0) {
       return detail::Guarded(this, [&] {
-        return InitialiseRole(model_, roles, seen.z, prior, out.y, out.jx, out.strides,
+        return InitialiseRole(model_, roles, observation.z, prior, out.y, out.jx, out.strides,
                               MatrixRef{out.jz, Model::Measurement::kTangent},
-                              MatrixRef{out.jp, Model::kPrior}, seen.known);
+                              MatrixRef{out.jp, Model::kPrior}, observation.known);
       });
     } else {
       return Status::kError;
@@ -188,7 +191,7 @@ class DirectSensor final : public SensorModel {
   Model model_;
 };
 
-/// A motion model by its author's struct.
+/// Motion model that calls a struct derived from Motion.
 template <class Model>
 class DirectMotion final : public MotionModel {
  public:
@@ -202,7 +205,8 @@ class DirectMotion final : public MotionModel {
     return detail::Guarded(this, [&] {
       Status status = Status::kOk;
       if (out.next != nullptr) {
-        if constexpr (!detail::Blocks<Model>::kStatic) {  // of a size that the author might miss
+        // A model with blocks of dynamic size may leave elements unwritten: they are NaN.
+        if constexpr (!detail::Blocks<Model>::kStatic) {
           for (std::size_t k = 0; k < this->blocks().size(); ++k) {
             std::fill_n(out.next[k], this->blocks()[k].geometry.ambient,
                         std::numeric_limits<double>::quiet_NaN());
@@ -223,12 +227,12 @@ class DirectMotion final : public MotionModel {
   Model model_;
 };
 
-/// The sensor of an author's struct; `name` is for messages.
+/// Returns a sensor model that calls `model`. Messages contain `name`.
 template <class Model>
 SharedSensor MakeSensor(Model model, std::string name = "model") {
   return std::make_shared<DirectSensor<Model>>(std::move(model), std::move(name));
 }
-/// The motion model of an author's struct; `name` is for messages.
+/// Returns a motion model that calls `model`. Messages contain `name`.
 template <class Model>
 SharedMotion MakeMotion(Model model, std::string name = "model") {
   return std::make_shared<DirectMotion<Model>>(std::move(model), std::move(name));

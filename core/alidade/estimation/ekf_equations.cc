@@ -24,12 +24,14 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
 
 [[gnu::flatten]] Outcome EkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
   const double* const* const roles = RolesAt(f, pending, f.state.values());
-  const bool elsewhere =
-      (pending.place->elsewhere || f.keeps_first_estimates()) && FindLinearisation(f, pending);
-  const Outcome outcome = elsewhere ? LineariseElsewhere(f, pending) : LineariseAt(pending, roles);
+  const bool has_jacobian_point =
+      (pending.place->linearises_at_measurement || f.uses_first_estimates()) &&
+      FindLinearisation(f, pending);
+  const Outcome outcome =
+      has_jacobian_point ? LineariseSeparately(f, pending) : LineariseAt(pending, roles);
   if (outcome != Outcome::kAccepted) {
     if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) pending.report->h = {};
-    NoteRefusal(f, pending, outcome);
+    ReportRefusal(f, pending, outcome);
     return outcome;
   }
   WrapAngles(pending.model->measurement().geometry, pending.h);
@@ -37,58 +39,59 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
   return outcome;
 }
 
-/// Puts where H is taken into at_: the roles in row.roles, but first estimates, and what the
-/// measurement implies for the role that asks for it. Whether that is elsewhere than h.
+/// Sets jacobian_roles_, the point at which H is evaluated: the values of the roles, but first
+/// estimates if they are in use, and the implied state with jacobian_at: measurement. Returns
+/// whether this differs from the point at which h is evaluated.
 [[gnu::noinline]] bool EkfEquations::FindLinearisation(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   const std::vector<RoleBinding>& bound = pending.binding->roles;
-  at_ = pending.roles;
-  implied_.clear();
-  bool elsewhere = false;
+  jacobian_roles_ = pending.roles;
+  implied_value_.clear();
+  bool differs = false;
   for (std::size_t i = 0; i < bound.size(); ++i) {
     const BlockId block = bound[i].block;
-    if (block < 0 || at_[i] == nullptr) continue;
+    if (block < 0 || jacobian_roles_[i] == nullptr) continue;
     const auto index = static_cast<std::size_t>(block);
     if (bound[i].jacobian_at == JacobianAt::kMeasurement) {
-      implied_.resize(static_cast<std::size_t>(pending.model->roles()[i].geometry.ambient));
-      at_[i] = implied_.data();
+      implied_value_.resize(static_cast<std::size_t>(pending.model->roles()[i].geometry.ambient));
+      jacobian_roles_[i] = implied_value_.data();
     } else if (!f.first_estimates[index].empty()) {
-      at_[i] = f.first_estimates[index].data();
+      jacobian_roles_[i] = f.first_estimates[index].data();
     }
-    elsewhere = elsewhere || at_[i] != pending.roles[i];
+    differs = differs || jacobian_roles_[i] != pending.roles[i];
   }
-  return elsewhere;
+  return differs;
 }
 
-/// h at row.roles, H at at_.
-[[gnu::noinline]] Outcome EkfEquations::LineariseElsewhere(FilterState& f,
-                                                           PendingMeasurement& pending) {
+/// Computes h at the values of the roles, and H at jacobian_roles_.
+[[gnu::noinline]] Outcome EkfEquations::LineariseSeparately(FilterState& f,
+                                                            PendingMeasurement& pending) {
   const SensorModel& model = *pending.model;
   pending.report->h = {pending.h, static_cast<std::size_t>(pending.place->ambient)};
   Outcome outcome = PredictAt(f, pending, f.state.values(), pending.h);
   if (outcome != Outcome::kAccepted) return outcome;
-  if (!implied_.empty()) {
+  if (!implied_value_.empty()) {
     const Status status =
         model.Initialise(pending.roles.data(), {pending.z, pending.measurement->known.data()},
-                         nullptr, {.y = implied_.data()});
-    // What z cannot have come from tells nothing of where to linearise.
+                         nullptr, {.y = implied_value_.data()});
+    // If no state implies z, the measurement is invalid.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
   const SensorPlace& place = *pending.place;
-  h_there_.resize(static_cast<std::size_t>(place.ambient));
-  outcome = EvaluateAt(model, place, *pending.measurement, at_.data(),
-                       {h_there_.data(), pending.H.data()});
+  jacobian_h_.resize(static_cast<std::size_t>(place.ambient));
+  outcome = EvaluateAt(model, place, *pending.measurement, jacobian_roles_.data(),
+                       {jacobian_h_.data(), pending.H.data()});
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(pending, pending.roles.data());
   if (outcome != Outcome::kAccepted) return outcome;
   for (std::size_t i = 0; i < place.values.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (place.columns[i] < 0 || at_[i] == pending.roles[i] ||
+    if (place.columns[i] < 0 || jacobian_roles_[i] == pending.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
-    std::array<double, 4> j;  // a unit vector's tangent has two elements
-    geometry.Transport(pending.roles[i], at_[i], j.data());
+    std::array<double, 4> j;  // 2 x 2: the tangent of a unit vector has two elements
+    geometry.Transport(pending.roles[i], jacobian_roles_[i], j.data());
     ChainJacobian(pending, place.columns[i], geometry.tangent, j.data(), f.work);
   }
   return outcome;
@@ -103,43 +106,48 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   stacked_.clear();
   int column = 0;
   for (PendingMeasurement* const pending : rows) {
-    MeasurementRows& one = pending->linearised;
-    if (one.column != column) f.update.MoveColumns(one.column, column, one.h.rows);
-    one.column = column;
-    stacked_.push_back(&one);
-    column += one.h.rows;
+    MeasurementRows& linearised = pending->linearised;
+    if (linearised.column != column) {
+      f.update.MoveColumns(linearised.column, column, linearised.h.rows);
+    }
+    linearised.column = column;
+    stacked_.push_back(&linearised);
+    column += linearised.h.rows;
   }
 }
 
-/// The rows of P that are considered, in considered_.
-[[gnu::noinline]] void EkfEquations::FindConsidered(const FilterState& f,
-                                                    std::span<PendingMeasurement* const> rows) {
+/// Writes the rows of P that belong to consider states to consider_rows_.
+[[gnu::noinline]] void EkfEquations::FindConsiderRows(const FilterState& f,
+                                                      std::span<PendingMeasurement* const> rows) {
   ForEachConsidered(f, rows, [&](int offset, int size, int, int) {
-    for (int i = 0; i < size; ++i) considered_.push_back(offset + i);
+    for (int i = 0; i < size; ++i) consider_rows_.push_back(offset + i);
   });
-  std::ranges::sort(considered_);
-  considered_.erase(std::unique(considered_.begin(), considered_.end()), considered_.end());
+  std::ranges::sort(consider_rows_);
+  consider_rows_.erase(std::unique(consider_rows_.begin(), consider_rows_.end()),
+                       consider_rows_.end());
 }
 
-/// K is K* with zeros for what is considered: takes it, and its dx, into the update.
-[[gnu::noinline]] EkfEquations::Considered EkfEquations::ConsiderCorrection(
+/// Computes the gain of the consider rows: K* with zeros for consider states. Writes it and the
+/// resulting dx to the update.
+[[gnu::noinline]] EkfEquations::ConsiderGain EkfEquations::ConsiderCorrection(
     FilterState& f, std::span<PendingMeasurement* const> rows, bool recorded) {
-  const Eigen::Index count = std::ssize(considered_), m = f.update.rows();
-  Considered found{f.work.Take(count, m), f.work.Take(count, m)};
-  Workspace::Matrix &gain = found.gain, &e = found.e, l = f.work.Take(m, m);
+  const Eigen::Index count = std::ssize(consider_rows_), m = f.update.rows();
+  ConsiderGain result{f.work.Take(count, m), f.work.Take(count, m)};
+  Workspace::Matrix &gain = result.gain, &e = result.e, l = f.work.Take(m, m);
   f.update.CopyFactor(l);
   for (Eigen::Index k = 0; k < m; ++k) {
     for (Eigen::Index i = 0; i < count; ++i) {
       gain(i, k) =
-          f.update.w(considered_[static_cast<std::size_t>(i)], static_cast<int>(k)) / l(k, k);
+          f.update.w(consider_rows_[static_cast<std::size_t>(i)], static_cast<int>(k)) / l(k, k);
     }
   }
   Divide(l, gain);
   e.setZero();
-  ForEachConsidered(f, rows, [&](int offset, int size, int at, int k) {
-    const Eigen::Index i = std::ranges::lower_bound(considered_, offset) - considered_.begin();
-    e.block(i, at, size, k) -= gain.block(i, at, size, k);
-    gain.block(i, at, size, k).setZero();
+  ForEachConsidered(f, rows, [&](int offset, int size, int column, int width) {
+    const Eigen::Index i =
+        std::ranges::lower_bound(consider_rows_, offset) - consider_rows_.begin();
+    e.block(i, column, size, width) -= gain.block(i, column, size, width);
+    gain.block(i, column, size, width).setZero();
   });
   for (Eigen::Index k = 0; k < m; ++k) {
     e.col(k) *= l(k, k);
@@ -147,26 +155,26 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   }
   const Workspace::Vector innovation = InnovationOf(f, rows);
   for (Eigen::Index i = 0; i < count; ++i) {
-    const int row = considered_[static_cast<std::size_t>(i)];
+    const int row = consider_rows_[static_cast<std::size_t>(i)];
     f.update.dx()[row] = gain.row(i).dot(innovation);
     for (int k = 0; recorded && k < m; ++k) f.update.gain(row, k) = gain(i, k);
   }
-  return found;
+  return result;
 }
 
-/// P by any gain, that of considered rows as given, without a difference that would cancel. False
-/// where a variance would be negative.
+/// Updates P by the Joseph form, which does not cancel. `consider_gain` is the gain of the consider
+/// rows. Returns false if a variance would be negative.
 [[gnu::noinline]] bool EkfEquations::Joseph(FilterState& f,
                                             std::span<PendingMeasurement* const> rows,
-                                            const Workspace::Matrix* considered) {
+                                            const Workspace::Matrix* consider_gain) {
   const Eigen::Index n = f.size(), m = f.update.rows();
   Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);
   f.update.CopyFactor(l);
   f.update.CopyColumns(0, gain);
   for (Eigen::Index k = 0; k < m; ++k) gain.col(k) /= l(k, k);
   Divide(l, gain);
-  for (std::size_t i = 0; i < considered_.size(); ++i) {
-    gain.row(considered_[i]) = considered->row(static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < consider_rows_.size(); ++i) {
+    gain.row(consider_rows_[i]) = consider_gain->row(static_cast<Eigen::Index>(i));
   }
   return internal::Joseph(f.state.covariance().lower(), gain, JacobianOf(f, rows), NoiseOf(f, rows),
                           f.work);
@@ -183,26 +191,27 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   const Solution solution = update.Solve(stacked_, recorded);
   if (solution == Solution::kNotPositiveDefinite) return Outcome::kNotPd;
   if (solution == Solution::kNotFinite) return Outcome::kNotFinite;
-  std::optional<Considered> considered;
-  considered_.clear();
-  if (f.blocks.considering || f.problem_index->considers) FindConsidered(f, rows);
-  if (!considered_.empty()) considered = ConsiderCorrection(f, rows, recorded);
+  std::optional<ConsiderGain> consider_gain;
+  consider_rows_.clear();
+  if (f.blocks.has_consider || f.problem_index->has_consider) FindConsiderRows(f, rows);
+  if (!consider_rows_.empty()) consider_gain = ConsiderCorrection(f, rows, recorded);
   if (!f.state.Retract(correction != nullptr ? correction : update.dx(), f.moved)) {
     return Outcome::kNotFinite;
   }
   if (solution == Solution::kCancellation) {
-    if (!Joseph(f, rows, considered ? &considered->gain : nullptr)) return Outcome::kNotPd;
+    if (!Joseph(f, rows, consider_gain ? &consider_gain->gain : nullptr)) return Outcome::kNotPd;
   } else {
     update.Downdate();
-    if (considered) {
-      AddOuterProduct(f.state.covariance().lower(), considered_, considered->e);
+    if (consider_gain) {
+      AddOuterProduct(f.state.covariance().lower(), consider_rows_, consider_gain->e);
     }
   }
-  f.state.MoveTo(f.moved);  // last: P turns with the tangent planes
+  f.state.MoveTo(f.moved);  // last, because it also transports P to the new tangent spaces
   if (recorded) {
-    RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
-      update.CopyGain(kept, column, count, to);
-    });
+    RecordGainBy(f, rows,
+                 [&](std::span<const int> p_rows, int column, int count, double* destination) {
+                   update.CopyGain(p_rows, column, count, destination);
+                 });
   }
   return Outcome::kAccepted;
 }

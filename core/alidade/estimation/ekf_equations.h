@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// The method of Ekf, which has the equations: everything by Jacobians, P dense.
+/// Equations of Ekf, which documents them: Jacobians and a dense P.
 class EkfEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -23,30 +23,32 @@ class EkfEquations : public UpdateMethod {
     return CorrectBy(f, rows, nullptr);
   }
 
-  /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
-  Outcome CorrectBy(FilterState& f, std::span<PendingMeasurement* const> rows, const double* dx);
-  /// Gives the rows columns that follow one another: some that passed the gate may be left out.
+  /// Corrects x and P as Correct does, but x by `correction`. If it is null, x by K r.
+  Outcome CorrectBy(FilterState& f, std::span<PendingMeasurement* const> rows,
+                    const double* correction);
+  /// Assigns consecutive columns to the rows. The rows may be a subset of those that passed the
+  /// gate.
   void AssignColumns(FilterState& f, std::span<PendingMeasurement* const> rows);
 
  private:
-  /// Of considered rows of P: K, and E = (K - K*) L, K* = P H' S^-1 and S = L L'.
-  struct Considered {
+  /// K and E = (K - K*) L of the consider rows of P; K* = P H' S^-1, S = L L'.
+  struct ConsiderGain {
     Workspace::Matrix gain, e;
   };
   bool FindLinearisation(const FilterState& f, const PendingMeasurement& pending);
-  Outcome LineariseElsewhere(FilterState& f, PendingMeasurement& pending);
-  void FindConsidered(const FilterState& f, std::span<PendingMeasurement* const> rows);
-  Considered ConsiderCorrection(FilterState& f, std::span<PendingMeasurement* const> rows,
-                                bool recorded);
+  Outcome LineariseSeparately(FilterState& f, PendingMeasurement& pending);
+  void FindConsiderRows(const FilterState& f, std::span<PendingMeasurement* const> rows);
+  ConsiderGain ConsiderCorrection(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                  bool recorded);
   bool Joseph(FilterState& f, std::span<PendingMeasurement* const> rows,
-              const Workspace::Matrix* considered);
+              const Workspace::Matrix* consider_gain);
 
-  // Memory that is kept from row to row.
-  Roles at_{};                            ///< where H is taken
-  Scratch<std::vector<double>> implied_;  ///< of the role that is linearised at what z implies
-  Scratch<std::vector<double>> h_there_;  ///< h where H is taken
+  // Reused memory.
+  Roles jacobian_roles_{};                                ///< the point at which H is evaluated
+  Scratch<std::vector<double>> implied_value_;            ///< with jacobian_at: measurement
+  Scratch<std::vector<double>> jacobian_h_;               ///< h at jacobian_roles_
   Scratch<std::vector<const MeasurementRows*>> stacked_;  ///< of the update
-  Scratch<std::vector<int>> considered_;  ///< rows of P whose gain is not the optimal one
+  Scratch<std::vector<int>> consider_rows_;  ///< rows of P whose gain is not the optimal one
 };
 
 }  // namespace alidade::internal

@@ -16,13 +16,13 @@ MeasurementReports& MeasurementReports::operator=(const MeasurementReports& othe
   for (const MeasurementReport& entry : entries_) {
     for (const auto part : kParts) count += (entry.*part).size();
   }
-  double* next = numbers_.emplace_back(count).data();
+  double* destination = numbers_.emplace_back(count).data();
   for (MeasurementReport& entry : entries_) {
     for (const auto part : kParts) {
       Numbers& values = entry.*part;
-      std::ranges::copy(values, next);
-      values = {next, values.size()};
-      next += values.size();
+      std::ranges::copy(values, destination);
+      values = {destination, values.size()};
+      destination += values.size();
     }
   }
   return *this;

@@ -21,51 +21,51 @@ namespace alidade {
 
 class Filter;
 
-/// What became of one measurement.
+/// Result of processing one measurement.
 enum class Outcome {
-  kAccepted,     ///< also while the frame goes on, as long as nothing speaks against it
+  kAccepted,     ///< used by the update; also the initial value during a frame
   kInitialised,  ///< consumed to initialise a block
   kGated,
   kOutOfDomain,  ///< h is not defined at the prediction
-  kInvalid,      ///< of no use: beyond the sensor's limits, or its covariance is none
-  kNotFinite,    ///< it is itself, its h, H, R or S, or the update, which was rolled back
+  kInvalid,      ///< beyond the limits of the sensor, or its covariance is not a covariance
+  kNotFinite,    ///< z, h, H, R, S or the update is not finite; an update was rolled back
   kNotPd,        ///< the update would have lost positive definiteness, and was rolled back
   kStale,        ///< older than the state
-  kNotReady,     ///< a block it needs has no value yet
+  kNotReady,     ///< a required block has no value yet
   kFailed,       ///< the plugin failed
-  kEnded,        ///< not looked at: the estimator has nothing left to go on with
+  kEnded,        ///< not processed: the estimator has failed before
 };
 
-/// How an outcome counts.
+/// Properties of an outcome.
 struct OutcomeInfo {
   const char* name;  ///< in files
   /// Whether it counts towards rejection recovery; `not_finite` only if h was computed.
   bool is_rejection = false;
-  bool is_gated = false;  ///< by the gate or by outlier rejection
-  bool starts = false;    ///< of what has no value before it
+  bool is_gated = false;           ///< by the gate or by outlier rejection
+  bool is_initialisation = false;  ///< the measurement initialises a block, or could do so
 };
-/// The outcomes that there are, by Outcome. Another one is a row here.
+/// Properties of all outcomes, indexed by Outcome.
 inline constexpr std::array kOutcomes = {
     OutcomeInfo{"accepted"},
-    OutcomeInfo{.name = "initialised", .starts = true},
+    OutcomeInfo{.name = "initialised", .is_initialisation = true},
     OutcomeInfo{.name = "gated", .is_rejection = true, .is_gated = true},
     OutcomeInfo{.name = "out_of_domain", .is_rejection = true},
     OutcomeInfo{"invalid"},
     OutcomeInfo{.name = "not_finite", .is_rejection = true},
     OutcomeInfo{.name = "not_pd", .is_rejection = true},
     OutcomeInfo{"stale"},
-    OutcomeInfo{.name = "not_ready", .starts = true},
+    OutcomeInfo{.name = "not_ready", .is_initialisation = true},
     OutcomeInfo{"failed"},
     OutcomeInfo{"ended"},
 };
 static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
-/// The row of an outcome.
+/// Returns the properties of an outcome.
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];
 }
-/// Its name, as in files: `accepted`, `gated`.
+/// Returns the name of an outcome in files: `accepted`, `gated`.
 inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
-/// What a model's status means for the measurement; kOk is kAccepted.
+/// Converts the status of a model to the outcome of the measurement; kOk to kAccepted.
 inline Outcome OutcomeOf(Status status) {
   switch (status) {
     case Status::kOk:
@@ -80,35 +80,35 @@ inline Outcome OutcomeOf(Status status) {
   return Outcome::kFailed;
 }
 
-/// Numbers of a report.
+/// Read-only view of the numbers of a report. Equal if all elements are equal.
 struct Numbers : std::span<const double> {
   using std::span<const double>::span;  // NOLINT(modernize-use-equals-default)
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 
-/// All that is known of one measurement; m = dof, its tangent size. The numbers lie in the memory
-/// of the estimator until its next frame, those of a copy in that of its UpdateReport. Empty: not
-/// reached.
+/// Result of one measurement; m = dof, its tangent size. The numbers are stored in the estimator
+/// and valid until its next frame; the numbers of a copy are stored in its UpdateReport. A view is
+/// empty if its quantity was not computed.
 struct MeasurementReport {
   MeasurementReport() = default;
-  MeasurementReport(int of_sensor, Outcome became, std::int64_t of_landmark, int tangent_size)
-      : sensor(of_sensor), outcome(became), landmark(of_landmark), dof(tangent_size) {}
+  MeasurementReport(int sensor_index, Outcome result, std::int64_t landmark_id, int tangent_size)
+      : sensor(sensor_index), outcome(result), landmark(landmark_id), dof(tangent_size) {}
 
   int sensor = -1;  ///< index into Problem::sensors
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;    ///< r' S^-1 r, not divided by dof; S without the loss
+  double nis = 0.0;    ///< r' S^-1 r, not divided by dof; S without the weight w
   Numbers z, h;        ///< ambient
   Numbers innovation;  ///< r = z (-) h, m
-  Numbers s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
-  /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
-  /// unless accepted.
+  Numbers s;           ///< S = H P H' + R / w, m x m; w = 1 without a robust loss
+  /// K, column by column. Its rows belong to the blocks with a covariance, in the order of the
+  /// layout. Empty unless accepted.
   Numbers gain;
 };
 
-/// Entries of measurements, and memory for numbers that lie nowhere else. A copy has all numbers of
-/// its own.
+/// Reports of the measurements of a frame, and memory for numbers that no other object stores. A
+/// copy stores all numbers itself.
 class MeasurementReports {
  public:
   MeasurementReports() = default;
@@ -120,11 +120,11 @@ class MeasurementReports {
 
   std::span<const MeasurementReport> entries() const { return entries_; }
   std::span<MeasurementReport> entries() { return entries_; }
-  /// One more; references to the others end.
+  /// Appends an entry. Invalidates references to other entries.
   MeasurementReport& Add(int sensor, Outcome outcome, std::int64_t landmark, int dof) {
     return entries_.emplace_back(sensor, outcome, landmark, dof);
   }
-  /// A copy of the values in that memory, until Clear.
+  /// Copies the values into this object. The copy is valid until Clear.
   Numbers Copy(Numbers values);
   void Clear() {
     entries_.clear();
@@ -136,29 +136,29 @@ class MeasurementReports {
   std::vector<std::vector<double>> numbers_;
 };
 
-/// Something that happened to the filter, worth a line to its user.
+/// Event of an estimator that is reported to the user.
 struct Event {
   Timestamp timestamp = kNoTimestamp;
   std::string kind;  ///< one word: diverged, rejection_recovery, conditioning, not_finite, ...
   std::string text;
-  bool divergence = false;  ///< the estimator diverged or failed by this
+  bool divergence = false;  ///< the estimator diverged or failed
 };
 
-/// Parts of the work of a frame, in its order; see Filter.
+/// Parts of the processing of a frame, in their order; see Filter.
 enum class FramePart { kStep, kEvaluate, kGate, kUpdate, kLandmarks };
 inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
 
-/// What one frame did. Filled again and again without allocating.
+/// Report of one frame. Can be reused without allocating memory.
 class UpdateReport {
  public:
   std::span<const MeasurementReport> measurements() const { return measurements_.entries(); }
   std::span<MeasurementReport> measurements() { return measurements_.entries(); }
-  /// One more; references to the others end.
+  /// Appends an entry. Invalidates references to other entries.
   MeasurementReport& Add(int sensor = -1, Outcome outcome = Outcome::kAccepted,
                          std::int64_t landmark = -1, int dof = 0) {
     return measurements_.Add(sensor, outcome, landmark, dof);
   }
-  /// A copy of the values in that memory.
+  /// Copies the values into this report. The copy is valid until Clear.
   Numbers Copy(Numbers values) { return measurements_.Copy(values); }
   void Clear() {
     stale = false;
@@ -171,54 +171,55 @@ class UpdateReport {
   }
   void ClearMeasurements() { measurements_.Clear(); }
 
-  bool stale = false;       ///< the frame is older than the state, which stays as it was
-  std::vector<int> inputs;  ///< motion models whose control input was taken, as in Problem::motions
+  bool stale = false;       ///< the frame is older than the state, which is unchanged
+  std::vector<int> inputs;  ///< indices into Problem::motions of the control inputs that were set
   std::vector<Event> events;
   LandmarkCounts landmarks;
-  /// Those that the frame removed from the state, as they were then. Those of a batch are not here.
+  /// Last estimates of the landmarks that the frame removed from the state. Empty for a batch.
   std::vector<LandmarkEstimate> removed_landmarks;
-  /// Time of the wall clock, by FramePart: of filters with landmarks; others take too little.
+  /// Wall-clock time by FramePart. Only filters with landmarks measure it.
   std::array<double, kFrameParts> spent_s{};
 
  private:
   MeasurementReports measurements_;
 };
 
-/// An estimator over one problem. It takes values and returns values: it neither reads files nor
-/// prints nor exits.
+/// Estimator for one problem. It does not read files, print or exit.
 class Estimator {
  public:
-  /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
+  /// Receives the estimate and the report of frame `index`, counted from the first call of Process.
   using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
 
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Timestamp timestamp) = 0;
-  /// Steps to the frame's timestamp and uses those of its measurements that a sensor is bound to.
-  /// The report is good until the next call.
+  /// Steps to the timestamp of the frame and uses the measurements whose stream has a sensor. The
+  /// report is valid until the next call.
   virtual const UpdateReport& Process(const Frame& frame) = 0;
-  /// True where an estimate depends on later frames too (a smoother, a batch): state() after
-  /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
+  /// Returns whether the estimates depend on later frames too (a smoother, a batch). If so, state()
+  /// is not meaningful after Process, and Smooth computes the estimates.
   virtual bool offline() const { return false; }
-  /// Once, after the last frame: the estimates of all frames, in their order. The events of the
-  /// smoothing itself come with the last report. Errors: where there is nothing to emit, or not
-  /// all, failed() turns true and the text of the error says why; whatever `emit` throws.
+  /// Computes the estimates of all frames and passes them to `emit` in order. Called once, after
+  /// the last frame. The last report has the events of the smoothing itself. If estimates are
+  /// missing, throws an Error with the reason, and failed() is true. Exceptions of `emit`
+  /// propagate.
   virtual void Smooth(const Emit& /*emit*/) {}
-  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
-  /// of kStopped. A null function never stops.
+  /// Sets a function that Smooth calls repeatedly while it runs. If it returns true, Smooth throws
+  /// an Error kStopped. A null function never stops.
   virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
-  /// A copy, whose every result from here on has the bits that this one's would have; null: it
-  /// cannot be copied.
+  /// Returns a copy whose later results equal those of this estimator bit by bit, or null if the
+  /// estimator cannot be copied.
   virtual std::unique_ptr<Estimator> Clone() const { return nullptr; }
-  /// This estimator as a recursive filter; null: it is not one.
+  /// Returns this estimator as a recursive filter, or null if it is not a recursive filter.
   virtual const Filter* AsFilter() const { return nullptr; }
   virtual const State& state() const = 0;
-  /// The landmarks in the state, by id.
+  /// Returns the landmarks in the state, ordered by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
   virtual Timestamp timestamp() const = 0;
-  /// True once the filter left the domain of its sensors or lost its numbers; see the events.
+  /// Returns whether the estimate left the domain of a sensor or the numbers became invalid; see
+  /// the events.
   virtual bool diverged() const = 0;
-  /// True where there is nothing left to go on with (not finite, unrecoverable).
+  /// Returns whether the estimator cannot continue (not finite, unrecoverable).
   virtual bool failed() const = 0;
 };
 

@@ -11,8 +11,8 @@
 namespace alidade {
 namespace {
 
-std::optional<ProblemDefect> OfBlocks(const Problem& problem,
-                                      const EstimatorCapabilities& capabilities) {
+std::optional<ProblemDefect> FindUnsupportedBlock(const Problem& problem,
+                                                  const EstimatorCapabilities& capabilities) {
   const std::vector<Block>& blocks = problem.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (blocks[b].status != BlockStatus::kConsider || capabilities.consider) continue;
@@ -20,7 +20,7 @@ std::optional<ProblemDefect> OfBlocks(const Problem& problem,
                          static_cast<BlockId>(b)};
   }
   for (const Prior& prior : problem.priors) {
-    if (prior.from.empty() || capabilities.from_measurement) continue;
+    if (prior.sensor.empty() || capabilities.from_measurement) continue;
     return ProblemDefect{"from_measurement", "blocks that start from a measurement",
                          "mean and sigma", prior.block};
   }
@@ -30,8 +30,8 @@ std::optional<ProblemDefect> OfBlocks(const Problem& problem,
   return std::nullopt;
 }
 
-std::optional<ProblemDefect> OfRole(const RoleBinding& role,
-                                    const EstimatorCapabilities& capabilities) {
+std::optional<ProblemDefect> FindUnsupportedMode(const RoleBinding& role,
+                                                 const EstimatorCapabilities& capabilities) {
   if (role.mode == RoleMode::kConsider && !capabilities.consider) {
     return ProblemDefect{"mode", "consider roles",
                          capabilities.known ? "estimate or known" : "estimate"};
@@ -44,40 +44,40 @@ std::optional<ProblemDefect> OfRole(const RoleBinding& role,
   return std::nullopt;
 }
 
-/// The sensor that a block starts from; null if there is none of that name.
+/// Returns the sensor that a block starts from, or null if that name does not exist.
 const SensorBinding* SensorOf(const Problem& problem, const Prior& prior) {
-  const int index = problem.FindSensor(prior.from);
+  const int index = problem.FindSensor(prior.sensor);
   return index < 0 ? nullptr : &problem.sensors[static_cast<std::size_t>(index)];
 }
 
-/// Why a block cannot start from the sensor that its prior names.
-std::optional<ProblemDefect> OfStart(const Problem& problem, const Prior& prior) {
+/// Returns the reason why a block cannot start from the sensor that its prior names, or nullopt.
+std::optional<ProblemDefect> CheckStart(const Problem& problem, const Prior& prior) {
   const SensorBinding* const sensor = SensorOf(problem, prior);
   if (sensor == nullptr) {
-    ProblemDefect defect{"from_measurement", "no sensor '" + prior.from + "' here",
+    ProblemDefect defect{"from_measurement", "no sensor '" + prior.sensor + "' here",
                          "a sensor of this estimator", prior.block};
-    defect.nearest = Nearest(prior.from, internal::NamesOf(problem.sensors));
+    defect.nearest = Nearest(prior.sensor, internal::NamesOf(problem.sensors));
     return defect;
   }
   const int role = sensor->model->inverse().role;
   if (role >= 0 && sensor->roles[static_cast<std::size_t>(role)].block == prior.block) return {};
-  return ProblemDefect{"from_measurement",
-                       "sensor '" + prior.from + "' does not determine this block",
-                       "a sensor whose inverse measurement model is this block", prior.block};
+  return ProblemDefect{
+      "from_measurement", "sensor '" + prior.sensor + "' does not determine this block",
+      "a sensor whose inverse measurement model determines this block", prior.block};
 }
 
-/// The first cycle among the blocks that `chain` leads to; each needs the next one to start. All
-/// sensors that blocks start from are there.
+/// Returns the first cycle among the blocks reachable from `chain`, in which each block needs the
+/// next one to start. Requires that all sensors that blocks start from exist.
 std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<BlockId>& chain) {
   const BlockId last = chain.back();
   if (std::ranges::find(chain, last) != chain.end() - 1) {
     std::vector<std::string> names;
     for (const BlockId block : chain) names.push_back(problem.layout[block].name);
     return ProblemDefect{"from_measurement", "cyclic: " + internal::Join(names, " <- "),
-                         "one block of the cycle with a mean of its own", last};
+                         "a mean for one block of the cycle", last};
   }
   const auto prior = std::ranges::find(problem.priors, last, &Prior::block);
-  if (prior == problem.priors.end() || prior->from.empty()) return {};
+  if (prior == problem.priors.end() || prior->sensor.empty()) return {};
   for (const RoleBinding& role : SensorOf(problem, *prior)->roles) {
     if (role.block < 0 || role.block == last) continue;
     chain.push_back(role.block);
@@ -87,9 +87,9 @@ std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<Block
   return {};
 }
 
-/// `consider blocks (block 'target.depth')`
+/// Returns a text such as `consider blocks (block 'target.depth'); expected ...`.
 std::string Describe(const ProblemDefect& defect, const Problem& problem) {
-  std::string text = defect.what;
+  std::string text = defect.description;
   if (defect.block >= 0) text += " (block '" + problem.layout[defect.block].name + "')";
   if (defect.sensor >= 0) {
     const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(defect.sensor)];
@@ -109,8 +109,8 @@ const char* ToString(EstimatorKind kind) {
 
 std::optional<ProblemDefect> FindDefect(const Problem& problem) {
   for (const Prior& prior : problem.priors) {
-    if (prior.from.empty()) continue;
-    if (auto defect = OfStart(problem, prior)) return defect;
+    if (prior.sensor.empty()) continue;
+    if (auto defect = CheckStart(problem, prior)) return defect;
   }
   for (const Prior& prior : problem.priors) {
     std::vector<BlockId> chain{prior.block};
@@ -136,11 +136,11 @@ std::optional<ProblemDefect> FindDefect(const Problem& problem) {
 
 std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
                                              const EstimatorCapabilities& capabilities) {
-  if (auto found = OfBlocks(problem, capabilities)) return found;
+  if (auto found = FindUnsupportedBlock(problem, capabilities)) return found;
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const SensorBinding& sensor = problem.sensors[s];
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
-      auto found = OfRole(sensor.roles[r], capabilities);
+      auto found = FindUnsupportedMode(sensor.roles[r], capabilities);
       if (!found) continue;
       found->sensor = static_cast<int>(s);
       found->role = static_cast<int>(r);

@@ -8,50 +8,50 @@
 
 namespace alidade {
 
-/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
-/// can be compared with.
+/// Use of the measurements by an estimator. It determines which estimators can be compared.
 enum class EstimatorKind {
-  kFilter,    ///< takes each measurement once, as it comes
-  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
-  kBatch,  ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
-  kSlidingWindow,  ///< solves for the last states anew
+  kFilter,    ///< uses each measurement once, in the order of the frames
+  kSmoother,  ///< a filter, then a backward pass about the linearisation of the filter
+  kBatch,     ///< solves for all states, by all or (`mode: filtering`) all previous measurements
+  kSlidingWindow,  ///< solves for the states of a sliding window
 };
-/// `filter`, `smoother`, `batch`, `sliding_window`.
+/// Returns `filter`, `smoother`, `batch` or `sliding_window`.
 const char* ToString(EstimatorKind kind);
 
-/// What an estimator can do with a problem, beyond blocks that are estimated or constant.
+/// Capabilities of an estimator, beyond blocks that are estimated or constant.
 struct EstimatorCapabilities {
   bool consider = false;          ///< consider blocks and roles (Schmidt)
   bool known = true;              ///< known roles
   bool at_measurement = false;    ///< jacobian_at: measurement
   bool from_measurement = false;  ///< blocks that start from their first measurement
-  bool recovery = false;          ///< after consecutive rejections
-  bool landmarks = false;         ///< that come and go
+  bool recovery = false;          ///< recovery after consecutive rejections
+  bool landmarks = false;         ///< landmarks that are added and removed during a run
 };
 
-/// Why a problem cannot be solved: for a block, for a role of a sensor, or without either for its
-/// landmarks.
+/// Reason why an estimator cannot solve a problem. It concerns a block, a role of a sensor, or (if
+/// neither index is set) the landmarks.
 struct ProblemDefect {
-  const char* key;     ///< of a config: `consider`, `from_measurement`, `mode`, `jacobian_at`
-  std::string what;    ///< `consider blocks`
-  std::string remedy;  ///< what to write in its place: `the block estimated or constant`
+  const char* key;          ///< of a config: `consider`, `from_measurement`, `mode`, `jacobian_at`
+  std::string description;  ///< `consider blocks`
+  std::string remedy;       ///< the accepted alternative: `the block estimated or constant`
   BlockId block = -1;
   int sensor = -1;           ///< index into Problem::sensors
   int role = -1;             ///< index into its roles
-  std::string nearest = {};  ///< the name that may be meant, or ""
+  std::string nearest = {};  ///< the closest existing name, or ""
 };
 
-/// The first defect that no estimator can do anything about, blocks before sensors: a block that
-/// starts from the measurement of a sensor that is not there or does not determine it, a cycle of
-/// blocks that start from one another, a role without an inverse measurement model that is
-/// linearised at its measurement. Nothing if there is none.
+/// Returns the first defect that makes a problem invalid for every estimator, or nullopt. Blocks
+/// are checked before sensors. The defects are:
+///   - a block starts from a sensor that does not exist or does not determine it;
+///   - blocks start from one another in a cycle;
+///   - a role without an inverse measurement model has `jacobian_at: measurement`.
 std::optional<ProblemDefect> FindDefect(const Problem& problem);
-/// The first thing that `problem` asks for beyond `capabilities`, blocks before sensors; nothing if
-/// all can be done. Recovery is an option of the estimator, and not looked at.
+/// Returns the first feature of `problem` that `capabilities` does not include, or nullopt. Blocks
+/// are checked before sensors. Recovery is an option of the estimator and is not checked.
 std::optional<ProblemDefect> FindUnsupported(const Problem& problem,
                                              const EstimatorCapabilities& capabilities);
-/// The problem. Error kBadConfig, by name and with the remedy, if it has a defect of either kind.
-/// `estimator`: `Ukf`.
+/// Returns the problem. Throws Error kBadConfig, with the name and the remedy, if FindUnsupported
+/// or FindDefect finds a defect. `estimator` is the name for the message, such as `Ukf`.
 Problem CheckedProblem(Problem problem, const char* estimator,
                        const EstimatorCapabilities& capabilities);
 

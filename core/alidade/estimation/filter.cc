@@ -16,57 +16,59 @@ using internal::FilterEngine;
 
 namespace {
 
-[[noreturn]] void RefuseName(const char* what, std::string_view name,
-                             const std::vector<std::string>& known) {
-  throw Error(ExitCode::kBadConfig, "no " + std::string(what) + " '" + std::string(name) +
-                                        "'; the filter has " + internal::Join(known));
+[[noreturn]] void ThrowUnknownName(const char* kind, std::string_view name,
+                                   const std::vector<std::string>& names) {
+  throw Error(ExitCode::kBadConfig, "no " + std::string(kind) + " '" + std::string(name) +
+                                        "'; the filter has " + internal::Join(names));
 }
 
-void CheckKnown(const std::string& what, int size, const std::vector<double>& known) {
+void CheckKnown(const std::string& place, int size, const std::vector<double>& known) {
   if (std::ssize(known) == size) return;
-  throw Error(ExitCode::kBadData, what + " takes " + std::to_string(size) +
-                                      " known numbers with a measurement, not " +
-                                      std::to_string(known.size()));
+  throw Error(ExitCode::kBadData, place + ": " + std::to_string(known.size()) +
+                                      " known numbers with a measurement; expected " +
+                                      std::to_string(size));
 }
 
-/// Index of the sensor, which takes as many known numbers.
+/// Returns the index of the sensor. Throws an Error if its model needs another number of known
+/// inputs.
 int FindSensor(const Problem& problem, std::string_view name, const std::vector<double>& known) {
   const int index = problem.FindSensor(name);
-  if (index < 0) RefuseName("sensor", name, internal::NamesOf(problem.sensors));
+  if (index < 0) ThrowUnknownName("sensor", name, internal::NamesOf(problem.sensors));
   CheckKnown("sensor '" + std::string(name) + '\'',
              problem.sensors[static_cast<std::size_t>(index)].model->known_size(), known);
   return index;
 }
 
 void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem,
-                  const Reading& one) {
-  if (one.stream < 0 || one.stream >= std::ssize(streams)) {
+                  const Reading& reading) {
+  if (reading.stream < 0 || reading.stream >= std::ssize(streams)) {
     throw Error(ExitCode::kBadData,
-                one.stream < 0 ? "a reading of a state that takes no control input, or of no sensor"
-                               : "no stream " + std::to_string(one.stream) + "; the filter has " +
-                                     std::to_string(streams.size()));
+                reading.stream < 0
+                    ? "a reading has no stream; expected a sensor, or a state with a control input"
+                    : "no stream " + std::to_string(reading.stream) + "; the filter has " +
+                          std::to_string(streams.size()));
   }
-  const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
-  if (std::ssize(one.values) != stream.size) {
-    throw Error(ExitCode::kBadData, "stream '" + stream.name + "' has " +
-                                        std::to_string(stream.size) + " values at a time, not " +
-                                        std::to_string(one.values.size()));
+  const StreamInfo& stream = streams[static_cast<std::size_t>(reading.stream)];
+  if (std::ssize(reading.values) != stream.size) {
+    throw Error(ExitCode::kBadData,
+                "stream '" + stream.name + "': " + std::to_string(reading.values.size()) +
+                    " values in a measurement; expected " + std::to_string(stream.size));
   }
-  CheckKnown("stream '" + stream.name + '\'', stream.known, one.known);
+  CheckKnown("stream '" + stream.name + '\'', stream.known, reading.known);
   for (const SensorBinding& sensor : problem.sensors) {
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model->measurement().geometry;
-    const double defect = DistanceFrom(geometry, one.values.data());
+    const double defect = DistanceFrom(geometry, reading.values.data());
     if (defect > kUnitTolerance) {
-      throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
-                                          "' are not of unit length: it is off by " +
+      throw Error(ExitCode::kBadData, "stream '" + stream.name +
+                                          "': the values do not have unit length: it is off by " +
                                           internal::RoundedText(defect, 4));
     }
     const int m = geometry.tangent;
-    if (one.covariance.empty() || std::ssize(one.covariance) == m * m) continue;
-    throw Error(ExitCode::kBadData, "the covariance of stream '" + stream.name + "' has " +
-                                        std::to_string(one.covariance.size()) + " numbers, not " +
-                                        std::to_string(m * m));
+    if (reading.covariance.empty() || std::ssize(reading.covariance) == m * m) continue;
+    throw Error(ExitCode::kBadData, "stream '" + stream.name + "': the covariance has " +
+                                        std::to_string(reading.covariance.size()) +
+                                        " numbers; expected " + std::to_string(m * m));
   }
 }
 
@@ -98,23 +100,23 @@ std::vector<LandmarkEstimate> Filter::landmarks() const {
 int Filter::stream(std::string_view name) const {
   const std::vector<StreamInfo>& streams = engine_->f.problem_index->streams;
   const auto found = std::ranges::find(streams, name, &StreamInfo::name);
-  if (found == streams.end()) RefuseName("stream", name, internal::NamesOf(streams));
+  if (found == streams.end()) ThrowUnknownName("stream", name, internal::NamesOf(streams));
   return static_cast<int>(found - streams.begin());
 }
 
 BlockId Filter::block(std::string_view name) const {
   const BlockId id = problem().layout.Find(name);
-  if (id < 0) RefuseName("block", name, internal::NamesOf(problem().layout.blocks()));
+  if (id < 0) ThrowUnknownName("block", name, internal::NamesOf(problem().layout.blocks()));
   return id;
 }
 
 Frame Filter::MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const {
   Frame frame;
   frame.timestamp = timestamp;
-  for (const Reading& one : readings) {
-    CheckReading(engine_->f.problem_index->streams, problem(), one);
-    frame.measurements.push_back(
-        {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
+  for (const Reading& reading : readings) {
+    CheckReading(engine_->f.problem_index->streams, problem(), reading);
+    frame.measurements.push_back({timestamp, reading.stream, reading.landmark, reading.values,
+                                  reading.covariance, reading.known});
   }
   return frame;
 }
@@ -144,12 +146,14 @@ std::vector<std::optional<Prediction>> Filter::ExpectEach(
     std::string_view sensor, Timestamp timestamp,
     const std::vector<std::int64_t>& landmarks) const {
   const int index = FindSensor(problem(), sensor, {});
-  std::vector<std::optional<Prediction>> each;
-  if (landmarks.empty()) return each;
+  std::vector<std::optional<Prediction>> predictions;
+  if (landmarks.empty()) return predictions;
   FilterEngine later(*engine_);
   later.Process({timestamp, {}});
-  for (const std::int64_t landmark : landmarks) each.push_back(later.Expect(index, landmark, {}));
-  return each;
+  for (const std::int64_t landmark : landmarks) {
+    predictions.push_back(later.Expect(index, landmark, {}));
+  }
+  return predictions;
 }
 
 }  // namespace alidade

@@ -14,36 +14,37 @@
 
 namespace alidade {
 
-/// How the measurements of one timestamp are put into updates.
+/// Grouping of the measurements of one timestamp into updates.
 enum class Fuse {
   kJoint,           ///< one stacked update
   kPerSensor,       ///< one update for each sensor, in the order of the config
   kPerMeasurement,  ///< one update for each measurement, in the order of the sensors
 };
 
-/// What happens after `rejection_recovery_after` consecutive rejections of one sensor.
+/// Reaction to `rejection_recovery_after` consecutive rejections of one sensor.
 enum class RejectionRecovery {
-  kReset,    ///< re-initialise its blocks from the measurement where it can, else inflate
+  kReset,    ///< re-initialise its blocks from the measurement if possible, else inflate
   kInflate,  ///< multiply the covariance of its blocks by 100
   kNone,
 };
 
-/// Where H is taken for the blocks of stationary motion models (`constant`) [Huang2010].
+/// Value at which H is evaluated for the blocks of stationary motion models (`constant`)
+/// [Huang2010].
 enum class JacobianPolicy {
-  kLatest,         ///< their estimate
-  kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
+  kLatest,         ///< the latest estimate
+  kFirstEstimate,  ///< the initial value: the mean of the prior, or the value that z implied
 };
 
-/// What the Kalman filters have in common to choose.
+/// Options common to all Kalman filters.
 struct EkfOptions {
-  /// Probability with which a measurement that fits passes the gate; 1: no gate (`gate: none`).
+  /// Probability that a consistent measurement passes the gate; 1: no gate (`gate: none`).
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
   JacobianPolicy jacobian = JacobianPolicy::kLatest;
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
   int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
-  int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends
-  /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
+  int max_covariance_repairs = 10;    ///< the filter ends at the next one
+  /// Longer gaps are divided into equal steps of at most this length, in whole ns, at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 };
 
@@ -59,61 +60,60 @@ inline EkfOptions WithoutRecovery(EkfOptions options) {
 
 }  // namespace internal
 
-/// A measurement of a sensor, or a control input of a state, as it comes.
+/// One measurement of a sensor, or one control input of a state, for Filter::Push.
 struct Reading {
-  Reading(int number, std::vector<double> numbers, std::int64_t of_landmark = -1,
-          std::vector<double> r = {}, std::vector<double> knowing = {})
-      : stream(number),
-        values(std::move(numbers)),
-        landmark(of_landmark),
+  Reading(int stream_index, std::vector<double> z, std::int64_t landmark_id = -1,
+          std::vector<double> r = {}, std::vector<double> known_numbers = {})
+      : stream(stream_index),
+        values(std::move(z)),
+        landmark(landmark_id),
         covariance(std::move(r)),
-        known(std::move(knowing)) {}
-  Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t of_landmark = -1,
-          std::vector<double> r = {}, std::vector<double> knowing = {})
-      : Reading(sensor.stream, std::move(z), of_landmark, std::move(r), std::move(knowing)) {}
-  /// Of a state whose model takes a control input.
+        known(std::move(known_numbers)) {}
+  Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t landmark_id = -1,
+          std::vector<double> r = {}, std::vector<double> known_numbers = {})
+      : Reading(sensor.stream, std::move(z), landmark_id, std::move(r), std::move(known_numbers)) {}
+  /// The control input of a state.
   Reading(const StateHandle& state, std::vector<double> u) : Reading(state.input, std::move(u)) {}
 
   int stream;  ///< Filter::stream
   std::vector<double> values;
   std::int64_t landmark;
-  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
-  std::vector<double> known;       ///< as many as its sensors take; mostly none
+  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: the model's
+  std::vector<double> known;       ///< known numbers of the sensor model; mostly empty
 };
 
-/// What a sensor would measure.
+/// Predicted measurement of a sensor.
 struct Prediction {
   std::vector<double> z;  ///< h, ambient
   Eigen::MatrixXd s;      ///< S = H P H' + R, m x m
 };
 
-/// A recursive estimator over one problem: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
-/// snapshot of it, and goes on by itself. What was moved from may be assigned to or destroyed, no
-/// more.
+/// Recursive estimator for one problem: Ekf, Iekf, Ukf, SquareRootEkf. A copy is a snapshot and an
+/// independent filter. A moved-from filter may only be assigned to or destroyed.
 ///
-/// What a frame goes through:
+/// Each frame is processed in these stages:
 ///
-///   step         to its timestamp, in parts where a control input changes or a gap is longer than
-///                max_dt_s; noise that a model holds is held up to the next update
+///   step         propagate to its timestamp; divided if a control input changes or the gap is
+///                longer than max_dt_s; discrete noise is constant until the next update
 ///   initialise   blocks that wait for one of its measurements
-///   predict      h, r and S of each measurement, all of a group at the same state
-///   gate         each by itself: r' S^-1 r against chi-square; robust losses; consensus
-///   correct      one stacked update by those that pass: all of it happens or nothing
-///   recover      from a covariance that is not positive semi-definite, and from sensors that are
-///                rejected again and again
-///   landmarks    are counted, pruned, converted and initialised
+///   predict      h, r and S of each measurement, for all measurements of a group at one state
+///   gate         compare r' S^-1 r of each measurement with chi-square; robust losses; consensus
+///   correct      one stacked update by the accepted measurements
+///   recover      repair a covariance that is not positive semi-definite; reset or inflate blocks
+///                if a sensor was rejected too often in a row
+///   landmarks    count, prune, convert and initialise
 ///
-/// Control inputs of the frame act from its timestamp on. An update is a transaction: what would
-/// leave the state not finite or not positive definite is rolled back and reported.
+/// Control inputs of the frame act from its timestamp on. An update is atomic: if it would leave
+/// the state not finite or not positive definite, it is rolled back and reported.
 ///
-/// Live use: Push measurements by the names of their streams as they come, ask At for the estimate
-/// at any later time, and Expect for what a sensor will see then; neither changes the filter.
+/// Live use: Push appends measurements by the names of their streams. At returns the estimate at a
+/// later time, and Expect the predicted measurement of a sensor. Neither changes the filter.
 ///
-/// Frames come in the order of their timestamps; an older one is `stale`. Late ones: Rollback.
+/// Frames have to be ordered by timestamp; an older one is `stale`. For late frames use Rollback.
 ///
-/// Threads: as a value of the standard library. Const members may be called from several threads at
-/// once, while none calls another one; a copy belongs to whoever has it. What copies share, the
-/// problem and its models, does not change, and models may be called from several threads.
+/// Threads: as for values of the standard library. Several threads may call const members
+/// concurrently while no thread calls a non-const member. Copies share only the problem and its
+/// models. These do not change, and models may be called from several threads.
 class Filter : public Estimator {
  public:
   // By frames.
@@ -130,52 +130,51 @@ class Filter : public Estimator {
   const Problem& problem() const;
 
   // Live.
-  /// Index of a stream, for Reading::stream. Error kBadConfig where there is none.
+  /// Returns the index of a stream, for Reading::stream. Error kBadConfig for an unknown name.
   int stream(std::string_view name) const;
-  /// Id of a block of the problem, `owner.block`. Error kBadConfig where there is none.
+  /// Returns the id of a block of the problem, `owner.block`. Error kBadConfig for an unknown name.
   BlockId block(std::string_view name) const;
-  /// The readings of one timestamp as a frame. Errors: kBadData for a stream that is not there,
-  /// values, a covariance or known numbers of another size than its sensors take, or a quaternion
-  /// or direction whose length is off by more than 1e-3.
+  /// Converts the readings of one timestamp to a frame. Errors: kBadData for an unknown stream;
+  /// for values, a covariance or known numbers whose size its sensors do not accept; or for a
+  /// quaternion or direction whose length differs from 1 by more than 1e-3.
   Frame MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const;
-  /// Process of MakeFrame. The report is good until the next call. Errors: those of MakeFrame, and
-  /// nothing has changed.
+  /// Calls MakeFrame and Process. The report is valid until the next call. Errors: those of
+  /// MakeFrame; the filter is then unchanged.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
     return Push(timestamp, {Reading(sensor, {z})});
   }
   // A Timestamp is in nanoseconds: TimestampFromSeconds(t_s).
-  template <std::floating_point Seconds, class... Rest>
-  const UpdateReport& Push(Seconds t_s, const Rest&... rest) = delete;
+  template <std::floating_point Seconds, class... Arguments>
+  const UpdateReport& Push(Seconds t_s, const Arguments&... arguments) = delete;
   template <std::floating_point Seconds>
   const UpdateReport& Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
   template <std::floating_point Seconds>
   State At(Seconds t_s) const = delete;
-  template <std::floating_point Seconds, class... Rest>
+  template <std::floating_point Seconds, class... Arguments>
   std::optional<Prediction> Expect(std::string_view sensor, Seconds t_s,
-                                   const Rest&... rest) const = delete;
-  /// The estimate of a block that has a value. ContractViolation if it has none yet.
+                                   const Arguments&... arguments) const = delete;
+  /// Returns the estimate of a block. ContractViolation if the block has no value yet.
   BlockEstimate Estimate(BlockId block) const;
-  /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
-  /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
+  /// Returns the state after a frame without measurements at `timestamp`, not before timestamp().
+  /// The filter is unchanged. If a step fails, returns the state before that step.
   State At(Timestamp timestamp) const;
-  /// What the sensor of that name will measure at `timestamp`, of the landmark of that id where it
-  /// measures landmarks, with `known` where it takes known numbers. Nothing where h is not defined
-  /// or not finite there, S is not positive definite, or a block or the landmark has no value yet.
-  /// Errors: kBadConfig where there is no such sensor, kBadData where it takes another number of
-  /// known numbers.
+  /// Predicts the measurement of a sensor at `timestamp`. `landmark` is the id of the landmark, if
+  /// the sensor measures landmarks; `known` are the known numbers of its model. Returns nullopt if
+  /// h is not defined or not finite, S is not positive definite, or a block or the landmark has no
+  /// value yet. Errors: kBadConfig for an unknown sensor, kBadData for a wrong size of `known`.
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1,
                                    const std::vector<double>& known = {}) const;
-  /// The same of each of the landmarks, of a sensor that takes no known numbers; the state is
-  /// stepped once for all.
+  /// Calls Expect for each of the landmarks, with a single step of the state. The sensor must not
+  /// have known numbers.
   std::vector<std::optional<Prediction>> ExpectEach(
       std::string_view sensor, Timestamp timestamp,
       const std::vector<std::int64_t>& landmarks) const;
 
  protected:
   /// @cond
-  /// `streams` are the source's, in the order of Measurement::stream.
+  /// `streams` are the streams of the source, in the order of Measurement::stream.
   Filter(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
          std::unique_ptr<internal::UpdateMethod> method);
   internal::FilterEngine& engine() { return *engine_; }

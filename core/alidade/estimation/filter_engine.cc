@@ -19,7 +19,7 @@ Event StaleEvent(const Frame& frame, Timestamp state) {
               "rollback, ...}` or, in C++, process frames by alidade::Rollback"};
 }
 
-/// The options. Error kBadConfig if one is out of its range.
+/// Returns the options. Throws Error kBadConfig if one is out of its range.
 const EkfOptions& CheckedOptions(const EkfOptions& options) {
   ExpectOption(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
                "a probability in (0, 1], 1: no gate");
@@ -33,8 +33,8 @@ const EkfOptions& CheckedOptions(const EkfOptions& options) {
 
 }  // namespace
 
-void ExpectOption(bool holds, const char* option, double value, const char* expected) {
-  if (holds) return;
+void ExpectOption(bool in_range, const char* option, double value, const char* expected) {
+  if (in_range) return;
   throw Error(ExitCode::kBadConfig, std::string("option ") + option + " is " +
                                         RoundedText(value, 6) + "; expected " + expected);
 }
@@ -61,58 +61,58 @@ void FilterEngine::Process(const Frame& frame) {
   f.report.Clear();
   Run(frame);
   if (time_.has_inputs()) time_.TakeInputs(frame, f.report);
-  if (f.report.stale && !stale_noted_) f.report.events.push_back(StaleEvent(frame, f.timestamp));
-  stale_noted_ = f.report.stale;
+  if (f.report.stale && !stale_reported_) f.report.events.push_back(StaleEvent(frame, f.timestamp));
+  stale_reported_ = f.report.stale;
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 
-/// The way of a frame. Flattened: its parts are small, and a call of each would cost as much. Large
-/// and rarely called functions are marked `noinline`.
+/// Processes a frame. Flattened: its parts are so small that a call of each would cost as much as
+/// its work. Large and rarely called functions are marked `noinline`.
 [[gnu::flatten]] void FilterEngine::Run(const Frame& frame) {
-  if (landmarks) since_ = std::chrono::steady_clock::now();
+  if (landmarks) part_start_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.health.ended) StepTo(frame.timestamp);
-  Spent(FramePart::kStep);
+  AddElapsedTo(FramePart::kStep);
   const Outcome refused = f.report.stale   ? Outcome::kStale
                           : f.health.ended ? Outcome::kEnded
                                            : Outcome::kAccepted;
   rows_.Collect(frame, *f.problem_index, f.report, refused);
   if (refused != Outcome::kAccepted) return;
-  const std::span<PendingMeasurement> all = rows_.all();
-  for (const PendingMeasurement& pending : all) {
-    if (pending.report->outcome == Outcome::kFailed) NotePluginFailure(f, pending);
+  const std::span<PendingMeasurement> rows = rows_.all();
+  for (const PendingMeasurement& pending : rows) {
+    if (pending.report->outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
   }
-  if (f.blocks.waiting) InitialiseWaiting(f, all);
-  if (landmarks) landmarks->Attach(f, all);
-  UpdateInGroups(all);
+  if (f.blocks.has_missing) InitialiseWaiting(f, rows);
+  if (landmarks) landmarks->Attach(f, rows);
+  UpdateInGroups(rows);
   const auto is_not_pd = [](const PendingMeasurement& pending) {
     return pending.report->outcome == Outcome::kNotPd;
   };
-  if (std::ranges::any_of(all, is_not_pd)) recovery_.RepairCovariance(f);
+  if (std::ranges::any_of(rows, is_not_pd)) recovery_.RepairCovariance(f);
   if (f.health.ended) return;
-  for (PendingMeasurement& pending : all) {
+  for (PendingMeasurement& pending : rows) {
     if (landmarks && pending.binding->model->has_landmark())
-      continue;  // its rejections do not count
+      continue;  // rejections of landmarks do not count
     if (gate_.Count(f, *pending.report)) recovery_.Recover(f, pending);
   }
-  Spent(FramePart::kUpdate);
+  AddElapsedTo(FramePart::kUpdate);
   if (!landmarks) return;
-  landmarks->Maintain(f, all);
-  Spent(FramePart::kLandmarks);
+  landmarks->Maintain(f, rows);
+  AddElapsedTo(FramePart::kLandmarks);
 }
 
-/// The time since the last part goes to this one, in the report.
-void FilterEngine::Spent(FramePart part) {
+/// Adds the time since the end of the previous part to this part, in the report.
+void FilterEngine::AddElapsedTo(FramePart part) {
   if (!landmarks) return;
   const auto now = std::chrono::steady_clock::now();
   f.report.spent_s[static_cast<std::size_t>(part)] +=
-      std::chrono::duration<double>(now - since_).count();
-  since_ = now;
+      std::chrono::duration<double>(now - part_start_).count();
+  part_start_ = now;
 }
 
-/// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
-/// before, and the filter has ended.
+/// Propagates the state to `timestamp`. If a step fails, the state stays at the end of the previous
+/// step and the filter ends.
 void FilterEngine::StepTo(Timestamp timestamp) {
   while (f.timestamp < timestamp) {
     time_.UseInputs(f.timestamp, f.motions, f.report.events);
@@ -128,17 +128,17 @@ void FilterEngine::StepTo(Timestamp timestamp) {
   }
 }
 
-/// The updates of a frame, group by group.
-void FilterEngine::UpdateInGroups(std::span<PendingMeasurement> all) {
+/// Performs the updates of a frame, group by group.
+void FilterEngine::UpdateInGroups(std::span<PendingMeasurement> rows) {
   std::vector<PendingMeasurement*>& group = groups_.group;
   group.clear();
-  const auto is_apart = [&](const PendingMeasurement& pending) {
+  const auto starts_group = [&](const PendingMeasurement& pending) {
     return options_.fuse == Fuse::kPerMeasurement ||
            (!group.empty() && group.back()->sensor != pending.sensor);
   };
-  for (PendingMeasurement& pending : all) {
+  for (PendingMeasurement& pending : rows) {
     if (pending.report->outcome != Outcome::kAccepted) continue;
-    if (options_.fuse != Fuse::kJoint && is_apart(pending)) {
+    if (options_.fuse != Fuse::kJoint && starts_group(pending)) {
       Update(group);
       group.clear();
     }
@@ -147,48 +147,49 @@ void FilterEngine::UpdateInGroups(std::span<PendingMeasurement> all) {
   Update(group);
 }
 
-/// One update by those of a group that pass.
+/// Performs one update by the measurements of a group that pass the gate.
 void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   PredictAndGate(group);
-  if (landmarks && Consensus::IsAsked(group)) {
+  if (landmarks && Consensus::IsEnabledFor(group)) {
     UpdateByConsensus(group);
   } else {
     Correct(group);
   }
 }
 
-/// One update by those that agree, and a second one by those that it rescues.
+/// Performs one update by the inliers, and a second one by the measurements that it rescues.
 [[gnu::noinline]] void FilterEngine::UpdateByConsensus(std::span<PendingMeasurement* const> group) {
-  groups_.agreed.clear();
-  groups_.rest.clear();
-  consensus_.Split(f, group, static_cast<std::uint64_t>(landmarks->frame()), groups_.agreed,
-                   groups_.rest);
-  Spent(FramePart::kGate);
-  if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
-    for (PendingMeasurement* const pending : groups_.rest) {
-      pending->report->outcome = groups_.agreed.front()->report->outcome;
+  groups_.inliers.clear();
+  groups_.remaining.clear();
+  consensus_.Split(f, group, static_cast<std::uint64_t>(landmarks->frame()), groups_.inliers,
+                   groups_.remaining);
+  AddElapsedTo(FramePart::kGate);
+  // Without an update by the inliers there is no state to rescue the remaining ones with.
+  if (!groups_.inliers.empty() && !Correct(groups_.inliers)) {
+    for (PendingMeasurement* const pending : groups_.remaining) {
+      pending->report->outcome = groups_.inliers.front()->report->outcome;
     }
     return;
   }
-  PredictAndGate(groups_.rest);
-  std::erase_if(groups_.rest, [&](const PendingMeasurement* pending) {
-    if (consensus_.Rescues(*pending)) return false;
+  PredictAndGate(groups_.remaining);
+  std::erase_if(groups_.remaining, [&](const PendingMeasurement* pending) {
+    if (consensus_.PassesRescueGate(*pending)) return false;
     pending->report->outcome = Outcome::kGated;
     return true;
   });
-  if (Correct(groups_.rest)) {
-    f.report.landmarks.rescued += static_cast<int>(groups_.rest.size());
+  if (Correct(groups_.remaining)) {
+    f.report.landmarks.rescued += static_cast<int>(groups_.remaining.size());
   }
 }
 
-/// Predicts all rows of a group at the state, and leaves those that pass the gate, each by itself.
+/// Predicts all measurements of a group at the state, and removes those that the gate rejects.
 void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   int capacity = 0;
   for (PendingMeasurement* const pending : group) {
     pending->report->outcome = method->Predict(f, *pending);
     if (pending->report->outcome == Outcome::kAccepted) capacity += pending->report->dof;
   }
-  Spent(FramePart::kEvaluate);
+  AddElapsedTo(FramePart::kEvaluate);
   method->BeginUpdate(f, capacity);
   int columns = 0;
   auto passed = group.begin();
@@ -202,19 +203,19 @@ void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
     columns += pending->report->dof;
   }
   group.erase(passed, group.end());
-  Spent(FramePart::kGate);
+  AddElapsedTo(FramePart::kGate);
 }
 
-/// False where there is no update.
+/// Performs one update. Returns false if the state is unchanged.
 bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   if (rows.empty()) return false;
   gate_.ApplyRobustWeights(rows);
   const Outcome outcome = method->Correct(f, rows);
-  Spent(FramePart::kUpdate);
+  AddElapsedTo(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
-    Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
+    AddEvent(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
   } else if (outcome == Outcome::kNotFinite) {
-    Note(f, "not_finite", "the update is not finite; rolled back");
+    AddEvent(f, "not_finite", "the update is not finite; rolled back");
   }
   if (outcome != Outcome::kAccepted) {
     for (const PendingMeasurement* const pending : rows) {
@@ -235,27 +236,27 @@ bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
 std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark,
                                                const std::vector<double>& known) {
   if (f.health.ended || f.report.stale) return std::nullopt;
-  Measurement one;
-  one.landmark = landmark;
-  one.known = known;
+  Measurement measurement;
+  measurement.landmark = landmark;
+  measurement.known = known;
   const Geometry& geometry = f.problem_index->problem.sensors[static_cast<std::size_t>(sensor)]
                                  .model->measurement()
                                  .geometry;
-  one.values.resize(static_cast<std::size_t>(geometry.ambient));
-  geometry.Identity(one.values.data());
-  PendingMeasurement& pending = rows_.CollectOne(one, sensor, *f.problem_index, f.report);
+  measurement.values.resize(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(measurement.values.data());
+  PendingMeasurement& pending = rows_.CollectOne(measurement, sensor, *f.problem_index, f.report);
   if (landmarks) landmarks->Attach(f, {&pending, 1});
   if (pending.report->outcome != Outcome::kAccepted || !IsReady(f, pending) ||
-      PredictAt(f, pending, f.state.values(), one.values.data()) != Outcome::kAccepted) {
+      PredictAt(f, pending, f.state.values(), measurement.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
-  std::ranges::copy(one.values, pending.z);  // as if it measured what it expects
+  std::ranges::copy(measurement.values, pending.z);  // z = h: the innovation is zero
   if (method->Predict(f, pending) != Outcome::kAccepted) return std::nullopt;
   const int m = pending.report->dof;
   method->BeginUpdate(f, m);
   pending.linearised.column = 0;
   const Outcome outcome = gate_.Test(f, pending, method->ComputeNis(f, pending));
-  // Gated: h at the estimate lies far from its mean.
+  // kGated is possible: h at the estimate may lie far from the mean of h.
   if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   return Prediction{{pending.report->h.begin(), pending.report->h.end()},
                     Eigen::Map<const RowMajor>(pending.s, m, m)};

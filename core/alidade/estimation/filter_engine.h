@@ -19,39 +19,40 @@
 
 namespace alidade::internal {
 
-/// Refuses an option of a filter that is out of its range. Error kBadConfig, if not `holds`.
-void ExpectOption(bool holds, const char* option, double value, const char* expected);
+/// Checks an option of a filter. Throws Error kBadConfig if it is not `in_range`.
+void ExpectOption(bool in_range, const char* option, double value, const char* expected);
 
-/// The engine of every recursive filter: its parts, and the way of a frame through them:
+/// Engine of every recursive filter. Processes a frame by these parts, in this order:
 ///
 ///   step         StepTo            Timeline::NextSubStep, UpdateMethod::Step
 ///   collect                        PendingMeasurements::Collect, by measurement and sensor
 ///   initialise                     InitialiseWaiting, LandmarkMap::Attach
-///   group        UpdateInGroups    Update of each group by itself, as `fuse` has them:
+///   group        UpdateInGroups    Update of each group that `fuse` defines:
 ///   predict      PredictAndGate    UpdateMethod::Predict of each measurement
 ///   gate                           UpdateMethod::ComputeNis and Gate::Test of each;
 ///                                  Consensus::Split
 ///   correct      Correct           Gate::ApplyRobustWeights, UpdateMethod::Correct
 ///   recover                        Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                      LandmarkMap::Maintain
-///   inputs                         Timeline::TakeInputs: they act from here on
+///   inputs                         Timeline::TakeInputs: they act from the frame's timestamp on
 ///
-/// Parts point to the problem index, which copies share, and not into one another. So a copy is a
-/// filter by itself.
+/// Parts point to the problem index, which copies share, and not to each other. A copy is therefore
+/// an independent filter.
 class FilterEngine {
  public:
   FilterEngine(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
                std::unique_ptr<UpdateMethod> method);
 
-  /// All that Filter::Process does. The report is in f.
+  /// Implements Filter::Process. The report is in f.
   void Process(const Frame& frame);
-  /// What the sensor, an index into Problem::sensors, would measure now; as Filter::Expect.
+  /// Predicts a measurement of the sensor at the current time, as Filter::Expect. `sensor` is an
+  /// index into Problem::sensors.
   std::optional<Prediction> Expect(int sensor, std::int64_t landmark,
                                    const std::vector<double>& known);
 
   FilterState f;
   ClonePtr<UpdateMethod> method;
-  std::optional<LandmarkMap> landmarks;  ///< where the problem has any
+  std::optional<LandmarkMap> landmarks;  ///< if the problem has landmarks
 
  private:
   void Run(const Frame& frame);
@@ -61,11 +62,11 @@ class FilterEngine {
   void UpdateByConsensus(std::span<PendingMeasurement* const> group);
   void PredictAndGate(std::vector<PendingMeasurement*>& group);
   bool Correct(std::span<PendingMeasurement* const> rows);
-  void Spent(FramePart part);
+  void AddElapsedTo(FramePart part);
 
-  /// One group of rows, and what becomes of it.
+  /// One group of measurements, and its division into inliers and remaining ones.
   struct Groups {
-    std::vector<PendingMeasurement*> group, agreed, rest;
+    std::vector<PendingMeasurement*> group, inliers, remaining;
   };
 
   EkfOptions options_;
@@ -73,8 +74,8 @@ class FilterEngine {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
-  bool stale_noted_ = false;                     ///< the last frame was stale
-  std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
+  bool stale_reported_ = false;                       ///< the last frame was stale
+  std::chrono::steady_clock::time_point part_start_;  ///< of the current FramePart
   Scratch<PendingMeasurements> rows_;
   Scratch<Groups> groups_;
 };

@@ -8,12 +8,12 @@
 #include "alidade/base/number_text.h"
 
 namespace alidade::internal {
-FilterState::FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_first_estimates)
-    : problem_index(std::move(of)),
+FilterState::FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates)
+    : problem_index(std::move(index)),
       state(problem_index->initial),
       motions(*problem_index),
       first_estimates(problem_index->problem.layout.blocks().size()),
-      keeps_first_estimates_(keeps_first_estimates) {
+      uses_first_estimates_(uses_first_estimates) {
   health.out_of_domain.assign(problem_index->sensor_places.size(), 0);
   health.inflated = health.out_of_domain;
   Activate();
@@ -21,22 +21,22 @@ FilterState::FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_firs
 
 void FilterState::Activate() {
   const std::size_t count = problem_index->problem.layout.blocks().size();
-  blocks.waiting = blocks.considering = false;
+  blocks.has_missing = blocks.has_consider = false;
   blocks.gain_rows.clear();
   for (std::size_t i = 0; i < count; ++i) {
     const Block& block = state.layout()[static_cast<BlockId>(i)];
-    blocks.waiting |= !block.present;
-    blocks.considering |= block.present && block.status == BlockStatus::kConsider;
+    blocks.has_missing |= !block.present;
+    blocks.has_consider |= block.present && block.status == BlockStatus::kConsider;
     for (int k = 0; block.has_covariance() && k < block.geometry().tangent; ++k) {
       blocks.gain_rows.push_back(block.tangent_offset + k);
     }
   }
   motions.Activate(state.layout());
-  if (keeps_first_estimates_) KeepFirstEstimates();
+  if (uses_first_estimates_) StoreFirstEstimates();
 }
 
-/// The values of stationary blocks that have none noted yet.
-void FilterState::KeepFirstEstimates() {
+/// Stores the values of stationary blocks whose first estimate is not stored yet.
+void FilterState::StoreFirstEstimates() {
   for (const MotionBinding& motion : problem_index->problem.motions) {
     if (!motion.model->stationary()) continue;
     for (const BlockId id : motion.blocks) {
@@ -48,7 +48,7 @@ void FilterState::KeepFirstEstimates() {
   }
 }
 
-[[gnu::noinline]] Event& Note(FilterState& f, const char* kind, std::string text) {
+[[gnu::noinline]] Event& AddEvent(FilterState& f, const char* kind, std::string text) {
   f.report.events.push_back({f.timestamp, kind, std::move(text)});
   return f.report.events.back();
 }
@@ -66,17 +66,17 @@ std::string Describe(const State& state, std::span<const BlockId> blocks) {
   return text;
 }
 
-void NoteDivergence(FilterState& f, const char* kind, std::string text) {
+void AddDivergenceEvent(FilterState& f, const char* kind, std::string text) {
   f.health.diverged = true;
-  Note(f, kind, std::move(text)).divergence = true;
+  AddEvent(f, kind, std::move(text)).divergence = true;
 }
 
-[[gnu::noinline]] void End(FilterState& f, const char* kind, const std::string& what) {
+[[gnu::noinline]] void End(FilterState& f, const char* kind, const std::string& reason) {
   f.health.ended = true;
-  std::vector<BlockId> all(f.problem_index->problem.layout.blocks().size());
-  std::iota(all.begin(), all.end(), 0);
-  std::string text =
-      what + "; last good state at " + SecondsText(f.timestamp) + ": " + Describe(f.state, all);
+  std::vector<BlockId> blocks(f.problem_index->problem.layout.blocks().size());
+  std::iota(blocks.begin(), blocks.end(), 0);
+  std::string text = reason + "; last good state at " + SecondsText(f.timestamp) + ": " +
+                     Describe(f.state, blocks);
   if (f.health.last_used.sensor >= 0) {
     text +=
         "; last measurement used: sensor '" +
@@ -84,7 +84,7 @@ void NoteDivergence(FilterState& f, const char* kind, std::string text) {
         "' at " + SecondsText(f.health.last_used.timestamp) + ", z =";
     for (const double z : f.health.last_used.z) text += ' ' + RoundedText(z, 6);
   }
-  NoteDivergence(f, kind, std::move(text));
+  AddDivergenceEvent(f, kind, std::move(text));
 }
 
 }  // namespace alidade::internal

@@ -15,7 +15,7 @@
 
 namespace alidade::internal {
 
-/// Health of a filter, and which findings were reported already: each is reported once.
+/// Health of a filter, and the findings that were already reported: each is reported once.
 struct Health {
   std::vector<char> out_of_domain, inflated;  ///< by sensor: since its last acceptance
   bool diverged = false, ended = false;
@@ -28,17 +28,17 @@ struct Health {
 };
 
 /// State shared by the parts of a filter: x and P, the time, the motion models, the report. Only an
-/// UpdateMethod changes P of blocks that have a value, because it may store a root of P; exceptions
-/// are documented where they are. A copy is a snapshot.
+/// UpdateMethod changes P of blocks that have a value, because it may store a root of P. A function
+/// that makes an exception documents it. A copy is a snapshot.
 struct FilterState {
-  FilterState(std::shared_ptr<const ProblemIndex> of, bool keeps_first_estimates);
+  FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Updates what depends on which blocks have a value. Has to be called when a block gets its
-  /// first value, or a new one that replaces a rejected one.
+  /// Updates the members that depend on the set of blocks with a value. Has to be called when a
+  /// block gets its first value, or a new value that replaces a rejected one.
   void Activate();
   /// Whether first_estimates are in use (JacobianPolicy::kFirstEstimate).
-  bool keeps_first_estimates() const { return keeps_first_estimates_; }
+  bool uses_first_estimates() const { return uses_first_estimates_; }
 
   std::shared_ptr<const ProblemIndex> problem_index;
   State state;
@@ -50,8 +50,8 @@ struct FilterState {
   Health health;
   /// Summary of the blocks of the problem, by Activate.
   struct {
-    bool waiting = false;        ///< a block has no value yet
-    bool considering = false;    ///< a block is a consider state
+    bool has_missing = false;    ///< a block has no value yet
+    bool has_consider = false;   ///< a block is a consider state
     std::vector<int> gain_rows;  ///< rows of P of the blocks that have a value
   } blocks;
   /// Temporary matrices. A function that uses it has a Workspace::Use.
@@ -60,18 +60,18 @@ struct FilterState {
   Scratch<KalmanUpdate> update;        ///< the last update of a method with Jacobians
 
  private:
-  void KeepFirstEstimates();
+  void StoreFirstEstimates();
 
-  bool keeps_first_estimates_;
+  bool uses_first_estimates_;
 };
 
-/// Adds an event to the report. Its timestamp is set at the end of the frame.
-Event& Note(FilterState& f, const char* kind, std::string text);
-/// Adds an event after which the filter counts as diverged.
-void NoteDivergence(FilterState& f, const char* kind, std::string text);
-/// `block = value, ...` of those of the blocks that have a value.
+/// Appends an event to the report. Its timestamp is set at the end of the frame.
+Event& AddEvent(FilterState& f, const char* kind, std::string text);
+/// Appends an event after which the filter counts as diverged.
+void AddDivergenceEvent(FilterState& f, const char* kind, std::string text);
+/// Returns `block = value, ...` for those of the blocks that have a value.
 std::string Describe(const State& state, std::span<const BlockId> blocks);
-/// Ends the filter with an event: what happened, the last good state, the last used measurement.
-void End(FilterState& f, const char* kind, const std::string& what);
+/// Ends the filter with an event: the reason, the last good state, the last used measurement.
+void End(FilterState& f, const char* kind, const std::string& reason);
 
 }  // namespace alidade::internal

@@ -9,11 +9,11 @@
 
 namespace alidade {
 
-/// A named stream of measurements, or of true values.
+/// Named stream of measurements, or of true values.
 struct StreamInfo {
   std::string name;
   int size = 1;
-  double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
+  double sigma = 0.0;  ///< of true values: standard deviation of each element, in the tangent space
   int known = 0;       ///< known numbers that come with each measurement
 };
 
@@ -23,12 +23,12 @@ struct Measurement {
   int stream = 0;  ///< index into the streams of the source
   std::int64_t landmark = -1;
   std::vector<double> values;
-  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
-  /// What its sensor takes as known with it: where the satellite was. Mostly empty.
+  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: the model's
+  /// Known numbers of the sensor model, such as the position of the satellite. Mostly empty.
   std::vector<double> known = {};
 };
 
-/// What was measured at one timestamp, in the order of the source: all that an estimator sees.
+/// Measurements of one timestamp, in the order of the source. The only input of an estimator.
 struct Frame {
   Timestamp timestamp = 0;
   std::vector<Measurement> measurements;

@@ -12,7 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
+/// Returns whether a measurement counts as a rejection. Non-finite measurements, for which h was
+/// not computed, do not count.
 bool IsRejected(const MeasurementReport& entry) {
   return InfoOf(entry.outcome).is_rejection &&
          (entry.outcome != Outcome::kNotFinite || !entry.h.empty());
@@ -21,58 +22,59 @@ bool IsRejected(const MeasurementReport& entry) {
 }  // namespace
 
 Gate::Gate(const Problem& problem, const EkfOptions& options)
-    : gates_(options.gate < 1.0),
-      warned_(problem.sensors.size(), false),
+    : has_gate_(options.gate < 1.0),
+      is_warned_(problem.sensors.size(), false),
       rejections_(problem.sensors.size(), 0),
-      most_rejections_(options.rejection_recovery == RejectionRecovery::kNone
-                           ? 0
-                           : options.rejection_recovery_after) {
+      max_rejections_(options.rejection_recovery == RejectionRecovery::kNone
+                          ? 0
+                          : options.rejection_recovery_after) {
   for (const SensorBinding& sensor : problem.sensors) {
-    weighs_ |= sensor.loss.kind != LossKind::kNone;
+    has_robust_loss_ |= sensor.loss.kind != LossKind::kNone;
     thresholds_.push_back(
-        gates_ ? ChiSquareQuantile(options.gate, sensor.model->measurement().geometry.tangent)
-               : std::numeric_limits<double>::max());
+        has_gate_ ? ChiSquareQuantile(options.gate, sensor.model->measurement().geometry.tangent)
+                  : std::numeric_limits<double>::max());
   }
 }
 
-/// Of a row whose NIS is too large, infinite or not a number.
-[[gnu::noinline]] Outcome Gate::Refuse(FilterState& f, PendingMeasurement& pending, double nis) {
+/// Handles a measurement whose NIS is too large, infinite or NaN.
+[[gnu::noinline]] Outcome Gate::Reject(FilterState& f, PendingMeasurement& pending, double nis) {
   if (!std::isfinite(nis)) {
-    const Outcome outcome = Defect(f, pending);
+    const Outcome outcome = CheckFinite(f, pending);
     if (outcome != Outcome::kAccepted) return outcome;
-    if (!gates_ && !std::isnan(nis)) return Pass(f, pending, nis);
+    if (!has_gate_ && !std::isnan(nis)) return Accept(f, pending, nis);
   }
   CheckConditioning(f, pending);
   pending.report->nis = std::isnan(nis) ? 0.0 : nis;
   if (!std::isnan(nis)) return Outcome::kGated;
-  Note(f, "not_pd", "sensor '" + pending.binding->name + "': S is not positive definite");
+  AddEvent(f, "not_pd", "sensor '" + pending.binding->name + "': S is not positive definite");
   return Outcome::kNotPd;
 }
 
-[[gnu::noinline]] Outcome Gate::Weigh(PendingMeasurement& pending, double nis) {
+[[gnu::noinline]] Outcome Gate::ComputeRobustWeight(PendingMeasurement& pending, double nis) {
   pending.weight = Weight(pending.binding->loss, std::sqrt(nis));
   if (pending.weight == 1.0) return Outcome::kAccepted;
   const double widest = *std::ranges::max_element(pending.R) / pending.weight;
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
-/// kNotFinite if a number of the row is not finite, else kAccepted.
-Outcome Gate::Defect(FilterState& f, PendingMeasurement& pending) {
+/// Returns kNotFinite if a number of the measurement is not finite, else kAccepted.
+Outcome Gate::CheckFinite(FilterState& f, PendingMeasurement& pending) {
   MeasurementReport& entry = *pending.report;
-  const char* const what = !AllFinite(entry.h)            ? "h"
-                           : !AllFinite(pending.H)        ? "H"
-                           : !AllFinite(pending.R)        ? "R"
-                           : !AllFinite(entry.innovation) ? "the innovation"
-                           : !AllFinite(entry.s)          ? "S = H P H' + R"
-                                                          : nullptr;
-  if (what == nullptr) return Outcome::kAccepted;
+  const char* const quantity = !AllFinite(entry.h)            ? "h"
+                               : !AllFinite(pending.H)        ? "H"
+                               : !AllFinite(pending.R)        ? "R"
+                               : !AllFinite(entry.innovation) ? "the innovation"
+                               : !AllFinite(entry.s)          ? "S = H P H' + R"
+                                                              : nullptr;
+  if (quantity == nullptr) return Outcome::kAccepted;
   entry.s = {};
-  Note(f, "not_finite", "sensor '" + pending.binding->name + "': " + what + " is not finite");
+  AddEvent(f, "not_finite",
+           "sensor '" + pending.binding->name + "': " + quantity + " is not finite");
   return Outcome::kNotFinite;
 }
 
 void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
-  if (!weighs_) return;
+  if (!has_robust_loss_) return;
   for (PendingMeasurement* const pending : rows) {
     if (pending->weight == 1.0) continue;
     for (std::size_t i = 0; i < pending->R.size(); ++i) {
@@ -83,25 +85,25 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   }
 }
 
-/// Of a measurement that was not accepted. Whether its sensor has to recover.
+/// Counts a measurement that was not accepted. Returns whether the filter has to recover.
 [[gnu::noinline]] bool Gate::CountRejection(const MeasurementReport& entry) {
-  if (most_rejections_ == 0 || !IsRejected(entry)) return false;
+  if (max_rejections_ == 0 || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
-  if (++count < most_rejections_) return false;
+  if (++count < max_rejections_) return false;
   count = 0;
   return true;
 }
 
-/// Once for each sensor whose noise vanishes compared with H P H'.
+/// Reports, once per sensor, that the noise is negligible compared with H P H'.
 [[gnu::noinline]] void Gate::WarnOfConditioning(FilterState& f, const PendingMeasurement& pending,
                                                 std::size_t i) {
   const auto sensor = static_cast<std::size_t>(pending.sensor);
-  if (warned_[sensor]) return;
-  warned_[sensor] = true;
-  Note(f, "conditioning",
-       "sensor '" + pending.binding->name + "': noise variance " + RoundedText(pending.R[i], 3) +
-           " vanishes compared with H P H' = " + RoundedText(pending.s[i] - pending.R[i], 3) +
-           "; S is badly conditioned");
+  if (is_warned_[sensor]) return;
+  is_warned_[sensor] = true;
+  AddEvent(f, "conditioning",
+           "sensor '" + pending.binding->name + "': noise variance " +
+               RoundedText(pending.R[i], 3) + " is negligible compared with H P H' = " +
+               RoundedText(pending.s[i] - pending.R[i], 3) + "; S is badly conditioned");
 }
 
 }  // namespace alidade::internal

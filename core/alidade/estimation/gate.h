@@ -11,7 +11,7 @@ namespace alidade::internal {
 
 /// Chi-square gate: accepts a measurement if its NIS r' S^-1 r is at most the quantile of the
 /// configured probability. Also computes the robust-loss weight, and counts consecutive rejections
-/// by sensor. A copy is a snapshot.
+/// per sensor. A copy is a snapshot.
 class Gate {
  public:
   Gate(const Problem& problem, const EkfOptions& options);
@@ -19,14 +19,14 @@ class Gate {
   /// Tests a measurement by its NIS, and computes its robust weight w. Returns kAccepted, or the
   /// reason for a rejection. A measurement whose R / w is not finite is rejected.
   Outcome Test(FilterState& f, PendingMeasurement& pending, double nis) {
-    return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Pass(f, pending, nis)
-                                                                        : Refuse(f, pending, nis);
+    return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Accept(f, pending, nis)
+                                                                        : Reject(f, pending, nis);
   }
-  /// R <- R / w, in R and in S, of measurements that passed.
+  /// Divides R by the robust weight w, in R and in S, for measurements that passed.
   void ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const;
 
-  /// Counts the outcome of a measurement. Returns whether its sensor was rejected so often in a row
-  /// that the filter has to recover; then the count starts again.
+  /// Counts the outcome of a measurement. Returns true if the consecutive rejections of its sensor
+  /// reached the limit, so that the filter has to recover. The count then restarts.
   bool Count(FilterState& f, const MeasurementReport& entry) {
     if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
       return CountRejection(entry);
@@ -38,31 +38,34 @@ class Gate {
   }
 
  private:
-  Outcome Pass(FilterState& f, PendingMeasurement& pending, double nis) {
+  Outcome Accept(FilterState& f, PendingMeasurement& pending, double nis) {
     CheckConditioning(f, pending);
     pending.report->nis = nis;
     pending.weight = 1.0;
-    return pending.binding->loss.kind == LossKind::kNone ? Outcome::kAccepted : Weigh(pending, nis);
+    return pending.binding->loss.kind == LossKind::kNone ? Outcome::kAccepted
+                                                         : ComputeRobustWeight(pending, nis);
   }
-  Outcome Refuse(FilterState& f, PendingMeasurement& pending, double nis);
-  static Outcome Defect(FilterState& f, PendingMeasurement& pending);
-  static Outcome Weigh(PendingMeasurement& pending, double nis);
+  Outcome Reject(FilterState& f, PendingMeasurement& pending, double nis);
+  static Outcome CheckFinite(FilterState& f, PendingMeasurement& pending);
+  static Outcome ComputeRobustWeight(PendingMeasurement& pending, double nis);
   void CheckConditioning(FilterState& f, const PendingMeasurement& pending) {
     const auto m = static_cast<std::size_t>(pending.place->dof);
-    for (std::size_t i = 0; i < m; ++i) {  // on the diagonals of R and S
-      const std::size_t at = i * (m + 1);
-      if (!(pending.R[at] > 1e-13 * pending.s[at])) return WarnOfConditioning(f, pending, at);
+    for (std::size_t i = 0; i < m; ++i) {
+      const std::size_t diagonal = i * (m + 1);
+      if (!(pending.R[diagonal] > 1e-13 * pending.s[diagonal])) {
+        return WarnOfConditioning(f, pending, diagonal);
+      }
     }
   }
   void WarnOfConditioning(FilterState& f, const PendingMeasurement& pending, std::size_t i);
   bool CountRejection(const MeasurementReport& entry);
 
-  bool gates_;                      ///< whether there is a gate: else what overflows passes too
+  bool has_gate_;                   ///< false: an infinite NIS passes too
   std::vector<double> thresholds_;  ///< on r' S^-1 r, by sensor; finite
-  bool weighs_ = false;             ///< whether a sensor has a robust loss
-  std::vector<bool> warned_;        ///< by sensor
+  bool has_robust_loss_ = false;    ///< whether any sensor has one
+  std::vector<bool> is_warned_;     ///< by sensor
   std::vector<int> rejections_;     ///< consecutive, by sensor
-  int most_rejections_;             ///< in a row; 0: without bound
+  int max_rejections_;              ///< consecutive; 0: unlimited
 };
 
 }  // namespace alidade::internal

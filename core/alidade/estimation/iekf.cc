@@ -18,13 +18,13 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// r' R^-1 r for R = L L', L the lower triangle of `l`; r becomes L^-1 r.
+/// Returns r' R^-1 r for R = L L', L the lower triangle of `l`. Sets r to L^-1 r.
 double SquaredNorm(const Workspace::Matrix& l, Workspace::Vector& r) {
   l.triangularView<Eigen::Lower>().solveInPlace(r);
   return r.squaredNorm();
 }
 
-/// Gauss-Newton over an update of EkfEquations.
+/// Equations of Iekf: Gauss-Newton iterations over updates of EkfEquations.
 class IekfEquations : public UpdateMethod {
  public:
   IekfEquations(int max_iterations, double tolerance)
@@ -44,61 +44,64 @@ class IekfEquations : public UpdateMethod {
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
  private:
+  /// Result of the iterations.
   struct Minimum {
     Workspace::Vector dx;
     int iterations = 0;
-    /// That is left, in posterior standard deviations; none where h has no Jacobian.
+    /// The next step, in posterior standard deviations; nullopt if h has no Jacobian.
     std::optional<double> step = std::nullopt;
     bool converged = false;
   };
-  /// dx = P v, and a step from there, step = P step_v.
-  struct Direction {
+  /// An iterate dx = P v, and a step from it, step = P step_v.
+  struct IterateStep {
     const Workspace::Vector &dx, &v, &step, &step_v;
   };
   std::optional<Minimum> Minimise(FilterState& f, std::span<PendingMeasurement* const> rows);
-  double PartThatLowersTheCost(FilterState& f, std::span<PendingMeasurement* const> rows,
-                               const Direction& at, const Workspace::Matrix& r,
-                               Workspace::Vector& residual);
-  bool MoveTo(FilterState& f, const double* dx);
-  bool Innovations(FilterState& f, std::span<PendingMeasurement* const> rows,
-                   Workspace::Vector& innovations);
+  double FindStepFraction(FilterState& f, std::span<PendingMeasurement* const> rows,
+                          const IterateStep& full, const Workspace::Matrix& r,
+                          Workspace::Vector& residual);
+  bool SetIterate(FilterState& f, const double* dx);
+  bool ComputeInnovations(FilterState& f, std::span<PendingMeasurement* const> rows,
+                          Workspace::Vector& innovations);
   bool Relinearise(FilterState& f, std::span<PendingMeasurement* const> rows, const double* dx);
 
   EkfEquations ekf_;
   int max_iterations_;
   double tolerance_;
-  std::vector<double> iterate_;        ///< values on the way; the state is the prior
-  std::vector<double> at_prediction_;  ///< h, innovations and S of its rows
+  std::vector<double> iterate_;             ///< values of the iterate; the state is the prediction
+  std::vector<double> prediction_numbers_;  ///< h, innovations and S at the prediction
 };
 
 Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Workspace::Use use(f.work);
-  at_prediction_.clear();
+  prediction_numbers_.clear();
   for (const PendingMeasurement* pending : rows) {
-    at_prediction_.insert(at_prediction_.end(), pending->h, pending->s + pending->report->s.size());
+    prediction_numbers_.insert(prediction_numbers_.end(), pending->h,
+                               pending->s + pending->report->s.size());
   }
   const std::optional<Minimum> minimum = Minimise(f, rows);
   const Outcome outcome = ekf_.CorrectBy(f, rows, minimum ? minimum->dx.data() : nullptr);
-  const double* at = at_prediction_.data();
+  const double* source = prediction_numbers_.data();
   for (const PendingMeasurement* pending : rows) {
     const auto count = pending->s + pending->report->s.size() - pending->h;
-    std::copy_n(at, count, pending->h);
-    at += count;
+    std::copy_n(source, count, pending->h);
+    source += count;
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    Note(f, "not_converged",
-         "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
-             (minimum->step
-                  ? ", a step of " + RoundedText(*minimum->step, 3) + " sigma before its optimum"
-                  : std::string(" where h has no Jacobian")) +
-             "; the last iterate is kept");
+    AddEvent(f, "not_converged",
+             "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+                 (minimum->step ? ", a step of " + RoundedText(*minimum->step, 3) +
+                                      " sigma before its optimum"
+                                : std::string(" because h has no Jacobian")) +
+                 "; the last iterate is used");
   }
   return outcome;
 }
 
-/// The optimum of one update, or the last iterate on the way, which the rows are then linearised
-/// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
-/// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
+/// Computes the minimum of one update, or the last iterate. The measurements are then linearised at
+/// the last iterate at which this is possible. P may be singular: dx = P v for all iterates, so
+/// that dx' P^-1 dx = v' dx. If the first step is not possible, returns nullopt and leaves the
+/// measurements unchanged.
 std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
     FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
@@ -107,36 +110,36 @@ std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
   Workspace::Vector y = f.work.Take(m), residual = f.work.Take(m);
-  Workspace::Vector linearised = f.work.Take(n);  // where the rows last were
+  Workspace::Vector linearised = f.work.Take(n);  // dx of the last linearisation
   Workspace::Matrix s = f.work.Take(m, m), r = f.work.Take(m, m);
   dx.setZero();
   v.setZero();
   linearised.setZero();
   for (bool defined = true;; defined = Relinearise(f, rows, dx.data())) {
     const Workspace::Use use(f.work);
-    const Stacked at = Stack(f, rows);
+    const StackedMeasurements stacked = Stack(f, rows);
     Workspace::Matrix pht = f.work.Take(n, m);
     f.update.CopyColumns(0, pht);
-    s = r = at.noise;
-    AddProduct(s, at.h, pht);
+    s = r = stacked.noise;
+    AddProduct(s, stacked.h, pht);
     if (!defined || !Factorise(s) || !Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
-      MoveTo(f, linearised.data());
+      SetIterate(f, linearised.data());
       Relinearise(f, rows, linearised.data());
       minimum.step.reset();
       break;
     }
     linearised = dx;
     ++minimum.iterations;
-    y = at.innovation;
-    y.noalias() += at.h * dx;
+    y = stacked.innovation;
+    y.noalias() += stacked.h * dx;
     s.triangularView<Eigen::Lower>().solveInPlace(y);
     s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
     step = -dx;
     step.noalias() += pht * y;
     step_v = -v;
-    step_v.noalias() += at.h.transpose() * y;
-    residual.noalias() = at.h * step;
+    step_v.noalias() += stacked.h.transpose() * y;
+    residual.noalias() = stacked.h * step;
     minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, residual));
     if (*minimum.step <= tolerance_) {
       dx += step;
@@ -144,57 +147,58 @@ std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
       break;
     }
     if (minimum.iterations == max_iterations_) break;
-    residual = at.innovation;
-    const double part = PartThatLowersTheCost(f, rows, {dx, v, step, step_v}, r, residual);
-    if (part == 0.0) break;
-    dx += part * step;
-    v += part * step_v;
+    residual = stacked.innovation;
+    const double fraction = FindStepFraction(f, rows, {dx, v, step, step_v}, r, residual);
+    if (fraction == 0.0) break;
+    dx += fraction * step;
+    v += fraction * step_v;
   }
   return minimum;
 }
 
-/// The largest of 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not rise, but for
-/// what rounding makes of it; 0 where there is none. `r` is the factor of R, `residual` the
-/// innovations at dx, then memory.
-double IekfEquations::PartThatLowersTheCost(FilterState& f,
-                                            std::span<PendingMeasurement* const> rows,
-                                            const Direction& at, const Workspace::Matrix& r,
-                                            Workspace::Vector& residual) {
+/// Returns the largest fraction 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not
+/// rise by more than rounding, or 0 if all of them fail. `r` is the factor of R. `residual` has the
+/// innovations at dx, and is overwritten.
+double IekfEquations::FindStepFraction(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                       const IterateStep& full, const Workspace::Matrix& r,
+                                       Workspace::Vector& residual) {
   constexpr double kRounding = 1e-12;
   constexpr int kHalvings = 10;
   const Workspace::Use use(f.work);
-  Workspace::Vector there = f.work.Take(at.dx.size());
-  const double cost = (at.v.dot(at.dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
+  Workspace::Vector dx = f.work.Take(full.dx.size());
+  const double cost = (full.v.dot(full.dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
   for (int halvings = 0; halvings <= kHalvings; ++halvings) {
-    const double part = std::ldexp(1.0, -halvings);
-    there = at.dx + part * at.step;
-    if (MoveTo(f, there.data()) && Innovations(f, rows, residual) &&
-        (at.v + part * at.step_v).dot(there) + SquaredNorm(r, residual) <= cost) {
-      return part;
+    const double fraction = std::ldexp(1.0, -halvings);
+    dx = full.dx + fraction * full.step;
+    if (SetIterate(f, dx.data()) && ComputeInnovations(f, rows, residual) &&
+        (full.v + fraction * full.step_v).dot(dx) + SquaredNorm(r, residual) <= cost) {
+      return fraction;
     }
   }
   return 0.0;
 }
 
-/// Puts the iterate at prior (+) dx. False where that is not finite.
-bool IekfEquations::MoveTo(FilterState& f, const double* dx) {
+/// Sets the iterate to prediction (+) dx. Returns false if it is not finite.
+bool IekfEquations::SetIterate(FilterState& f, const double* dx) {
   return f.state.Retract(dx, iterate_);
 }
 
-/// z (-) h at the iterate, of all rows; false where one is not defined or not finite.
-bool IekfEquations::Innovations(FilterState& f, std::span<PendingMeasurement* const> rows,
-                                Workspace::Vector& innovations) {
-  Eigen::Index at = 0;
+/// Computes z (-) h of all measurements at the iterate. Returns false if an h is not defined or an
+/// innovation is not finite.
+bool IekfEquations::ComputeInnovations(FilterState& f, std::span<PendingMeasurement* const> rows,
+                                       Workspace::Vector& innovations) {
+  Eigen::Index offset = 0;
   for (PendingMeasurement* pending : rows) {
     const SensorModel& model = *pending->model;
     if (PredictAt(f, *pending, iterate_, pending->h) != Outcome::kAccepted) return false;
-    model.measurement().geometry.Minus(pending->z, pending->h, innovations.data() + at);
-    at += pending->report->dof;
+    model.measurement().geometry.Minus(pending->z, pending->h, innovations.data() + offset);
+    offset += pending->report->dof;
   }
   return innovations.allFinite();
 }
 
-/// h, R, d h / d dx and S of all rows at the iterate, which lies at prior (+) dx.
+/// Computes h, R, d h / d dx and S of all measurements at the iterate, prediction (+) dx. Returns
+/// false if a model fails.
 bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* const> rows,
                                 const double* dx) {
   for (PendingMeasurement* pending : rows) {
@@ -204,7 +208,7 @@ bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* co
     if (LineariseAt(*pending, roles) != Outcome::kAccepted) return false;
     for (double& r : pending->R) r /= pending->weight;
     ComputeInnovation(*pending);
-    const double* const* const at = RolesAt(f, *pending, f.state.values());
+    const double* const* const prediction = RolesAt(f, *pending, f.state.values());
     std::size_t part = 0;
     for (std::size_t i = 0; i < place.values.size(); ++i) {
       if (place.columns[i] < 0) continue;
@@ -213,7 +217,7 @@ bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* co
       if (geometry.kind == GeometryKind::kVector) continue;
       const Workspace::Use use(f.work);
       Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
-      PlusJacobian(geometry, at[i], dx + offset, j.data());
+      PlusJacobian(geometry, prediction[i], dx + offset, j.data());
       ChainJacobian(*pending, place.columns[i], geometry.tangent, j.data(), f.work);
     }
     ekf_.ComputeNis(f, *pending);

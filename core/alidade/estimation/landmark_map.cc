@@ -14,10 +14,10 @@
 namespace alidade::internal {
 namespace {
 
-/// A landmark that waits for its initialisation is no more counted after so many frames without it.
-constexpr int kWaitingFrames = 30;
+/// Candidates are deleted after this number of frames without an observation.
+constexpr int kMaxCandidateFrames = 30;
 
-/// The role of a landmark that is a point, m.
+/// Returns the role of a landmark with the representation xyz, m.
 Space Xyz() {
   return {"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
 }
@@ -26,7 +26,7 @@ bool IsUsed(const PendingMeasurement& pending) {
   return pending.report->outcome == Outcome::kAccepted;
 }
 
-/// Of a landmark that has a representation.
+/// Returns pointers to the values of a landmark that has a representation.
 std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
   std::array<const double*, 3> values{};
   const auto value = [&](BlockId id) { return state.value(id); };
@@ -38,7 +38,7 @@ bool HasInverseDistance(const LandmarkRecord& landmark) {
   return landmark.in_state() && landmark.representation && !IsXyz(*landmark.representation);
 }
 
-/// The last element of all that has one.
+/// Returns the inverse distance, the last element of each representation that has one.
 double InverseDistance(const State& state, const LandmarkRecord& landmark) {
   const BlockId last = landmark.blocks.back();
   return state.value(last)[state.layout()[last].geometry().ambient - 1];
@@ -55,11 +55,11 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
                      InverseDistanceSigma(state, landmark), camera);
 }
 
-/// J P J' of the blocks of a landmark.
+/// Returns J P J' for the blocks of a landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
                              const LandmarkPoint& point) {
-  constexpr int kWidest = 6;
-  std::array<int, kWidest> rows;  // of P
+  constexpr int kMaxRows = 6;
+  std::array<int, kMaxRows> rows;  // of P
   auto jacobian = point.jacobian;
   int used = 0, column = 0;
   for (const BlockId id : landmark.blocks) {
@@ -77,74 +77,74 @@ Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
   return covariance;
 }
 
-/// Of a landmark in the state.
+/// Returns the estimate of a landmark in the state.
 LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkRecord& landmark) {
-  LandmarkEstimate one;
-  one.id = id;
-  one.generation = landmark.generation;
-  one.representation = landmark.representation;
-  one.first = landmark.first;
-  one.last = landmark.last;
-  one.tried = landmark.tried;
-  one.accepted = landmark.accepted;
+  LandmarkEstimate estimate;
+  estimate.id = id;
+  estimate.generation = landmark.generation;
+  estimate.representation = landmark.representation;
+  estimate.first = landmark.first;
+  estimate.last = landmark.last;
+  estimate.tried = landmark.tried;
+  estimate.accepted = landmark.accepted;
   if (HasInverseDistance(landmark)) {
-    one.inverse_distance = InverseDistance(state, landmark);
-    one.sigma = InverseDistanceSigma(state, landmark);
+    estimate.inverse_distance = InverseDistance(state, landmark);
+    estimate.sigma = InverseDistanceSigma(state, landmark);
   }
   if (!landmark.representation) {
-    for (const BlockId of : landmark.blocks) {
-      const Block& block = state.layout()[of];
+    for (const BlockId block_id : landmark.blocks) {
+      const Block& block = state.layout()[block_id];
       if (block.space.name != "landmark_position" || block.geometry().tangent != 3) continue;
-      one.position = Eigen::Map<const Eigen::Vector3d>(state.value(of));
-      one.covariance = state.covariance()
-                           .lower()
-                           .block<3, 3>(block.tangent_offset, block.tangent_offset)
-                           .selfadjointView<Eigen::Lower>();
+      estimate.position = Eigen::Map<const Eigen::Vector3d>(state.value(block_id));
+      estimate.covariance = state.covariance()
+                                .lower()
+                                .block<3, 3>(block.tangent_offset, block.tangent_offset)
+                                .selfadjointView<Eigen::Lower>();
     }
-    return one;
+    return estimate;
   }
   const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
-  if (!point) return one;
-  one.position = point->position;
-  one.covariance = CovarianceOf(state, landmark, *point);
-  return one;
+  if (!point) return estimate;
+  estimate.position = point->position;
+  estimate.covariance = CovarianceOf(state, landmark, *point);
+  return estimate;
 }
 
 }  // namespace
 
-int LandmarkIdReuse::Of(std::int64_t id) const {
-  const auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
-  return found == ended_.end() || found->id != id ? 0 : found->generation;
+int LandmarkIdReuse::CountOf(std::int64_t id) const {
+  const auto found = std::ranges::lower_bound(deletions_, id, {}, &Deletion::id);
+  return found == deletions_.end() || found->id != id ? 0 : found->count;
 }
 
-void LandmarkIdReuse::End(std::int64_t id, int generation) {
-  constexpr std::int64_t kMost = 100'000;
-  auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
-  if (found == ended_.end() || found->id != id) found = ended_.insert(found, Ended{});
-  *found = {id, ++ends_, generation};
-  if (std::ssize(ended_) <= kMost) return;
-  std::erase_if(ended_, [&](const Ended& one) { return one.order <= ends_ - kMost / 2; });
+void LandmarkIdReuse::Record(std::int64_t id, int count) {
+  constexpr std::int64_t kMaxSize = 100'000;
+  auto found = std::ranges::lower_bound(deletions_, id, {}, &Deletion::id);
+  if (found == deletions_.end() || found->id != id) found = deletions_.insert(found, Deletion{});
+  *found = {id, ++total_, count};
+  if (std::ssize(deletions_) <= kMaxSize) return;
+  std::erase_if(deletions_,
+                [&](const Deletion& deletion) { return deletion.order <= total_ - kMaxSize / 2; });
 }
 
 LandmarkMap::LandmarkMap(const ProblemIndex& index)
     : options_(*index.problem.landmarks), xyz_(Xyz()) {
   for (const SensorBinding& sensor : index.problem.sensors) {
-    Family& family = families_.emplace_back();
+    LandmarkSensorInfo& info = sensor_infos_.emplace_back();
     const std::vector<Space>& roles = sensor.model->roles();
-    family.representation = RepresentationOf(roles);
+    info.representation = RepresentationOf(roles);
     for (std::size_t i = 0; i < roles.size(); ++i) {
-      if (roles[i].name == "position") family.position = static_cast<int>(i);
-      ALIDADE_EXPECTS(roles[i].landmark() || family.first < 0);
+      if (roles[i].name == "position") info.position = static_cast<int>(i);
+      ALIDADE_EXPECTS(roles[i].landmark() || info.first < 0);
       if (!roles[i].landmark()) continue;
-      if (family.first < 0) family.first = static_cast<int>(i);
-      family.roles.push_back(roles[i]);
+      if (info.first < 0) info.first = static_cast<int>(i);
+      info.roles.push_back(roles[i]);
     }
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model->inverse().prior_size == 0 ||
+    ALIDADE_EXPECTS(info.first < 0 || sensor.model->inverse().prior_size == 0 ||
                     (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
                      options_.prior->sigma >= 0.0));
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model->inverse().prior_size <= 1);
-    ALIDADE_EXPECTS(family.first < 0 || family.representation == XyzRepresentation() ||
-                    sensor.xyz ||
+    ALIDADE_EXPECTS(info.first < 0 || sensor.model->inverse().prior_size <= 1);
+    ALIDADE_EXPECTS(info.first < 0 || info.representation == XyzRepresentation() || sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
   }
 }
@@ -156,7 +156,7 @@ BlockId LandmarkMap::Declare(FilterState& f, std::int64_t id, const Space& role,
   name_ += '.';
   name_ += role.name;
   name_ += '#';
-  name_ += std::to_string(names_++);
+  name_ += std::to_string(block_name_counter_++);
   return f.state.Declare(name_, "landmarks", role, status);
 }
 
@@ -164,7 +164,7 @@ void LandmarkMap::AddKnown(FilterState& f) {
   for (const KnownLandmark& known : options_.known) {
     LandmarkRecord& landmark = landmarks_[known.id];
     landmark.representation = XyzRepresentation();
-    landmark.known = true;
+    landmark.is_known = true;
     landmark.blocks = {Declare(
         f, known.id, xyz_, known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
     f.state.Add(landmark.blocks[0], known.position.data(),
@@ -173,17 +173,17 @@ void LandmarkMap::AddKnown(FilterState& f) {
 }
 
 const double* LandmarkMap::CameraOf(const State& state, const PendingMeasurement& pending) const {
-  const int position = FamilyOf(pending).position;
+  const int position = SensorInfoOf(pending).position;
   if (position < 0) return nullptr;
   const BlockId id = pending.binding->roles[static_cast<std::size_t>(position)].block;
   return id < 0 ? nullptr : state.value(id);
 }
 
 [[gnu::noinline]] void LandmarkMap::Attach(FilterState& f, std::span<PendingMeasurement> rows) {
-  bool any = false;
+  bool has_landmarks = false;
   for (PendingMeasurement& pending : rows) {
-    if (!Has(pending)) continue;
-    any = true;
+    if (!IsOfLandmark(pending)) continue;
+    has_landmarks = true;
     Outcome& outcome = pending.report->outcome;
     if (outcome != Outcome::kAccepted) continue;
     const auto found = landmarks_.find(pending.measurement->landmark);
@@ -195,18 +195,18 @@ const double* LandmarkMap::CameraOf(const State& state, const PendingMeasurement
       outcome = Outcome::kNotReady;
     }
   }
-  if (any) ++frame_;
+  if (has_landmarks) ++frame_;
 }
 
-/// Puts the blocks of the landmark into the row's last roles.
+/// Sets the last roles of the measurement to the blocks of the landmark.
 void LandmarkMap::Attach(const FilterState& f, PendingMeasurement& pending,
                          const LandmarkRecord& landmark) {
-  const Family& family = FamilyOf(pending);
-  pending.own = *pending.place;
-  pending.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(),
-                          landmark.blocks);
-  pending.Bind(pending.own);
-  if (landmark.representation != family.representation) pending.model = pending.binding->xyz.get();
+  const LandmarkSensorInfo& info = SensorInfoOf(pending);
+  pending.landmark_place = *pending.place;
+  pending.landmark_place.PutLandmark(static_cast<std::size_t>(info.first), f.state.layout(),
+                                     landmark.blocks);
+  pending.Bind(pending.landmark_place);
+  if (landmark.representation != info.representation) pending.model = pending.binding->xyz.get();
 }
 
 [[gnu::noinline]] void LandmarkMap::Maintain(FilterState& f, std::span<PendingMeasurement> rows) {
@@ -217,43 +217,45 @@ void LandmarkMap::Attach(const FilterState& f, PendingMeasurement& pending,
   InitialiseNew(f, rows);
 }
 
-/// Takes down which landmarks were seen, and what became of their measurements.
+/// Counts the observations of landmarks, and the outcomes of their measurements.
 void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
   for (const PendingMeasurement& pending : rows) {
-    if (!Has(pending) || (!pending.on_landmark() && pending.report->outcome != Outcome::kNotReady))
+    if (!IsOfLandmark(pending) ||
+        (!pending.is_on_landmark() && pending.report->outcome != Outcome::kNotReady))
       continue;
     if (!IsReady(f, pending)) continue;
     LandmarkRecord& landmark = RecordOf(pending.measurement->landmark);
     if (landmark.first == kNoTimestamp) landmark.first = f.timestamp;
-    if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
-    landmark.seen = frame_;
+    if (landmark.observations == 0 || landmark.last_frame != frame_) ++landmark.observations;
+    landmark.last_frame = frame_;
     landmark.last = f.timestamp;
-    if (!pending.on_landmark()) continue;
+    if (!pending.is_on_landmark()) continue;
     ++landmark.tried;
     landmark.accepted += IsUsed(pending);
   }
 }
 
-/// A new one has the memory of one that is gone.
+/// Returns the record of a landmark. A new record reuses the memory of a deleted one.
 LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
-  const auto at = landmarks_.lower_bound(id);
-  if (at != landmarks_.end() && at->first == id) return at->second;
-  if (spare_.empty()) {
-    LandmarkRecord& landmark = landmarks_.try_emplace(at, id)->second;
-    landmark.generation = generations_.Of(id);
+  const auto entry = landmarks_.lower_bound(id);
+  if (entry != landmarks_.end() && entry->first == id) return entry->second;
+  if (recycled_nodes_.empty()) {
+    LandmarkRecord& landmark = landmarks_.try_emplace(entry, id)->second;
+    landmark.generation = id_reuse_.CountOf(id);
     return landmark;
   }
-  ById::node_type node = std::move(spare_.back());
-  spare_.pop_back();
-  LandmarkRecord fresh;
-  fresh.blocks.swap(node.mapped().blocks);
-  fresh.generation = generations_.Of(id);
+  ById::node_type node = std::move(recycled_nodes_.back());
+  recycled_nodes_.pop_back();
+  LandmarkRecord landmark;
+  landmark.blocks.swap(node.mapped().blocks);
+  landmark.generation = id_reuse_.CountOf(id);
   node.key() = id;
-  node.mapped() = std::move(fresh);
-  return landmarks_.insert(at, std::move(node))->second;
+  node.mapped() = std::move(landmark);
+  return landmarks_.insert(entry, std::move(node))->second;
 }
 
-/// Looks for inverse distances that an update left at zero or below.
+/// Counts landmarks whose inverse distance is at or below zero after an update, and deletes them
+/// with the option negative_depth: delete.
 void LandmarkMap::CheckDepths(FilterState& f) {
   DeleteIf(f, [&](LandmarkRecord& landmark) {
     return IsNegative(f, landmark) &&
@@ -261,74 +263,78 @@ void LandmarkMap::CheckDepths(FilterState& f) {
   });
 }
 
-/// Counts it where it has become so.
+/// Returns whether the inverse distance of a landmark is at or below zero. Counts the change to it.
 bool LandmarkMap::IsNegative(FilterState& f, LandmarkRecord& landmark) {
-  const bool negative = HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
-  f.report.landmarks.negative += negative && !landmark.negative;
-  landmark.negative = negative;
-  return negative;
+  const bool is_negative =
+      HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
+  f.report.landmarks.negative += is_negative && !landmark.is_negative;
+  landmark.is_negative = is_negative;
+  return is_negative;
 }
 
-/// Deletes landmarks that were not seen for long, or fail too often. Known landmarks stay.
+/// Deletes landmarks that missed too many frames or have a low match ratio, but not known ones.
 void LandmarkMap::Prune(FilterState& f) {
   DeleteIf(f, [&](const LandmarkRecord& landmark) {
-    return !landmark.known && (frame_ >= DueOf(landmark) || Fails(landmark));
+    return !landmark.is_known && (frame_ >= PruneFrameOf(landmark) || HasLowMatchRatio(landmark));
   });
 }
 
-/// Whether too few of its measurements are accepted.
-bool LandmarkMap::Fails(const LandmarkRecord& landmark) const {
+/// Returns whether too few measurements of a landmark are accepted.
+bool LandmarkMap::HasLowMatchRatio(const LandmarkRecord& landmark) const {
   return landmark.tried >= options_.min_attempts &&
          landmark.accepted < options_.min_match_ratio * landmark.tried;
 }
 
-/// The frame at which it is lost, unless it is seen before.
-std::int64_t LandmarkMap::DueOf(const LandmarkRecord& landmark) const {
-  const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
-  return most > 0 ? landmark.seen + most : std::numeric_limits<std::int64_t>::max();
+/// Returns the frame at which a landmark is deleted if no earlier frame measures it.
+std::int64_t LandmarkMap::PruneFrameOf(const LandmarkRecord& landmark) const {
+  const int max_frames = landmark.in_state() ? options_.max_missed_frames : kMaxCandidateFrames;
+  return max_frames > 0 ? landmark.last_frame + max_frames
+                        : std::numeric_limits<std::int64_t>::max();
 }
 
 template <class Condition>
 void LandmarkMap::DeleteIf(FilterState& f, const Condition& condition) {
-  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
-    at = condition(at->second) ? Delete(f, at) : std::next(at);
+  for (auto entry = landmarks_.begin(); entry != landmarks_.end();) {
+    entry = condition(entry->second) ? Delete(f, entry) : std::next(entry);
   }
 }
 
-LandmarkMap::ById::iterator LandmarkMap::Delete(FilterState& f, ById::iterator at) {
-  if (at->second.in_state()) {
-    NoteRemoval(f, at->first, at->second);
-    DropBlocks(f, at->second);
+LandmarkMap::ById::iterator LandmarkMap::Delete(FilterState& f, ById::iterator entry) {
+  if (entry->second.in_state()) {
+    RecordRemoval(f, entry->first, entry->second);
+    DropBlocks(f, entry->second);
     ++f.report.landmarks.deleted;
-    generations_.End(at->first, at->second.generation + 1);
+    id_reuse_.Record(entry->first, entry->second.generation + 1);
   }
-  const auto next = std::next(at);
-  spare_.push_back(landmarks_.extract(at));
+  const auto next = std::next(entry);
+  recycled_nodes_.push_back(landmarks_.extract(entry));
   return next;
 }
 
-/// Puts what is known of it, as long as it is in the state, into the report.
-void LandmarkMap::NoteRemoval(FilterState& f, std::int64_t id, const LandmarkRecord& landmark) {
+/// Appends the last estimate of a landmark to the report. The landmark is still in the state.
+void LandmarkMap::RecordRemoval(FilterState& f, std::int64_t id, const LandmarkRecord& landmark) {
   f.report.removed_landmarks.push_back(EstimateOf(f.state, id, landmark));
   f.report.removed_landmarks.back().removed = f.timestamp;
 }
 
-/// A shared block goes with the last landmark on it.
+/// Removes the blocks of a landmark from the state. A shared block is removed with the last
+/// landmark that shares it.
 void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
   for (const BlockId id : landmark.blocks) {
     const auto index = static_cast<std::size_t>(id);
-    const bool shared = index < users_.size() && users_[index] > 0;
-    if (shared && --users_[index] > 0) continue;
+    const bool shared = index < shared_block_refcount_.size() && shared_block_refcount_[index] > 0;
+    if (shared && --shared_block_refcount_[index] > 0) continue;
     f.state.Remove(id);
   }
   landmark.blocks.clear();
 }
 
-/// Turns those landmarks of the frame into xyz that are linear enough.
+/// Converts the landmarks of the frame to xyz whose linearity index is low enough.
 void LandmarkMap::Convert(FilterState& f, std::span<PendingMeasurement> rows) {
   if (!(options_.max_linearity_index > 0.0)) return;
   for (const PendingMeasurement& pending : rows) {
-    if (!pending.on_landmark() || pending.model != pending.binding->model.get() || !IsUsed(pending))
+    if (!pending.is_on_landmark() || pending.model != pending.binding->model.get() ||
+        !IsUsed(pending))
       continue;
     const auto found = landmarks_.find(pending.measurement->landmark);
     if (found == landmarks_.end() || !found->second.in_state()) continue;
@@ -343,71 +349,73 @@ bool LandmarkMap::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& 
   const double linearity = LinearityIndexOf(f.state, landmark, camera);
   const auto point = PointOf(*landmark.representation, ValuesOf(f.state, landmark).data());
   if (!point || !(linearity < options_.max_linearity_index)) return false;
-  const BlockId to = Declare(f, id, xyz_, BlockStatus::kEstimated);
-  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
-  f.state.Initialise({&to, 1}, point->position.data(), landmark.blocks, point->jacobian, none);
+  const BlockId xyz = Declare(f, id, xyz_, BlockStatus::kEstimated);
+  const Eigen::Matrix3d no_noise = Eigen::Matrix3d::Zero();
+  f.state.Initialise({&xyz, 1}, point->position.data(), landmark.blocks, point->jacobian, no_noise);
   DropBlocks(f, landmark);
-  landmark.blocks = {to};
+  landmark.blocks = {xyz};
   landmark.representation = XyzRepresentation();
   return true;
 }
 
-/// Initialises landmarks of this frame that wait, as long as too few are measured.
+/// Initialises candidates that the frame measures, until max_per_frame landmarks are measured.
 void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> rows) {
   FindMeasured(rows);
-  auto measured = std::ssize(measured_);
-  for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
+  auto count = std::ssize(measured_);
+  for (LandmarkSensorInfo& info : sensor_infos_) info.shared.assign(info.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
-  bool asked_map = prior_.adapt_after == 0;
-  Reserve(f, rows, options_.max_per_frame - measured);
+  bool is_prior_adapted = prior_.adapt_after == 0;
+  Reserve(f, rows, options_.max_per_frame - count);
   for (PendingMeasurement& pending : rows) {
-    if (measured >= options_.max_per_frame) return;
-    const auto found = FindWaiting(f, pending);
+    if (count >= options_.max_per_frame) return;
+    const auto found = FindCandidate(f, pending);
     if (found == landmarks_.end()) continue;
-    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state);
-    asked_map = true;
+    if (!is_prior_adapted) prior_.inverse_distance = PriorInverseDistance(f.state);
+    is_prior_adapted = true;
     pending.report->outcome = Initialise(f, found->first, pending, found->second);
     if (pending.report->outcome != Outcome::kInitialised) continue;
     ++f.report.landmarks.initialised;
-    ++measured;
+    ++count;
   }
 }
 
-/// The landmark that the row may initialise, or the end.
-LandmarkMap::ById::iterator LandmarkMap::FindWaiting(const FilterState& f,
-                                                     const PendingMeasurement& pending) {
-  if (!Has(pending) || pending.report->outcome != Outcome::kNotReady || !IsReady(f, pending) ||
-      pending.binding->model->inverse().role != FamilyOf(pending).first) {
+/// Returns the candidate that the measurement may initialise, or the end of the map.
+LandmarkMap::ById::iterator LandmarkMap::FindCandidate(const FilterState& f,
+                                                       const PendingMeasurement& pending) {
+  if (!IsOfLandmark(pending) || pending.report->outcome != Outcome::kNotReady ||
+      !IsReady(f, pending) ||
+      pending.binding->model->inverse().role != SensorInfoOf(pending).first) {
     return landmarks_.end();
   }
-  const bool takes_prior =
+  const bool uses_prior =
       pending.binding->model->inverse().prior_size > 0 && prior_.min_observations > 0;
-  const int least = takes_prior ? prior_.min_observations : options_.min_observations;
+  const int min_observations = uses_prior ? prior_.min_observations : options_.min_observations;
   const auto found = landmarks_.find(pending.measurement->landmark);
-  const bool waits =
-      found != landmarks_.end() && !found->second.in_state() && found->second.observations >= least;
-  return waits ? found : landmarks_.end();
+  const bool is_candidate = found != landmarks_.end() && !found->second.in_state() &&
+                            found->second.observations >= min_observations;
+  return is_candidate ? found : landmarks_.end();
 }
 
-/// Takes memory at once for those that may come, `most`: the first frame has many.
+/// Reserves memory for all landmarks that the frame may initialise, at most `max_count`. The first
+/// frame initialises many.
 void LandmarkMap::Reserve(FilterState& f, std::span<const PendingMeasurement> rows,
-                          std::ptrdiff_t most) {
+                          std::ptrdiff_t max_count) {
   int size = 0;
   for (const PendingMeasurement& pending : rows) {
-    if (most <= 0) break;
-    if (FindWaiting(f, pending) == landmarks_.end()) continue;
-    for (const Space& role : FamilyOf(pending).roles)
+    if (max_count <= 0) break;
+    if (FindCandidate(f, pending) == landmarks_.end()) continue;
+    for (const Space& role : SensorInfoOf(pending).roles)
       size += role.shared() ? 0 : role.geometry.tangent;
-    --most;
+    --max_count;
   }
   f.state.covariance().Reserve(size);
 }
 
-/// A row that was used of each landmark in the state, by id; the first one of several.
+/// Finds the first accepted measurement of each landmark in the state, sorted by id.
 void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
   measured_.clear();
   for (const PendingMeasurement& pending : rows) {
-    if (!pending.on_landmark() || !IsUsed(pending)) continue;
+    if (!pending.is_on_landmark() || !IsUsed(pending)) continue;
     const auto found = landmarks_.find(pending.measurement->landmark);
     if (found != landmarks_.end() && found->second.in_state()) measured_.push_back(&pending);
   }
@@ -421,13 +429,13 @@ void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
   measured_.erase(std::unique(measured_.begin(), measured_.end(), same), measured_.end());
 }
 
-/// The median of the converged inverse distances among landmarks that were measured, where there
-/// are enough; else the prior's.
+/// Returns the median of the inverse distances of the measured landmarks that have converged. If
+/// there are fewer than adapt_after, returns the inverse distance of the prior.
 double LandmarkMap::PriorInverseDistance(const State& state) {
-  constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
+  constexpr double kConverged = 0.1;  // linearity index, without conversion to xyz
   const double limit =
       options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
-  distances_.clear();
+  inverse_distances_.clear();
   for (const PendingMeasurement* const pending : measured_) {
     const double* const camera = CameraOf(state, *pending);
     const LandmarkRecord& landmark = landmarks_.at(pending->measurement->landmark);
@@ -436,63 +444,64 @@ double LandmarkMap::PriorInverseDistance(const State& state) {
       continue;
     const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
     const Eigen::Map<const Eigen::Vector3d> r(camera);
-    if (point) distances_.push_back(1.0 / (point->position - r).norm());
+    if (point) inverse_distances_.push_back(1.0 / (point->position - r).norm());
   }
-  if (distances_.empty() || std::ssize(distances_) < options_.prior->adapt_after) {
+  if (inverse_distances_.empty() || std::ssize(inverse_distances_) < options_.prior->adapt_after) {
     return options_.prior->inverse_distance;
   }
-  const auto middle = distances_.begin() + std::ssize(distances_) / 2;
-  std::ranges::nth_element(distances_, middle);
+  const auto middle = inverse_distances_.begin() + std::ssize(inverse_distances_) / 2;
+  std::ranges::nth_element(inverse_distances_, middle);
   return *middle;
 }
 
-/// Gives the landmark its blocks, correlated with those that the observation took. Of a shared role
-/// the first landmark of the frame makes the block, and the others of the same sensor take it.
+/// Initialises the blocks of a landmark, correlated with the blocks that the observation depends
+/// on. The first landmark of a frame creates the block of a shared role. The other landmarks of the
+/// sensor share this block.
 Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, PendingMeasurement& pending,
                                 LandmarkRecord& landmark) {
-  Family& family = families_[static_cast<std::size_t>(pending.sensor)];
-  InverseMeasurement& inverse = family.inverse;
+  LandmarkSensorInfo& info = sensor_infos_[static_cast<std::size_t>(pending.sensor)];
+  InverseMeasurement& inverse = info.inverse;
   const Outcome outcome = Invert(f, pending, options_.prior ? &prior_ : nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
-  auto& [fresh, values, rows] = fresh_;
-  fresh.clear();
+  auto& [blocks, values, rows] = new_blocks_;
+  blocks.clear();
   values.clear();
   rows.clear();
   const double* y = inverse.y.data();
-  int at = 0;
-  for (std::size_t i = 0; i < family.roles.size(); ++i) {
-    const Space& role = family.roles[i];
-    if (family.shared[i] >= 0) {
-      landmark.blocks.push_back(family.shared[i]);
+  int offset = 0;
+  for (std::size_t i = 0; i < info.roles.size(); ++i) {
+    const Space& role = info.roles[i];
+    if (info.shared[i] >= 0) {
+      landmark.blocks.push_back(info.shared[i]);
     } else {
-      fresh.push_back(Declare(f, id, role, BlockStatus::kEstimated));
-      landmark.blocks.push_back(fresh.back());
+      blocks.push_back(Declare(f, id, role, BlockStatus::kEstimated));
+      landmark.blocks.push_back(blocks.back());
       values.insert(values.end(), y, y + role.geometry.ambient);
-      for (int k = 0; k < role.geometry.tangent; ++k) rows.push_back(at + k);
-      if (role.shared()) family.shared[i] = fresh.back();
+      for (int k = 0; k < role.geometry.tangent; ++k) rows.push_back(offset + k);
+      if (role.shared()) info.shared[i] = blocks.back();
     }
     if (role.shared()) {
       const auto block = static_cast<std::size_t>(landmark.blocks.back());
-      users_.resize(std::max(users_.size(), block + 1));
-      ++users_[block];
+      shared_block_refcount_.resize(std::max(shared_block_refcount_.size(), block + 1));
+      ++shared_block_refcount_[block];
     }
     y += role.geometry.ambient;
-    at += role.geometry.tangent;
+    offset += role.geometry.tangent;
   }
   const Workspace::Use use(f.work);
   const auto size = std::ssize(rows);
   Eigen::Map<RowMajor> by_x(f.work.Take(size * inverse.by_x.cols()).data(), size,
                             inverse.by_x.cols());
-  Workspace::Matrix own = f.work.Take(size, size);
+  Workspace::Matrix noise = f.work.Take(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     const int row_of_y = rows[static_cast<std::size_t>(i)];
     by_x.row(i) = inverse.by_x.row(row_of_y);
     for (Eigen::Index j = 0; j < size; ++j) {
-      own(i, j) = inverse.own(row_of_y, rows[static_cast<std::size_t>(j)]);
+      noise(i, j) = inverse.noise_covariance(row_of_y, rows[static_cast<std::size_t>(j)]);
     }
   }
-  f.state.Initialise(fresh, values.data(), inverse.from, by_x, own);
-  landmark.representation = family.representation;
+  f.state.Initialise(blocks, values.data(), inverse.from, by_x, noise);
+  landmark.representation = info.representation;
   f.motions.EndInterval();
   return Outcome::kInitialised;
 }

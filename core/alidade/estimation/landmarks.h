@@ -13,27 +13,27 @@
 #include "alidade/estimation/landmark_representation.h"
 #include "alidade/state/eigen_alignment.h"
 
-/// Landmarks: the part of the state that comes and goes with what is seen.
+/// Landmarks: state blocks that are added and removed during a run.
 namespace alidade {
 
-/// A landmark whose place in the world is known beforehand, m. It starts as xyz.
+/// Landmark whose position in the world is known beforehand, m. Its representation is xyz.
 struct KnownLandmark {
   std::int64_t id = 0;
   std::array<double, 3> position{};
   double sigma = 0.0;  ///< of each element; 0: known exactly, never corrected
 };
 
-/// How landmarks are initialised, converted and pruned.
+/// Options for the initialisation, conversion and pruning of landmarks.
 struct LandmarkOptions {
-  /// What one observation does not determine: the inverse distance, 1/m, and its standard
-  /// deviation. Neither has a default: they depend on the scene.
+  /// Inverse distance, 1/m, and its standard deviation, which one observation does not determine.
+  /// They depend on the scene and have no default.
   struct Prior {
     double inverse_distance = std::numeric_limits<double>::quiet_NaN();
     double sigma = std::numeric_limits<double>::quiet_NaN();
-    /// Once so many landmarks that a frame measures have converged, the median of their inverse
-    /// distances stands for `inverse_distance`; 0: never.
+    /// If a frame measures at least this number of converged landmarks, the median of their inverse
+    /// distances replaces `inverse_distance`; 0: never.
     int adapt_after = 0;
-    /// As `min_observations` below, of landmarks that take this prior; 0: that one.
+    /// Replaces `min_observations` below for landmarks that need this prior; 0: does not.
     int min_observations = 0;
   };
   enum class NegativeDepth { kKeep, kDelete };
@@ -41,52 +41,52 @@ struct LandmarkOptions {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
 
   std::optional<Prior> prior;
-  int max_per_frame =
-      kUnlimited;  ///< landmarks measured in a frame, below which new ones are initialised
-  int min_observations = 1;   ///< observations, the last of which initialises it
-  int max_missed_frames = 0;  ///< after so many without an observation it is deleted; 0: never
-  /// It is deleted where a smaller share of at least `min_attempts` measurements is accepted.
+  /// New landmarks are initialised as long as a frame measures fewer landmarks than this.
+  int max_per_frame = kUnlimited;
+  int min_observations = 1;   ///< the observation with this number initialises a landmark
+  int max_missed_frames = 0;  ///< frames without an observation until it is deleted; 0: never
+  /// A landmark is deleted if it has at least `min_attempts` measurements and the share of accepted
+  /// ones is below this.
   double min_match_ratio = 0.0;
   int min_attempts = 10;
-  /// It becomes xyz once its index of linearity [Civera2008] is below this; 0: never.
+  /// A landmark is converted to xyz if its linearity index [Civera2008] is below this; 0: never.
   double max_linearity_index = 0.0;
-  /// What is done where an update leaves an inverse distance at or below zero.
+  /// Reaction to an inverse distance at or below zero after an update.
   NegativeDepth negative_depth = NegativeDepth::kKeep;
   std::vector<KnownLandmark> known;
 };
 
-/// Matches of landmarks that agree, found by 1-point RANSAC [Civera2010]: one match alone corrects
-/// the state, and those that it then predicts to within pixel noise support it. The matches of the
-/// best support make an update; of the rest, those join that fit the state that it leaves.
+/// Options of one-point RANSAC [Civera2010], the outlier rejection for landmarks. A hypothesis is
+/// the state after an update by one match. The matches that it predicts to within pixel noise are
+/// its support. The support of the best hypothesis makes an update. The remaining matches that are
+/// consistent with the updated state make a second update.
 struct OnePointRansac {
-  double inlier_probability =
-      0.99;                  ///< probability with which a match that agrees is within its own noise
-  double confidence = 0.99;  ///< of having tried one match that is right, when no more are tried
-  double rescue_probability =
-      0.99;  ///< probability with which a match that fits joins after the update
+  double inlier_probability = 0.99;  ///< that an inlier is within its own noise
+  double confidence = 0.99;          ///< of having tried at least one inlier
+  double rescue_probability = 0.99;  ///< that an inlier outside the support makes the second update
 };
 
-/// A landmark in the state, or as it was when it was removed; for the record.
+/// Estimate of a landmark in the state, or its last estimate before it was removed.
 struct LandmarkEstimate {
   std::int64_t id = 0;
-  int generation = 0;  ///< landmarks of this id before it
+  int generation = 0;  ///< number of earlier landmarks with this id
   std::optional<LandmarkRepresentation> representation;
   Eigen::Vector3d position = Eigen::Vector3d::Constant(std::nan(""));       ///< in the world, m
-  Eigen::Vector3d true_position = Eigen::Vector3d::Constant(std::nan(""));  ///< where known, m
+  Eigen::Vector3d true_position = Eigen::Vector3d::Constant(std::nan(""));  ///< m; NaN: unknown
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::nan(""));
-  double inverse_distance = std::nan("");  ///< 1/m; not of xyz
+  double inverse_distance = std::nan("");  ///< 1/m; NaN for xyz
   double sigma = std::nan("");             ///< of the inverse distance, 1/m
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
-  Timestamp removed = kNoTimestamp;  ///< when it was; none: it is in the state
+  Timestamp removed = kNoTimestamp;  ///< of its removal; kNoTimestamp: it is in the state
   int tried = 0, accepted = 0;       ///< measurements
 };
 
-/// What became of landmarks in one frame, or in all.
+/// Counts of landmark events in one frame, or in all frames.
 struct LandmarkCounts {
   int initialised = 0, deleted = 0, converted = 0;
-  int negative = 0;    ///< their inverse distance fell to zero or below
+  int negative = 0;    ///< landmarks whose inverse distance fell to zero or below
   int hypotheses = 0;  ///< matches that RANSAC tried
-  int rescued = 0;     ///< matches outside the support that joined afterwards
+  int rescued = 0;     ///< matches outside the support that were used afterwards
 };
 
 }  // namespace alidade

@@ -15,7 +15,7 @@ struct ModelError {
   std::string text;
 };
 
-/// The last of this thread, each of another model.
+/// Latest error of each model in this thread.
 thread_local std::vector<ModelError> model_errors;
 
 std::string ErrorTextOf(const void* model) {
@@ -33,11 +33,11 @@ std::vector<double> NeutralElement(const Geometry& geometry) {
 
 std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
   const std::ptrdiff_t n = geometry.tangent;
-  const auto fits = [](const std::vector<double>& values, std::ptrdiff_t size) {
+  const auto has_size = [](const std::vector<double>& values, std::ptrdiff_t size) {
     return values.empty() || std::ssize(values) == size;
   };
-  if (!fits(owned.mean, geometry.ambient) || !fits(owned.sqrt_prior, n * n) ||
-      !fits(owned.sqrt_density, n * n)) {
+  if (!has_size(owned.mean, geometry.ambient) || !has_size(owned.sqrt_prior, n * n) ||
+      !has_size(owned.sqrt_density, n * n)) {
     return "have another size than the role";
   }
   if (owned.mean.empty()) owned.mean = NeutralElement(geometry);
@@ -46,7 +46,7 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
     return "are not finite";
   }
   if (DistanceFrom(geometry, owned.mean.data()) > kUnitTolerance) {
-    return "have a mean that is not of unit length";
+    return "have a mean that does not have unit length";
   }
   geometry.Normalise(owned.mean.data());
   if (owned.dynamics != OwnedDynamics::kGaussMarkov) owned.time_constant_s = 0.0;
@@ -56,13 +56,13 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
   return {};
 }
 
-Status internal::NoteModelError(const void* model, const std::string& text) noexcept {
-  constexpr std::size_t kMost = 64;
+Status internal::RecordModelError(const void* model, const std::string& text) noexcept {
+  constexpr std::size_t kMaxErrors = 64;
   try {
     std::erase_if(model_errors, [&](const ModelError& error) { return error.model == model; });
-    if (model_errors.size() == kMost) model_errors.erase(model_errors.begin());
+    if (model_errors.size() == kMaxErrors) model_errors.erase(model_errors.begin());
     model_errors.push_back({model, text});
-  } catch (const std::bad_alloc&) {  // an error without a text
+  } catch (const std::bad_alloc&) {  // the error then has no text
   }
   return Status::kError;
 }
@@ -84,11 +84,11 @@ OwnedRole SensorModel::owned(std::size_t role) const {
   return neutral;
 }
 
-Status SensorModel::Initialise(const double* const* roles, const Observation& seen,
+Status SensorModel::Initialise(const double* const* roles, const Observation& observation,
                                const double* prior, InverseOutput out) const {
   ALIDADE_EXPECTS(inverse().role >= 0);
   if (out.strides == nullptr) out.strides = tangents_.data();
-  return DoInitialise(roles, seen, prior, out);
+  return DoInitialise(roles, observation, prior, out);
 }
 
 std::string SensorModel::error_text() const { return ErrorTextOf(this); }

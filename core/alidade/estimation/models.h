@@ -13,66 +13,66 @@
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
 
-/// Sensors and motion models as estimators see them, whatever they are made of: the struct of an
-/// author (direct_models.h) or a plugin.
+/// Interfaces of sensor and motion models for estimators. A struct (direct_models.h) or a plugin
+/// implements them.
 namespace alidade {
 
-/// The most roles of a sensor, and blocks of a motion model.
+/// Maximum number of roles of a sensor, and of blocks of a motion model.
 inline constexpr int kMaxRoles = ALIDADE_MAX_ROLES;
 
-/// The process of a state that comes with its sensor.
+/// Process of a model parameter state of a sensor, such as a bias.
 enum class OwnedDynamics : std::uint32_t {
   kConstant = ALIDADE_STAYS,
   kRandomWalk = ALIDADE_RANDOM_WALK,
   kGaussMarkov = ALIDADE_GAUSS_MARKOV,
 };
 
-/// Prior and dynamics of a role that is a state of its sensor, n: its tangent size.
+/// Prior and dynamics of a role that is a model parameter state. n: its tangent size.
 struct OwnedRole {
   std::vector<double> mean;        ///< ambient
   std::vector<double> sqrt_prior;  ///< L of P = L L', n x n row-major; empty: known exactly
   OwnedDynamics dynamics = OwnedDynamics::kConstant;
-  std::vector<double> sqrt_density;  ///< L of the driving noise, per sqrt(s); empty: none
+  std::vector<double> sqrt_density;  ///< L of the driving noise, per sqrt(s); empty: zero
   double time_constant_s = 0.0;      ///< of a Gauss-Markov process
 };
 
-/// The output of Initialise of a sensor.
+/// Inverse measurement model of a sensor: the output of SensorModel::Initialise.
 struct InverseModel {
-  int role = -1;       ///< the first role, of a landmark the first of it; -1: it has none
-  int count = 0;       ///< of roles from there on: those of a landmark together, else one
-  int prior_size = 0;  ///< numbers that it needs besides the measurement
+  int role = -1;       ///< the first role that it determines; -1: the sensor has no inverse model
+  int count = 0;       ///< number of roles from `role` on: all roles of a landmark, else one
+  int prior_size = 0;  ///< number of prior values that it needs besides the measurement
 };
 
-/// A measurement as a sensor model sees it.
+/// Measurement as the input of a sensor model.
 struct Observation {
-  const double* z = nullptr;      ///< ambient; null: a prediction alone is asked for
-  const double* known = nullptr;  ///< numbers that came with it, of a sensor that takes some
+  const double* z = nullptr;      ///< ambient; null for a prediction
+  const double* known = nullptr;  ///< known numbers of the measurement, if the sensor has any
 };
 
-/// A sensor z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. Thread-safe as
-/// far as its author made it: each call is const.
+/// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All calls are
+/// const; they are thread-safe if the implementation is.
 class SensorModel {
  public:
   struct Description {
     std::string name;    ///< of the model
-    std::string origin;  ///< the plugin file; empty: none
+    std::string origin;  ///< the plugin file; empty: not from a plugin
     std::vector<Space> roles;
     Space measurement;
-    Space known = {};  ///< numbers that come with each measurement; empty name: none
+    Space known = {};  ///< known numbers of each measurement; empty name: none
     InverseModel inverse = {};
-    std::map<std::size_t, OwnedRole> owned = {};  ///< by role, if the model says
-    bool has_validity = false;                    ///< whether Valid may refuse a measurement
-    /// L of R = L L', m x m row-major, in place of the model's; empty: the model's.
+    std::map<std::size_t, OwnedRole> owned = {};  ///< by role, if the model defines it
+    bool has_validity = false;                    ///< whether Valid may reject a measurement
+    /// L of R = L L', m x m row-major, which replaces the L of the model; empty: the model's.
     std::vector<double> sqrt_noise = {};
   };
-  /// Destinations of an evaluation; null: not wanted.
+  /// Destinations of an evaluation; null: not computed.
   struct Output {
     double* h = nullptr;                 ///< ambient
     double* const* jacobians = nullptr;  ///< dh / d role_i, row-major; each may be null
     const int* strides = nullptr;        ///< from row to row of each Jacobian
     double* sqrt_noise = nullptr;        ///< L, m x m row-major
   };
-  /// Destinations of the inverse model; null: not wanted.
+  /// Destinations of the inverse model; null: not computed.
   struct InverseOutput {
     double* y = nullptr;           ///< ambient
     double* const* jx = nullptr;   ///< dy / d role_i of the other roles, row-major
@@ -92,21 +92,23 @@ class SensorModel {
   const Space& known() const { return description_.known; }
   int known_size() const { return known_size_; }
   const InverseModel& inverse() const { return description_.inverse; }
-  /// Whether its roles are filled by the landmark that a measurement names.
+  /// Returns whether some roles belong to the landmark that a measurement names.
   bool has_landmark() const;
-  /// Of a role with ALIDADE_ROLE_OWNED: the model's own, or constant at the neutral element.
+  /// Returns prior and dynamics of a role with ALIDADE_ROLE_OWNED: those that the model defines, or
+  /// a constant at the neutral element.
   OwnedRole owned(std::size_t role) const;
 
-  /// h, its Jacobians and L at the roles. kOutOfDomain: h is not defined there, and the outputs are
-  /// unspecified. ContractViolation if the known numbers that it takes are missing.
-  Status Evaluate(const Observation& seen, const double* const* roles, const Output& out) const {
-    ALIDADE_EXPECTS(seen.known != nullptr || known_size_ == 0);
+  /// Computes h, its Jacobians and L at the roles. Returns kOutOfDomain if h is not defined there;
+  /// the outputs are then unspecified. ContractViolation if the known numbers are missing.
+  Status Evaluate(const Observation& observation, const double* const* roles,
+                  const Output& out) const {
+    ALIDADE_EXPECTS(observation.known != nullptr || known_size_ == 0);
     if (out.sqrt_noise == nullptr || description_.sqrt_noise.empty()) {
-      return DoEvaluate(seen, roles, out);
+      return DoEvaluate(observation, roles, out);
     }
     std::ranges::copy(description_.sqrt_noise, out.sqrt_noise);
     if (out.h == nullptr) return Status::kOk;
-    return DoEvaluate(seen, roles, {out.h, out.jacobians, out.strides, nullptr});
+    return DoEvaluate(observation, roles, {out.h, out.jacobians, out.strides, nullptr});
   }
   Status Predict(const double* const* roles, double* h, const double* known = nullptr) const {
     return Evaluate({nullptr, known}, roles, {.h = h});
@@ -119,25 +121,25 @@ class SensorModel {
                    const double* known = nullptr) const {
     return Evaluate({z, known}, roles, {.sqrt_noise = l});
   }
-  /// kInvalid: the measurement is of no use, whatever the state is.
-  Status Valid(const Observation& seen) const {
-    return description_.has_validity ? DoValid(seen) : Status::kOk;
+  /// Returns kInvalid if the measurement cannot be used for any state.
+  Status Valid(const Observation& observation) const {
+    return description_.has_validity ? DoValid(observation) : Status::kOk;
   }
-  /// y = g(other roles, z, prior), the initialised roles one after the other. kInvalid: it needs a
-  /// prior. ContractViolation if the sensor has no inverse model.
-  Status Initialise(const double* const* roles, const Observation& seen, const double* prior,
+  /// Computes y = g(other roles, z, prior), the initialised roles one after the other. Returns
+  /// kInvalid if a required prior is missing. ContractViolation if the sensor has no inverse model.
+  Status Initialise(const double* const* roles, const Observation& observation, const double* prior,
                     InverseOutput out) const;
-  /// Why its last call in this thread returned kError.
+  /// Returns the reason why the last call in this thread returned kError.
   std::string error_text() const;
 
  protected:
   explicit SensorModel(Description description);
 
  private:
-  virtual Status DoEvaluate(const Observation& seen, const double* const* roles,
+  virtual Status DoEvaluate(const Observation& observation, const double* const* roles,
                             const Output& out) const = 0;
-  virtual Status DoValid(const Observation& /*seen*/) const { return Status::kOk; }
-  virtual Status DoInitialise(const double* const* /*roles*/, const Observation& /*seen*/,
+  virtual Status DoValid(const Observation& /*observation*/) const { return Status::kOk; }
+  virtual Status DoInitialise(const double* const* /*roles*/, const Observation& /*observation*/,
                               const double* /*prior*/, const InverseOutput& /*out*/) const {
     return Status::kError;
   }
@@ -147,24 +149,24 @@ class SensorModel {
   std::vector<int> tangents_;  ///< of the roles
 };
 
-/// A motion model x' = f(x, u, w, dt), w ~ N(0, L L'). n: tangent size of all blocks, n_w of w.
+/// Motion model x' = f(x, u, w, dt), w ~ N(0, L L'). n: tangent size of all blocks, n_w: size of w.
 class MotionModel {
  public:
   struct Description {
     std::string name;    ///< of the model
-    std::string origin;  ///< the plugin file; empty: none
+    std::string origin;  ///< the plugin file; empty: not from a plugin
     std::vector<Space> blocks;
     Space input = {};  ///< the control input; empty name: none
     int noise_size = 0;
-    bool stationary = false;      ///< its blocks stay as they are: Step need not be called
-    bool discrete_noise = false;  ///< one w is held from an update to the next
-    /// L of Qw = L L', n_w x n_w row-major, in place of the model's; empty: the model's.
+    bool stationary = false;      ///< its blocks never change: Step need not be called
+    bool discrete_noise = false;  ///< w is constant from an update to the next
+    /// L of Qw = L L', n_w x n_w row-major, which replaces the L of the model; empty: the model's.
     std::vector<double> sqrt_noise = {};
   };
-  /// Destinations of a step; null: not wanted.
+  /// Destinations of a step; null: not computed.
   struct Output {
     double* const* next = nullptr;  ///< x', by block
-    double* f = nullptr;            ///< F = dx' / dx, n x n row-major; G has to be wanted too
+    double* f = nullptr;            ///< F = dx' / dx, n x n row-major; requires g
     double* g = nullptr;            ///< G = dx' / dw, n x n_w row-major
     double* sqrt_q = nullptr;       ///< L, n_w x n_w row-major
   };
@@ -183,7 +185,7 @@ class MotionModel {
   bool has_input() const { return !description_.input.name.empty(); }
   const Space& input() const { return description_.input; }
 
-  /// x' with its Jacobians, and L, at the blocks, input u and noise w; w null: zero.
+  /// Computes x' with its Jacobians, and L, for input u and noise w. A null w counts as zero.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               const Output& out) const {
     if (w == nullptr) w = zero_noise_.data();
@@ -197,7 +199,7 @@ class MotionModel {
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
     return Step(blocks, input, nullptr, dt_s, {.sqrt_q = l});
   }
-  /// Why its last call in this thread returned kError.
+  /// Returns the reason why the last call in this thread returned kError.
   std::string error_text() const;
 
  protected:
@@ -217,12 +219,12 @@ using SharedMotion = std::shared_ptr<const MotionModel>;
 
 namespace internal {
 
-/// The defect of a prior and dynamics of a role of this geometry; empty: none, and its mean is the
-/// neutral element if it had none, normalised if it had one.
+/// Checks prior and dynamics of a role with this geometry. Returns the defect, or "" if they are
+/// valid. A missing mean becomes the neutral element, and a given mean is normalised.
 std::string CheckOwned(const Geometry& geometry, OwnedRole& owned);
 
-/// Keeps `text` as the error text of a model in this thread, and returns kError.
-[[gnu::cold]] Status NoteModelError(const void* model, const std::string& text) noexcept;
+/// Records `text` as the error text of a model in this thread, and returns kError.
+[[gnu::cold]] Status RecordModelError(const void* model, const std::string& text) noexcept;
 
 }  // namespace internal
 

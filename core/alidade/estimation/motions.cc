@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-/// gl = G L, for G n x w and L w x w.
+/// Computes gl = G L, for G n x w and L w x w.
 void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
   for (int i = 0; i < n; ++i, g += w, gl += w) {
     for (int c = 0; c < w; ++c) {
@@ -21,24 +21,25 @@ void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
   }
 }
 
-/// StepAt that looks at x' alone.
+/// As StepAt, but checks only x' for finite values.
 [[gnu::always_inline]] inline Outcome CallStep(const MotionBinding& motion,
                                                const MotionPlace& place, const double* x,
                                                const double* u, const double* w, double dt_s,
-                                               const StepOutput& to) {
-  std::array<const double*, kMaxRoles> from;
+                                               const StepOutput& output) {
+  std::array<const double*, kMaxRoles> blocks;
   std::array<double*, kMaxRoles> next;
-  for (std::size_t k = 0, blocks = place.values.size(); k < blocks; ++k) {
-    from[k] = x + place.values[k];
-    next[k] = to.next + place.values[k];
+  for (std::size_t k = 0, count = place.values.size(); k < count; ++k) {
+    blocks[k] = x + place.values[k];
+    next[k] = output.next + place.values[k];
   }
-  double* const* const x_next = to.next == nullptr ? nullptr : next.data();
-  const Status status = motion.model->Step(from.data(), u, w, dt_s, {x_next, to.f, to.g, to.l});
+  double* const* const x_next = output.next == nullptr ? nullptr : next.data();
+  const Status status =
+      motion.model->Step(blocks.data(), u, w, dt_s, {x_next, output.f, output.g, output.l});
   if (status != Status::kOk) return OutcomeOf(status);
-  if (to.next == nullptr) return Outcome::kAccepted;
+  if (output.next == nullptr) return Outcome::kAccepted;
   double defect = 0.0;
-  for (const auto& [at, size, geometry] : place.all) {
-    defect += ZeroIfFinite({to.next + at, static_cast<std::size_t>(size)});
+  for (const auto& [offset, size, geometry] : place.block_ranges) {
+    defect += ZeroIfFinite({output.next + offset, static_cast<std::size_t>(size)});
   }
   return defect == 0.0 ? Outcome::kAccepted : Outcome::kNotFinite;
 }
@@ -46,28 +47,29 @@ void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
 }  // namespace
 
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-               const double* u, const double* w, double dt_s, const StepOutput& to) {
-  const Outcome outcome = CallStep(motion, place, x, u, w, dt_s, to);
+               const double* u, const double* w, double dt_s, const StepOutput& output) {
+  const Outcome outcome = CallStep(motion, place, x, u, w, dt_s, output);
   if (outcome != Outcome::kAccepted) return outcome;
   const std::size_t n = place.at.size();
   const auto n_w = static_cast<std::size_t>(motion.model->noise_size());
   const auto is_finite = [](const double* numbers, std::size_t count) {
     return numbers == nullptr || AllFinite({numbers, count});
   };
-  return is_finite(to.f, n * n) && is_finite(to.g, n * n_w) && is_finite(to.l, n_w * n_w)
+  return is_finite(output.f, n * n) && is_finite(output.g, n * n_w) &&
+                 is_finite(output.l, n_w * n_w)
              ? Outcome::kAccepted
              : Outcome::kNotFinite;
 }
 
 [[gnu::noinline]] StepError StepErrorOf(const MotionBinding& motion, Outcome outcome) {
   if (outcome == Outcome::kAccepted) return {};
-  const std::string who = "motion model of '" + motion.name + "' ";
+  const std::string model = "motion model of '" + motion.name + "' ";
   if (outcome == Outcome::kNotFinite) {
-    return {"not_finite", who + "steps to a state that is not finite"};
+    return {"not_finite", model + "steps to a state that is not finite"};
   }
   const bool failed = outcome == Outcome::kFailed;
   return {failed ? "plugin_failed" : "diverged",
-          who + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
+          model + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
 }
 
 Motions::Motions(const ProblemIndex& index)
@@ -79,7 +81,7 @@ Motions::Motions(const ProblemIndex& index)
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
     Step& step = steps_[i];
-    step.f.resize(n * n, kNotANumber);  // whatever the model leaves out
+    step.f.resize(n * n, kNotANumber);  // detects elements that the model does not write
     step.g.resize(n * n_w, kNotANumber);
     step.l.resize(n_w * n_w, kNotANumber);
     step.gl.resize(n * n_w);
@@ -89,7 +91,7 @@ Motions::Motions(const ProblemIndex& index)
 }
 
 void Motions::Activate(const StateLayout& layout) {
-  holds_ = false;
+  has_discrete_noise_ = false;
   active_.clear();
   for (std::size_t i = 0, count = steps_.size(); i < count; ++i) {
     const MotionBinding& motion = index_->problem.motions[i];
@@ -97,48 +99,51 @@ void Motions::Activate(const StateLayout& layout) {
         !motion.model->stationary() &&
         std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
     if (steps_[i].active) active_.push_back(i);
-    holds_ = holds_ || (steps_[i].active && index_->motion_places[i].holds);
+    has_discrete_noise_ =
+        has_discrete_noise_ || (steps_[i].active && index_->motion_places[i].holds);
   }
 }
 
 StepError Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
   for (const std::size_t i : active_) {
-    if (StepError error = EvaluateOne(i, state, dt_s, derivatives)) return error;
+    if (StepError error = EvaluateModel(i, state, dt_s, derivatives)) return error;
   }
   return {};
 }
 
-StepError Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
+StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s, bool derivatives) {
   const MotionBinding& motion = index_->problem.motions[i];
   const MotionPlace& place = index_->motion_places[i];
   Step& step = steps_[i];
-  const bool goes_on = place.holds && in_interval();
-  StepOutput to{next_.data()};
+  const bool continues_interval = place.holds && in_interval();
+  StepOutput output{next_.data()};
   if (derivatives) {
-    to.f = step.f.data();
-    to.g = step.g.data();
+    output.f = step.f.data();
+    output.g = step.g.data();
   }
-  if (!goes_on) to.l = step.l.data();
-  // F, G and L that are not finite leave P so, which Apply finds.
+  if (!continues_interval) output.l = step.l.data();
+  // Apply detects F, G and L that are not finite, because P is then not finite.
   const double* const x = state.values().data();
-  const Outcome outcome = derivatives ? CallStep(motion, place, x, step.u.data(), nullptr, dt_s, to)
-                                      : StepAt(motion, place, x, step.u.data(), nullptr, dt_s, to);
+  const Outcome outcome = derivatives
+                              ? CallStep(motion, place, x, step.u.data(), nullptr, dt_s, output)
+                              : StepAt(motion, place, x, step.u.data(), nullptr, dt_s, output);
   if (outcome != Outcome::kAccepted) return StepErrorOf(motion, outcome);
   if (!derivatives) return {};
   SpreadNoise(step.g.data(), step.l.data(), motion.model->tangent_size(),
               motion.model->noise_size(), step.gl.data());
-  step.carries = goes_on;
-  if (goes_on) {
-    CarryHeld(*motion.model, place, step);
+  step.continues_interval = continues_interval;
+  if (continues_interval) {
+    PropagateDiscreteNoise(*motion.model, place, step);
   } else if (place.holds) {
     for (std::size_t k = 0; k < step.m.size(); ++k) step.m[k] = step.gl[k];
   }
   return {};
 }
 
-/// With A = F M and N = G Lq: C = A N', M <- A + N. Blocks without a covariance have no M.
-[[gnu::noinline]] void Motions::CarryHeld(const MotionModel& model, const MotionPlace& place,
-                                          Step& step) {
+/// Computes C = A N' and M <- A + N, with A = F M and N = G Lq. M is zero for blocks without a
+/// covariance.
+[[gnu::noinline]] void Motions::PropagateDiscreteNoise(const MotionModel& model,
+                                                       const MotionPlace& place, Step& step) {
   const Workspace::Use use(memory_);
   const Eigen::Index n = model.tangent_size(), w = model.noise_size();
   const Eigen::Map<const RowMajor> f(step.f.data(), n, n), input(step.gl.data(), n, w);
@@ -154,15 +159,15 @@ StepError Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, b
 
 StepError Motions::Apply(State& state) {
   Covariance& p = state.covariance();
-  if (active_.size() <= 1) {  // all of it, or nothing
-    if (!Propagate(p)) return WhyNotFinite();
+  if (active_.size() <= 1) {  // a failed propagation by one model leaves P unchanged
+    if (!Propagate(p)) return FindNotFinite();
   } else if (IsBounded(p)) {
     Propagate(p);
   } else {
     const Covariance before = p;
     if (!Propagate(p)) {
       p = before;
-      return WhyNotFinite();
+      return FindNotFinite();
     }
   }
   for (const std::size_t i : active_) {
@@ -171,29 +176,29 @@ StepError Motions::Apply(State& state) {
   return {};
 }
 
-/// Why P after the step is not finite.
-[[gnu::noinline]] StepError Motions::WhyNotFinite() const {
+/// Returns the reason why P after the step is not finite.
+[[gnu::noinline]] StepError Motions::FindNotFinite() const {
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
     if (AllFinite(step.f) && AllFinite(step.g) && AllFinite(step.l)) continue;
     return StepErrorOf(index_->problem.motions[i], Outcome::kNotFinite);
   }
-  return {"not_finite", "the covariance steps to what is not finite"};
+  return {"not_finite", "the covariance after the step is not finite"};
 }
 
-/// Whether P of this step cannot overflow, by |F P F'|_ij <= (n max|F|)^2 max|P|,
-/// |N N'|_ij <= n_w max|N|^2.
+/// Returns whether P after this step cannot overflow, because |F P F'|_ij <= (n max|F|)^2 max|P|
+/// and |N N'|_ij <= n_w max|N|^2.
 [[gnu::noinline]] bool Motions::IsBounded(const Covariance& covariance) const {
   constexpr double kSafe = 1e300;
   double f = 1.0, noise = 0.0, cross = 0.0, p = 0.0;
-  const auto widen = [](double& most, std::span<const double> values) {
-    for (const double value : values) most = std::max(most, std::abs(value));
+  const auto update_bound = [](double& bound, std::span<const double> values) {
+    for (const double value : values) bound = std::max(bound, std::abs(value));
     return AllFinite(values);
   };
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
-    if (!widen(f, step.f) || !widen(noise, step.gl)) return false;
-    if (step.carries && !widen(cross, step.cross)) return false;
+    if (!update_bound(f, step.f) || !update_bound(noise, step.gl)) return false;
+    if (step.continues_interval && !update_bound(cross, step.cross)) return false;
   }
   const int n = covariance.size();
   for (int i = 0; i < n; ++i) p = std::max(p, covariance.Variance(i));
@@ -201,13 +206,14 @@ StepError Motions::Apply(State& state) {
   return rows * rows * p + noise_size() * noise * noise + 2.0 * cross <= kSafe;
 }
 
-/// P of all models, or of those before one by which it would not be finite.
+/// Propagates P by all active models. Stops and returns false at a model after which P would not be
+/// finite.
 bool Motions::Propagate(Covariance& p) {
   for (const std::size_t i : active_) {
     const MotionPlace& place = index_->motion_places[i];
     const Step& step = steps_[i];
     const int width = index_->problem.motions[i].model->noise_size();
-    const double* const cross = step.carries ? step.cross.data() : nullptr;
+    const double* const cross = step.continues_interval ? step.cross.data() : nullptr;
     const bool finite = place.rows.size() == place.at.size()
                             ? p.Propagate(place.rows, step.f.data(), step.gl.data(), width, cross)
                             : PropagatePart(p, place, step, width);
@@ -216,7 +222,7 @@ bool Motions::Propagate(Covariance& p) {
   return true;
 }
 
-/// Of a model whose blocks are not all in P.
+/// Propagates P by a model with blocks that are not in P.
 [[gnu::noinline]] bool Motions::PropagatePart(Covariance& p, const MotionPlace& place,
                                               const Step& step, int width) {
   if (place.rows.empty()) return true;
@@ -229,7 +235,7 @@ bool Motions::Propagate(Covariance& p) {
   const std::vector<int>& present = place.present;
   f = Eigen::Map<const RowMajor>(step.f.data(), n, n)(present, present);
   noise = Eigen::Map<const RowMajor>(step.gl.data(), n, width)(present, Eigen::all);
-  if (!step.carries) return p.Propagate(place.rows, f.data(), noise.data(), width);
+  if (!step.continues_interval) return p.Propagate(place.rows, f.data(), noise.data(), width);
   cross = Eigen::Map<const RowMajor>(step.cross.data(), n, n)(present, present);
   return p.Propagate(place.rows, f.data(), noise.data(), width, cross.data());
 }
@@ -255,8 +261,8 @@ Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   return transition;
 }
 
-Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Workspace& work,
-                                bool all) const {
+Workspace::Matrix Motions::NoiseColumns(std::vector<double> Step::*matrix, int n, Workspace& work,
+                                        bool with_continuous) const {
   Workspace::Matrix input = work.Take(n, noise_size());
   input.setZero();
   Eigen::Index columns = 0;
@@ -265,10 +271,10 @@ Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Worksp
     const MotionPlace& place = index_->motion_places[i];
     const MotionModel& model = *index_->problem.motions[i].model;
     const Eigen::Index width = model.noise_size();
-    for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {
+    for (std::size_t row = 0; row < place.at.size() && (place.holds || with_continuous); ++row) {
       if (place.at[row] < 0) continue;
-      const Eigen::Map<const RowMajor> from((step.*matrix).data(), model.tangent_size(), width);
-      input.row(place.at[row]).segment(columns, width) = from.row(static_cast<Eigen::Index>(row));
+      const Eigen::Map<const RowMajor> block((step.*matrix).data(), model.tangent_size(), width);
+      input.row(place.at[row]).segment(columns, width) = block.row(static_cast<Eigen::Index>(row));
     }
     columns += width;
   }

@@ -13,17 +13,17 @@
 namespace alidade {
 namespace {
 
-/// Where the landmarks are before the camera, as shares of their usual distance.
-constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
-                                 {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
+/// Positions of the landmarks in the camera frame, divided by their usual distance.
+constexpr double kPositions[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
+                                    {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
-/// The sensor's model for landmarks of the representation xyz; null where it has none.
+/// Returns the model of a sensor for landmarks with the representation xyz, or null.
 const SharedSensor& XyzModel(const SensorBinding& sensor) {
   const bool xyz = RepresentationOf(sensor.model->roles()) == internal::XyzRepresentation();
   return xyz ? sensor.model : sensor.xyz;
 }
 
-/// The block in the role of that name; -1 where there is none.
+/// Returns the block in the role with this name, or -1.
 BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     if (sensor.model->roles()[i].name == role) return sensor.roles[i].block;
@@ -31,16 +31,16 @@ BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   return -1;
 }
 
-/// Where the block starts, else `otherwise`.
-std::vector<double> StartOf(const Problem& problem, BlockId block,
-                            const std::vector<double>& otherwise) {
+/// Returns the mean of the prior of a block, or else `default_mean`.
+std::vector<double> PriorMeanOf(const Problem& problem, BlockId block,
+                                const std::vector<double>& default_mean) {
   const auto prior = std::ranges::find(problem.priors, block, &Prior::block);
-  const bool fits = prior != problem.priors.end() && prior->mean.size() == otherwise.size();
-  return fits ? prior->mean : otherwise;
+  const bool has_mean = prior != problem.priors.end() && prior->mean.size() == default_mean.size();
+  return has_mean ? prior->mean : default_mean;
 }
 
-/// The sensor as it sees the one landmark `block`.
-SensorBinding SeenAs(const SensorBinding& sensor, BlockId block) {
+/// Returns the sensor as a sensor of the landmark `block` alone.
+SensorBinding SensorOfLandmark(const SensorBinding& sensor, BlockId block) {
   SensorBinding binding{sensor.name, sensor.stream, XyzModel(sensor), {}};
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     if (!sensor.model->roles()[i].landmark()) binding.roles.push_back(sensor.roles[i]);
@@ -49,15 +49,16 @@ SensorBinding SeenAs(const SensorBinding& sensor, BlockId block) {
   return binding;
 }
 
-/// Blocks with their values and the columns they take in the observability matrix.
+/// Values of the blocks along a trajectory, and their columns in the observability matrix.
 struct Trajectory {
   std::vector<std::vector<double>> values;
-  std::vector<int> columns;  ///< -1: known, no column
+  std::vector<int> columns;  ///< first column by block; -1: constant, no column
   std::vector<double> scale;
   std::vector<std::string> names;
 };
 
-/// A generic point near the prior: no element at a special value, the sensors' domain kept.
+/// Returns a generic point near the prior: no element has a special value, and the point is in the
+/// domain of the sensors.
 Trajectory StartNearPrior(const Problem& problem) {
   Trajectory t;
   t.values.resize(problem.layout.blocks().size());
@@ -67,17 +68,17 @@ Trajectory StartNearPrior(const Problem& problem) {
     const Geometry& geometry = block.geometry();
     auto& value = t.values[static_cast<std::size_t>(prior.block)];
     value.resize(static_cast<std::size_t>(geometry.ambient));
-    if (prior.from.empty()) {
+    if (prior.sensor.empty()) {
       value = prior.mean;
     } else {
       geometry.Identity(value.data());
     }
-    std::vector<double> nudge(static_cast<std::size_t>(geometry.tangent));
-    for (std::size_t i = 0; i < nudge.size(); ++i) {
-      const double size = prior.from.empty() ? 0.03 * (1.0 + std::abs(value[i])) : 1.0;
-      nudge[i] = size * (1.0 + 0.1 * static_cast<double>((prior.block + 3 * i) % 7));
+    std::vector<double> offset(static_cast<std::size_t>(geometry.tangent));
+    for (std::size_t i = 0; i < offset.size(); ++i) {
+      const double size = prior.sensor.empty() ? 0.03 * (1.0 + std::abs(value[i])) : 1.0;
+      offset[i] = size * (1.0 + 0.1 * static_cast<double>((prior.block + 3 * i) % 7));
     }
-    geometry.Plus(value.data(), nudge.data(), value.data());
+    geometry.Plus(value.data(), offset.data(), value.data());
     if (block.status == BlockStatus::kConstant) continue;
     t.columns[static_cast<std::size_t>(prior.block)] = static_cast<int>(t.names.size());
     const std::vector<std::string> names = ColumnNames(block.name, block.space);
@@ -93,23 +94,23 @@ Trajectory StartNearPrior(const Problem& problem) {
   return t;
 }
 
-/// A control input of no special value, each element times a random factor from 1/4 to 7/4 if there
-/// is a generator; empty where the model takes none.
+/// Returns a generic control input. With a generator, each element is multiplied by a random factor
+/// from 1/4 to 7/4. Empty if the model has no control input.
 std::vector<double> GenericInput(const MotionModel& model, Random* random) {
   if (!model.has_input()) return {};
   const Geometry& geometry = model.input().geometry;
   std::vector<double> input(static_cast<std::size_t>(geometry.ambient));
-  std::vector<double> nudge(static_cast<std::size_t>(geometry.tangent));
-  for (std::size_t i = 0; i < nudge.size(); ++i) {
-    nudge[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
-    if (random != nullptr) nudge[i] *= 0.25 + 1.5 * random->Uniform();
+  std::vector<double> offset(static_cast<std::size_t>(geometry.tangent));
+  for (std::size_t i = 0; i < offset.size(); ++i) {
+    offset[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
+    if (random != nullptr) offset[i] *= 0.25 + 1.5 * random->Uniform();
   }
   geometry.Identity(input.data());
-  geometry.Plus(input.data(), nudge.data(), input.data());
+  geometry.Plus(input.data(), offset.data(), input.data());
   return input;
 }
 
-/// Moves the values by dt and phi <- F phi. False where a model cannot step.
+/// Propagates the values by dt_s and sets phi <- F phi. Returns false if a model fails.
 bool Advance(const Problem& problem, double dt_s, Random* random, Trajectory& t,
              Eigen::MatrixXd& phi) {
   for (const MotionBinding& motion : problem.motions) {
@@ -129,42 +130,42 @@ bool Advance(const Problem& problem, double dt_s, Random* random, Trajectory& t,
         !f.allFinite()) {
       return false;
     }
-    std::vector<Eigen::Index> to, from;
+    std::vector<Eigen::Index> phi_rows, f_rows;
     Eigen::Index row = 0;
     for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
       const BlockId id = motion.blocks[i];
       const int column = t.columns[static_cast<std::size_t>(id)];
       for (int k = 0; k < problem.layout[id].geometry().tangent; ++k, ++row) {
         if (column < 0) continue;
-        from.push_back(row);
-        to.push_back(column + k);
+        f_rows.push_back(row);
+        phi_rows.push_back(column + k);
       }
       if (column >= 0) t.values[static_cast<std::size_t>(id)] = next[i];
     }
-    const Eigen::MatrixXd moved = f(from, from) * phi(to, Eigen::all);
-    phi(to, Eigen::all) = moved;
+    const Eigen::MatrixXd product = f(f_rows, f_rows) * phi(phi_rows, Eigen::all);
+    phi(phi_rows, Eigen::all) = product;
   }
   return true;
 }
 
-/// The span of the rows seen so far, as an orthonormal basis.
+/// Span of the rows of the observability matrix, as an orthonormal basis.
 class RowSpace {
  public:
   explicit RowSpace(Eigen::Index n) : q_(n, n) {}
 
   Eigen::Index rank() const { return rank_; }
-  /// Adds what `row` has outside the span; nothing where that is rounding.
+  /// Adds the component of `row` orthogonal to the span, unless it is a rounding error.
   void Add(Eigen::VectorXd row) {
     constexpr double kRankTolerance = 1e-9;
     const double norm = row.norm();
     if (rank_ == q_.rows() || !(norm > 0.0) || !std::isfinite(norm)) return;
     row /= norm;
-    const auto known = q_.leftCols(rank_);
-    for (int twice = 0; twice < 2; ++twice) row -= known * (known.transpose() * row);
-    const double outside = row.norm();
-    if (outside > kRankTolerance) q_.col(rank_++) = row / outside;
+    const auto basis = q_.leftCols(rank_);
+    for (int pass = 0; pass < 2; ++pass) row -= basis * (basis.transpose() * row);
+    const double residual = row.norm();
+    if (residual > kRankTolerance) q_.col(rank_++) = row / residual;
   }
-  /// Orthonormal columns which the rows do not see: n x (n - rank).
+  /// Returns an orthonormal basis of the null space: n x (n - rank).
   Eigen::MatrixXd Complement() const { return internal::ComplementOf(q_.leftCols(rank_)); }
 
  private:
@@ -172,9 +173,9 @@ class RowSpace {
   Eigen::Index rank_ = 0;
 };
 
-/// Adds the rows H phi of a sensor, where it is defined at the values, in units of the prior sigma.
-void ObserveBy(const SensorBinding& sensor, const double* known, const Problem& problem,
-               const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
+/// Adds the rows H phi of a sensor, in units of the prior sigma, if h is defined at the values.
+void AddSensorRows(const SensorBinding& sensor, const double* known, const Problem& problem,
+                   const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
   const int m = sensor.model->measurement().geometry.tangent;
   std::vector<const double*> roles;
@@ -195,139 +196,153 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const Problem& 
       Status::kOk) {
     return;
   }
-  Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
+  Eigen::MatrixXd h_phi = Eigen::MatrixXd::Zero(m, phi.cols());
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     const RoleBinding& role = sensor.roles[i];
     if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
     const int column = t.columns[static_cast<std::size_t>(role.block)];
     if (column < 0) continue;
     if (!j[i].allFinite()) return;
-    seen += j[i] * phi.middleRows(column, j[i].cols());
+    h_phi += j[i] * phi.middleRows(column, j[i].cols());
   }
-  for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
+  for (Eigen::Index i = 0; i < m; ++i) rows.Add(h_phi.row(i).cwiseProduct(scale));
 }
 
-/// The same of every sensor; known numbers are any of the size of the state, as several
-/// measurements bring them.
-void Observe(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
-             Random& random, RowSpace& rows) {
+/// Adds the rows of every sensor. Sensors with known numbers measure several times, with random
+/// known numbers of the magnitude of the state.
+void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
+                        Random& random, RowSpace& rows) {
   constexpr int kMeasurements = 4;
-  double reach = 1.0;
+  double magnitude = 1.0;
   for (const std::vector<double>& value : t.values) {
-    for (const double element : value) reach = std::max(reach, 2.0 * std::abs(element));
+    for (const double element : value) magnitude = std::max(magnitude, 2.0 * std::abs(element));
   }
   for (const SensorBinding& sensor : problem.sensors) {
     std::vector<double> known(static_cast<std::size_t>(sensor.model->known_size()));
     for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
-      for (double& number : known) number = reach * random.Normal();
-      ObserveBy(sensor, known.data(), problem, t, phi, rows);
+      for (double& number : known) number = magnitude * random.Normal();
+      AddSensorRows(sensor, known.data(), problem, t, phi, rows);
     }
   }
 }
 
-/// Adds the elements that the prior tells exactly, and the places of landmarks that are known: with
-/// landmarks it is these that say where the world is.
-void AddKnown(const internal::WithLandmarks& with, const Trajectory& t, RowSpace& rows) {
+/// Adds the elements with an exact prior, and the positions of known landmarks. With landmarks,
+/// they define the world frame.
+void AddKnown(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& t,
+              RowSpace& rows) {
   const auto n = static_cast<Eigen::Index>(t.names.size());
-  for (const Prior& prior : with.problem.priors) {
+  for (const Prior& prior : landmark_problem.problem.priors) {
     const int column = t.columns[static_cast<std::size_t>(prior.block)];
-    const auto landmark = std::ranges::find(with.landmarks, prior.block) - with.landmarks.begin();
+    const auto landmark = std::ranges::find(landmark_problem.landmarks, prior.block) -
+                          landmark_problem.landmarks.begin();
     for (Eigen::Index i = 0; column >= 0 && i < prior.covariance.rows(); ++i) {
-      const bool known = landmark < static_cast<std::ptrdiff_t>(with.known);
-      if (known || prior.covariance(i, i) == 0.0) rows.Add(Eigen::VectorXd::Unit(n, column + i));
+      const bool is_known = landmark < static_cast<std::ptrdiff_t>(landmark_problem.known_count);
+      if (is_known || prior.covariance(i, i) == 0.0) {
+        rows.Add(Eigen::VectorXd::Unit(n, column + i));
+      }
     }
   }
 }
 
-/// Takes the direction that moves all landmarks along their offsets from the camera, d p = p - r,
-/// and the rest of the state somehow, out of a null-space basis; false where it is not in it.
-bool TakeScale(const internal::WithLandmarks& with, const Trajectory& start,
-               Eigen::MatrixXd& basis) {
+/// Removes the direction of scale from a null-space basis: it moves all landmarks along their
+/// offsets from the camera, d p = p - r, and may move the other blocks. Returns false if the null
+/// space does not contain it.
+bool RemoveScale(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& start,
+                 Eigen::MatrixXd& basis) {
   constexpr double kTolerance = 1e-5;
-  if (with.camera < 0 || basis.cols() == 0) return false;
-  Eigen::VectorXd offsets(3 * std::ssize(with.landmarks));
-  const double* const r = start.values[static_cast<std::size_t>(with.camera)].data();
-  for (std::size_t i = 0; i < with.landmarks.size(); ++i) {
-    const double* const p = start.values[static_cast<std::size_t>(with.landmarks[i])].data();
+  if (landmark_problem.camera < 0 || basis.cols() == 0) return false;
+  Eigen::VectorXd offsets(3 * std::ssize(landmark_problem.landmarks));
+  const double* const r = start.values[static_cast<std::size_t>(landmark_problem.camera)].data();
+  for (std::size_t i = 0; i < landmark_problem.landmarks.size(); ++i) {
+    const double* const p =
+        start.values[static_cast<std::size_t>(landmark_problem.landmarks[i])].data();
     for (std::size_t e = 0; e < 3; ++e) {
       offsets[static_cast<Eigen::Index>(3 * i + e)] = p[e] - r[e];
     }
   }
-  const Eigen::MatrixXd moved = basis.bottomRows(offsets.size());  // their columns come last
-  const Eigen::VectorXd scale = internal::SolveByPivoting(moved, offsets);
-  if (!((moved * scale - offsets).norm() < kTolerance * offsets.norm())) return false;
+  const Eigen::MatrixXd landmark_rows = basis.bottomRows(offsets.size());
+  const Eigen::VectorXd scale = internal::SolveByPivoting(landmark_rows, offsets);
+  if (!((landmark_rows * scale - offsets).norm() < kTolerance * offsets.norm())) return false;
   basis = (basis * internal::ComplementOf(scale)).eval();
   return true;
 }
 
-/// Brings the columns of a null-space basis to reduced echelon form, so that each one moves as few
-/// elements as it can.
+/// Converts the columns of a null-space basis to reduced echelon form, so that each column moves
+/// few elements.
 void Reduce(Eigen::MatrixXd& basis) {
-  Eigen::Index done = 0;
-  for (Eigen::Index row = 0; row < basis.rows() && done < basis.cols(); ++row) {
-    Eigen::Index pivot = done;
-    basis.row(row).tail(basis.cols() - done).cwiseAbs().maxCoeff(&pivot);
-    pivot += done;
+  Eigen::Index rank = 0;
+  for (Eigen::Index row = 0; row < basis.rows() && rank < basis.cols(); ++row) {
+    Eigen::Index pivot = rank;
+    basis.row(row).tail(basis.cols() - rank).cwiseAbs().maxCoeff(&pivot);
+    pivot += rank;
     if (std::abs(basis(row, pivot)) < 1e-6) continue;
-    basis.col(done).swap(basis.col(pivot));
-    basis.col(done) /= basis(row, done);
+    basis.col(rank).swap(basis.col(pivot));
+    basis.col(rank) /= basis(row, rank);
     for (Eigen::Index c = 0; c < basis.cols(); ++c) {
-      if (c != done) basis.col(c) -= basis(row, c) * basis.col(done);
+      if (c != rank) basis.col(c) -= basis(row, c) * basis.col(rank);
     }
-    ++done;
+    ++rank;
   }
 }
 
 }  // namespace
 
-std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const Problem& problem) {
-  const auto sees = [](const SensorBinding& sensor) { return sensor.model->has_landmark(); };
-  const auto blind = [&](const SensorBinding& s) { return sees(s) && XyzModel(s) == nullptr; };
-  const auto first = std::ranges::find_if(problem.sensors, sees);
+std::optional<internal::ProblemWithLandmarks> internal::PlaceLandmarks(const Problem& problem) {
+  const auto has_landmark = [](const SensorBinding& s) { return s.model->has_landmark(); };
+  const auto has_no_xyz = [&](const SensorBinding& s) {
+    return has_landmark(s) && XyzModel(s) == nullptr;
+  };
+  const auto first = std::ranges::find_if(problem.sensors, has_landmark);
   if (!problem.landmarks || first == problem.sensors.end() ||
-      std::ranges::any_of(problem.sensors, blind)) {
+      std::ranges::any_of(problem.sensors, has_no_xyz)) {
     return std::nullopt;
   }
-  const std::size_t known = std::min(problem.landmarks->known.size(), std::size(kPlaces));
-  WithLandmarks with{problem, {}, known, BlockIn(*first, "position")};
-  with.problem.landmarks.reset();
-  std::erase_if(with.problem.sensors, sees);
-  const std::vector<double> r = StartOf(problem, with.camera, {0.0, 0.0, 0.0});
+  const std::size_t known = std::min(problem.landmarks->known.size(), std::size(kPositions));
+  ProblemWithLandmarks landmark_problem{problem, {}, known, BlockIn(*first, "position")};
+  landmark_problem.problem.landmarks.reset();
+  std::erase_if(landmark_problem.problem.sensors, has_landmark);
+  const std::vector<double> r = PriorMeanOf(problem, landmark_problem.camera, {0.0, 0.0, 0.0});
   const std::vector<double> q =
-      StartOf(problem, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
+      PriorMeanOf(problem, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
   const auto& prior = problem.landmarks->prior;
-  constexpr double kFarthest_m = 1000.0;  // a prior at infinity would tell nothing of scale
-  const double distance_m = prior ? std::min(1.0 / prior->inverse_distance, kFarthest_m) : 2.0;
+  constexpr double kMaxDistance_m = 1000.0;  // landmarks at infinity do not determine the scale
+  const double distance_m = prior ? std::min(1.0 / prior->inverse_distance, kMaxDistance_m) : 2.0;
   const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3)};
-  for (const auto& place : kPlaces) {
-    const double h[3] = {distance_m * place[0], distance_m * place[1], distance_m * place[2]};
+  for (const auto& position : kPositions) {
+    const double h[3] = {distance_m * position[0], distance_m * position[1],
+                         distance_m * position[2]};
     double p[3];
     UnitQuaternion::Rotate(q.data(), h, p);
     Vec<3>::Plus(r.data(), p, p);
-    const std::string name = std::string(kLandmarks) + '.' + std::to_string(with.landmarks.size());
-    const BlockId block = with.problem.layout.Declare(name, kLandmarks, xyz);
-    with.landmarks.push_back(block);
-    with.problem.priors.push_back({block, {p, p + 3}, Eigen::Matrix3d::Identity(), {}});
+    const std::string name =
+        std::string(kLandmarks) + '.' + std::to_string(landmark_problem.landmarks.size());
+    const BlockId block = landmark_problem.problem.layout.Declare(name, kLandmarks, xyz);
+    landmark_problem.landmarks.push_back(block);
+    landmark_problem.problem.priors.push_back({block, {p, p + 3}, Eigen::Matrix3d::Identity(), {}});
     for (const SensorBinding& sensor : problem.sensors) {
-      if (sees(sensor)) with.problem.sensors.push_back(SeenAs(sensor, block));
+      if (has_landmark(sensor))
+        landmark_problem.problem.sensors.push_back(SensorOfLandmark(sensor, block));
     }
   }
-  return with;
+  return landmark_problem;
 }
 
-bool internal::ObservabilityIsTold(const Problem& problem) {
+bool internal::IsObservabilityComputed(const Problem& problem) {
   int size = 0;
   for (const Block& block : problem.layout.blocks()) {
     if (block.status != BlockStatus::kConstant) size += block.geometry().tangent;
   }
-  return size <= internal::kMostObserved;
+  return size <= internal::kMaxObservabilityElements;
 }
 
-std::vector<std::vector<std::string>> internal::UnobservableDirections(const Problem& given,
-                                                                       Excitation excitation) {
-  const auto with = internal::PlaceLandmarks(given);
-  if ((given.landmarks && !with) || !internal::ObservabilityIsTold(given)) return {};
-  const Problem& problem = with ? with->problem : given;
+std::vector<std::vector<std::string>> internal::UnobservableDirections(
+    const Problem& original_problem, Excitation excitation) {
+  const auto landmark_problem = internal::PlaceLandmarks(original_problem);
+  if ((original_problem.landmarks && !landmark_problem) ||
+      !internal::IsObservabilityComputed(original_problem)) {
+    return {};
+  }
+  const Problem& problem = landmark_problem ? landmark_problem->problem : original_problem;
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
   const Trajectory start = StartNearPrior(problem);
@@ -336,21 +351,22 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(const Pro
   Trajectory t = start;
   Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
   RowSpace rows(n);
-  if (with) AddKnown(*with, t, rows);
+  if (landmark_problem) AddKnown(*landmark_problem, t, rows);
   Random random(1), known(2);
   Random* const changing = excitation == Excitation::kChanging ? &random : nullptr;
-  // Once a step adds nothing to the rank, later ones do not either: what holds from this state and
-  // for these inputs, which are not special, holds from the next ones. Twice, as trajectories turn.
+  // If a step does not increase the rank, later steps do not either, because state and inputs are
+  // generic. Two such steps are required, because trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
-    const Eigen::Index before = rows.rank();
-    Observe(problem, t, phi, known, rows);
-    idle = rows.rank() == before ? idle + 1 : 0;
+    const Eigen::Index previous_rank = rows.rank();
+    AddObservationRows(problem, t, phi, known, rows);
+    idle = rows.rank() == previous_rank ? idle + 1 : 0;
     if (!Advance(problem, kStep, changing, t, phi)) break;
   }
   if (rows.rank() == n) return {};
   Eigen::MatrixXd null_space = rows.Complement();
   std::vector<std::vector<std::string>> directions;
-  if (with && TakeScale(*with, start, null_space)) directions.push_back({"scale"});
+  if (landmark_problem && RemoveScale(*landmark_problem, start, null_space))
+    directions.push_back({"scale"});
   Reduce(null_space);
   for (Eigen::Index c = 0; c < null_space.cols(); ++c) {
     std::vector<std::string> names;
@@ -359,8 +375,9 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(const Pro
       const std::string& name = start.names[static_cast<std::size_t>(i)];
       if (names.empty() || names.back() != name) names.push_back(name);
     }
-    // Where a landmark is by itself, the path tells in time.
-    if (!with || names.front() != internal::kLandmarks) directions.push_back(std::move(names));
+    // A landmark alone becomes observable when the trajectory continues.
+    if (!landmark_problem || names.front() != internal::kLandmarks)
+      directions.push_back(std::move(names));
   }
   return directions;
 }

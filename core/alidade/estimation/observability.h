@@ -9,35 +9,35 @@
 
 namespace alidade::internal {
 
-/// Up to how many elements of the state UnobservableDirections looks: its time grows faster than
-/// their number cubed.
-inline constexpr int kMostObserved = 500;
+/// Maximum number of state elements for UnobservableDirections: its time grows faster than the cube
+/// of this number.
+inline constexpr int kMaxObservabilityElements = 500;
 
-/// Whether the estimated and consider blocks have at most kMostObserved elements; where not,
-/// UnobservableDirections gives none.
-bool ObservabilityIsTold(const Problem& problem);
+/// Returns whether the estimated and consider blocks have at most kMaxObservabilityElements
+/// elements. If not, UnobservableDirections returns no directions.
+bool IsObservabilityComputed(const Problem& problem);
 
-/// Whether control inputs change from step to step. A direction that only a change shows, such as
-/// the orientation of a body about its specific force, is unobservable under constant ones.
+/// Change of the control inputs from step to step. Some directions are observable only if the
+/// inputs change, such as the orientation of a body about its specific force.
 enum class Excitation { kChanging, kConstant };
 
-/// As alidade::UnobservableDirections, which has changing inputs.
+/// As alidade::UnobservableDirections, which uses changing inputs.
 std::vector<std::vector<std::string>> UnobservableDirections(const Problem& problem,
                                                              Excitation excitation);
 
-/// Owner of the blocks of landmarks; no state entry has this name.
+/// Owner of the blocks of landmarks. State entries cannot have this name.
 inline constexpr const char* kLandmarks = "landmarks";
 
-/// A problem whose landmarks are blocks of their own, to see what can be observed.
-struct WithLandmarks {
-  Problem problem;                 ///< has no `landmarks`; these blocks and priors come last
-  std::vector<BlockId> landmarks;  ///< of the representation xyz
-  std::size_t known = 0;           ///< so many of them are where they are known to be
-  BlockId camera = -1;             ///< its position; -1: no sensor has one
+/// Problem with a fixed set of landmarks, each a block, for the analysis of observability.
+struct ProblemWithLandmarks {
+  Problem problem;                 ///< has no `landmarks`; their blocks and priors come last
+  std::vector<BlockId> landmarks;  ///< with the representation xyz
+  std::size_t known_count = 0;     ///< number of known landmarks, the first ones
+  BlockId camera = -1;             ///< block of its position; -1: no sensor has this role
 };
 
-/// The problem with a few points before the camera in the place of landmarks to come, seen by every
-/// sensor of landmarks. None where one of these has no landmarks of the representation xyz.
-std::optional<WithLandmarks> PlaceLandmarks(const Problem& problem);
+/// Returns the problem with a few landmarks in front of the camera, which every sensor of landmarks
+/// measures. Returns nullopt if one of these sensors has no model for the representation xyz.
+std::optional<ProblemWithLandmarks> PlaceLandmarks(const Problem& problem);
 
 }  // namespace alidade::internal

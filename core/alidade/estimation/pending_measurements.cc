@@ -11,14 +11,15 @@
 
 namespace alidade::internal {
 
-[[gnu::noinline]] void PendingMeasurement::Bind(const SensorPlace& to) {
-  place = &to;
-  sensor = to.sensor;
-  binding = to.binding;
+[[gnu::noinline]] void PendingMeasurement::Bind(const SensorPlace& sensor_place) {
+  place = &sensor_place;
+  sensor = sensor_place.sensor;
+  binding = sensor_place.binding;
   model = binding->model.get();
-  roles_of = nullptr;
-  const auto a = static_cast<std::size_t>(to.ambient), m = static_cast<std::size_t>(to.dof),
-             width = static_cast<std::size_t>(to.width);
+  roles_source = nullptr;
+  const auto a = static_cast<std::size_t>(sensor_place.ambient),
+             m = static_cast<std::size_t>(sensor_place.dof),
+             width = static_cast<std::size_t>(sensor_place.width);
   numbers.resize(2 * a + m + 3 * m * m);
   z = numbers.data();
   h = z + a;
@@ -26,15 +27,16 @@ namespace alidade::internal {
   s = innovation + m;
   R = {s + m * m, m * m};
   root = s + 2 * m * m;
-  std::fill(h, numbers.data() + numbers.size(), kNotANumber);  // whatever a model leaves out
+  // Detects elements that the model does not write.
+  std::fill(h, numbers.data() + numbers.size(), kNotANumber);
   H.assign(m * width, kNotANumber);
-  for (std::size_t i = 0; i < to.columns.size(); ++i) {
-    jacobians[i] = to.columns[i] < 0 ? nullptr : H.data() + to.columns[i];
+  for (std::size_t i = 0; i < sensor_place.columns.size(); ++i) {
+    jacobians[i] = sensor_place.columns[i] < 0 ? nullptr : H.data() + sensor_place.columns[i];
   }
-  linearised = {{H.data(), to.dof, to.rows}, innovation, R.data(), s};
+  linearised = {{H.data(), sensor_place.dof, sensor_place.rows}, innovation, R.data(), s};
 }
 
-/// The row of a measurement.
+/// Appends a measurement of the sensor.
 [[gnu::always_inline]] inline PendingMeasurement& PendingMeasurements::Add(
     const Measurement& measurement, const SensorPlace& place) {
   const std::ptrdiff_t ambient = place.ambient;
@@ -49,7 +51,7 @@ namespace alidade::internal {
   return pending;
 }
 
-/// Its entry in the report.
+/// Appends the entry of a measurement to the report.
 [[gnu::always_inline]] inline void PendingMeasurements::Report(const PendingMeasurement& pending,
                                                                Outcome outcome,
                                                                UpdateReport& report) {
@@ -58,26 +60,27 @@ namespace alidade::internal {
   entry.z = {pending.z, static_cast<std::size_t>(pending.place->ambient)};
 }
 
-/// Once there are no more.
+/// Sets the pointers to the entries of the report. Called after the last entry was appended.
 void PendingMeasurements::PointToReports(UpdateReport& report) {
   MeasurementReport* entry = report.measurements().data();
   for (PendingMeasurement& pending : all()) pending.report = entry++;
 }
 
-/// The outcome of a measurement by itself: kAccepted, or why it is of no use.
+/// Returns kAccepted if the measurement can be used, else the reason.
 [[gnu::always_inline]] inline Outcome PendingMeasurements::Check(
     const PendingMeasurement& pending) {
   const Measurement& m = *pending.measurement;
   if (!AllFinite(m.values)) return Outcome::kNotFinite;
   if (!m.known.empty() || !m.covariance.empty() || pending.place->known_size > 0) {
-    const Outcome outcome = CheckRest(pending);
+    const Outcome outcome = CheckKnownAndCovariance(pending);
     if (outcome != Outcome::kAccepted) return outcome;
   }
   return OutcomeOf(pending.model->Valid({m.values.data(), m.known.data()}));
 }
 
-/// The same of its known numbers and its covariance.
-[[gnu::noinline]] Outcome PendingMeasurements::CheckRest(const PendingMeasurement& pending) {
+/// Checks the known numbers and the covariance of a measurement.
+[[gnu::noinline]] Outcome PendingMeasurements::CheckKnownAndCovariance(
+    const PendingMeasurement& pending) {
   const Measurement& m = *pending.measurement;
   const int dof = pending.place->dof;
   ALIDADE_EXPECTS(std::ssize(m.known) == pending.place->known_size);
@@ -133,15 +136,15 @@ Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles) {
 
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work) {
   const Workspace::Use use(work);
-  const Eigen::Map<const RowMajor> given(s, m, m);
+  const Eigen::Map<const RowMajor> matrix(s, m, m);
   Workspace::Matrix l = work.Take(m, m);  // L D, D on the diagonal
   Workspace::Vector y = work.Take(m);     // L^-1 r
   double sum = 0.0;
   for (int i = 0; i < m; ++i) {
-    l(i, i) = given(i, i);
+    l(i, i) = matrix(i, i);
     y[i] = r[i];
     for (int j = 0; j < i; ++j) {
-      l(i, j) = given(i, j);
+      l(i, j) = matrix(i, j);
       for (int k = 0; k < j; ++k) l(i, j) -= l(i, k) * l(j, k) / l(k, k);
       l(i, i) -= l(i, j) * l(i, j) / l(j, j);
       y[i] -= l(i, j) / l(j, j) * y[j];
@@ -156,30 +159,30 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
                    Workspace& work) {
   const Workspace::Use use(work);
   const int m = pending.report->dof;
-  auto own =
+  auto jacobian =
       Eigen::Map<RowMajor>(pending.H.data(), m, pending.place->width).middleCols(column, size);
   Workspace::Matrix chained = work.Take(m, size);
-  chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
-  own = chained;
+  chained.noalias() = jacobian * Eigen::Map<const RowMajor>(j, size, size);
+  jacobian = chained;
 }
 
-[[gnu::noinline]] void NotePluginFailure(FilterState& f, const PendingMeasurement& pending) {
-  Note(f, "plugin_failed",
-       "sensor '" + pending.binding->name + "': " + pending.model->error_text());
+[[gnu::noinline]] void ReportPluginFailure(FilterState& f, const PendingMeasurement& pending) {
+  AddEvent(f, "plugin_failed",
+           "sensor '" + pending.binding->name + "': " + pending.model->error_text());
 }
 
-[[gnu::noinline]] void NoteRefusal(FilterState& f, const PendingMeasurement& pending,
-                                   Outcome outcome) {
+[[gnu::noinline]] void ReportRefusal(FilterState& f, const PendingMeasurement& pending,
+                                     Outcome outcome) {
   const SensorBinding& sensor = *pending.binding;
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, pending);
-  char& said = f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)];
-  // A landmark behind the camera, say, is no divergence.
-  if (outcome != Outcome::kOutOfDomain || pending.on_landmark() || said != 0) return;
-  said = 1;
+  if (outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
+  char& is_reported = f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)];
+  // A landmark outside the domain, such as behind the camera, is not a divergence.
+  if (outcome != Outcome::kOutOfDomain || pending.is_on_landmark() || is_reported != 0) return;
+  is_reported = 1;
   std::vector<BlockId> blocks;
   for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
-  NoteDivergence(f, "diverged",
-                 "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
+  AddDivergenceEvent(f, "diverged",
+                     "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
 }
 
 }  // namespace alidade::internal

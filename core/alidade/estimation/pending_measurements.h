@@ -15,15 +15,15 @@
 /// The measurements of a frame before their update, with the results of their sensor models.
 namespace alidade::internal {
 
-/// One measurement by one sensor before its update: m = dof, n = size of P.
+/// Measurement of one sensor before its update. m = dof, n = size of P.
 struct PendingMeasurement {
   const Measurement* measurement = nullptr;
   MeasurementReport* report = nullptr;
   int sensor = -1;
   const SensorBinding* binding = nullptr;
-  const SensorModel* model = nullptr;  ///< of the sensor, or for the landmark's representation
-  const SensorPlace* place = nullptr;  ///< of the sensor, or `own`; set by Bind
-  SensorPlace own;                     ///< with the blocks of the landmark that is measured
+  const SensorModel* model = nullptr;  ///< of the sensor, or for the representation of the landmark
+  const SensorPlace* place = nullptr;  ///< of the sensor, or `landmark_place`; set by Bind
+  SensorPlace landmark_place;          ///< includes the blocks of the measured landmark
   std::vector<double> numbers;  ///< z, h, the innovation, S, R and L; the report points to them
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;  ///< s: m x m, row-major
   std::span<double> R;                                                     ///< R, m x m, row-major
@@ -32,27 +32,27 @@ struct PendingMeasurement {
   std::vector<double> gain;                    ///< K, as in the report
   std::array<double*, kMaxRoles> jacobians{};  ///< by role: its first column in H
   Roles roles{};                               ///< the result of the last RolesAt
-  const double* roles_of = nullptr;            ///< the filter's x, if `roles` point into it
+  const double* roles_source = nullptr;        ///< the filter's x, if `roles` point into it
   double weight = 1.0;                         ///< w of the robust loss; R is divided by it
-  MeasurementRows linearised;  ///< H, innovation, R and S for the update, and its column there
+  MeasurementRows linearised;  ///< H, innovation, R and S, and their first column in the update
 
   /// Sets `place`, and the memory and pointers that depend on it.
-  void Bind(const SensorPlace& to);
-  /// Whether the landmark that is measured is in the state.
-  bool on_landmark() const { return place == &own; }
+  void Bind(const SensorPlace& sensor_place);
+  /// Returns whether the measured landmark is in the state.
+  bool is_on_landmark() const { return place == &landmark_place; }
 };
 
-/// The pending measurements of a frame. Their memory, to which the report points, is kept from one
-/// frame to the next.
+/// Pending measurements of a frame. The report points to their memory, which is reused for the next
+/// frame.
 class PendingMeasurements {
  public:
-  /// Collects one for each measurement and sensor bound to its stream, in the order of the sensors,
-  /// and adds its entry to the report. The outcome is kAccepted, unless the measurement is not
-  /// finite or its sensor finds it invalid. If `refused` is not kAccepted, all have that outcome
+  /// Collects the measurements of all sensors, in the order of the sensors, and appends their
+  /// entries to the report. The outcome is kAccepted, unless the measurement is not finite or
+  /// invalid for its sensor. If `refused` is not kAccepted, it is the outcome of all measurements,
   /// and no model is called.
   void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
                Outcome refused = Outcome::kAccepted);
-  /// Collects one measurement by one sensor, whatever their streams, with the outcome kAccepted.
+  /// Collects one measurement for one sensor with the outcome kAccepted; ignores its stream.
   PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
                                  const ProblemIndex& index, UpdateReport& report);
   std::span<PendingMeasurement> all() {
@@ -64,24 +64,24 @@ class PendingMeasurements {
   void Report(const PendingMeasurement& pending, Outcome outcome, UpdateReport& report);
   void PointToReports(UpdateReport& report);
   Outcome Check(const PendingMeasurement& pending);
-  Outcome CheckRest(const PendingMeasurement& pending);
+  Outcome CheckKnownAndCovariance(const PendingMeasurement& pending);
   bool IsCovariance(const std::vector<double>& covariance, int size);
 
   std::vector<PendingMeasurement> rows_;  ///< the first count_ are in use
   std::ptrdiff_t count_ = 0;
-  // Memory.
+  // Reused memory.
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
   Scratch<Eigen::MatrixXd> root_;
 };
 
-/// Pointers to the values of its roles at x, valid until the next call. Roles that the sensor knows
-/// point to their values in `f`.
+/// Returns pointers to the values of the roles at x, valid until the next call. Known roles point
+/// to their values in `f`.
 inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pending,
                                     const std::vector<double>& x) {
   const double* const values = f.state.values().data();
-  if (x.data() == values && pending.roles_of == values) return pending.roles.data();
+  if (x.data() == values && pending.roles_source == values) return pending.roles.data();
   RolesAt(*pending.place, x.data(), values, pending.roles);
-  pending.roles_of = x.data() == values ? values : nullptr;
+  pending.roles_source = x.data() == values ? values : nullptr;
   return pending.roles.data();
 }
 /// Computes h at x, ambient, into `h`.
@@ -105,23 +105,23 @@ Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::
   }
   return OutcomeOf(status);
 }
-/// Computes R at the roles, or copies that of the measurement.
+/// Computes R at the roles, or copies the covariance of the measurement.
 Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles);
-/// Computes z (-) h of the last h; it is in the report too.
+/// Computes z (-) h for the last h; it is in the report too.
 inline void ComputeInnovation(PendingMeasurement& pending) {
   pending.report->innovation = {pending.innovation, static_cast<std::size_t>(pending.place->dof)};
   pending.model->measurement().geometry.Minus(pending.z, pending.h, pending.innovation);
 }
-/// H <- H J in the columns of one role, J size x size, row-major.
+/// Sets H <- H J in the columns of one role; J is size x size, row-major.
 void ChainJacobian(PendingMeasurement& pending, int column, int size, const double* j,
                    Workspace& work);
 
-/// r' S^-1 r by S = L D L', m x m, row-major; NaN unless S is positive definite.
+/// Returns r' S^-1 r, computed by S = L D L', m x m, row-major. NaN unless S is positive definite.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
-/// Reports why h could not be computed. If h is not defined, the filter counts as diverged; this is
-/// reported once until the next acceptance of the sensor.
-void NoteRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
-void NotePluginFailure(FilterState& f, const PendingMeasurement& pending);
+/// Reports that h could not be computed. If h is not defined, the filter counts as diverged; this
+/// is reported once until the sensor is accepted again.
+void ReportRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
+void ReportPluginFailure(FilterState& f, const PendingMeasurement& pending);
 
 }  // namespace alidade::internal

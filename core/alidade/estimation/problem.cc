@@ -16,25 +16,27 @@ namespace {
 
 using internal::NamesOf;
 
-[[noreturn]] void Refuse(const std::string& who, const std::string& why) {
-  throw Error(ExitCode::kBadConfig, who + ' ' + why);
+[[noreturn]] void Fail(const std::string& place, const std::string& defect) {
+  throw Error(ExitCode::kBadConfig, place + ": " + defect);
 }
 
-/// Mean and covariance of a block, checked.
+/// Checks an initial value and returns it as a prior.
 Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
-              const std::string& who) {
-  Prior prior{block, initial.mean, {}, initial.from};
-  if (!initial.from.empty()) return prior;
+              const std::string& place) {
+  Prior prior{block, initial.mean, {}, initial.sensor};
+  if (!initial.sensor.empty()) return prior;
   const Geometry& geometry = space.geometry;
   const std::string value =
       "the initial value of '" + space.name + "', " + internal::WithArticle(ToString(geometry));
   if (std::ssize(prior.mean) != geometry.ambient) {
-    Refuse(who, "needs " + std::to_string(geometry.ambient) + " numbers as " + value + ", not " +
-                    std::to_string(prior.mean.size()));
+    Fail(place, value + ", has " + std::to_string(prior.mean.size()) + " numbers; expected " +
+                    std::to_string(geometry.ambient));
   }
-  if (!internal::AllFinite(prior.mean)) Refuse(who, "has numbers that are not finite in " + value);
+  if (!internal::AllFinite(prior.mean)) {
+    Fail(place, value + ", is not finite; expected finite numbers");
+  }
   if (DistanceFrom(geometry, prior.mean.data()) > kUnitTolerance) {
-    Refuse(who, "has a length that is not 1 in " + value);
+    Fail(place, value + ", does not have unit length; expected a length of 1");
   }
   geometry.Normalise(prior.mean.data());
   if (initial.status == BlockStatus::kConstant) return prior;
@@ -48,69 +50,78 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
     Eigen::LDLT<Eigen::MatrixXd> ldlt;
     Eigen::MatrixXd root;
     if (!fits || internal::SquareRootOf(prior.covariance, ldlt, root) < -kRounding) {
-      Refuse(who, "needs a symmetric, positive semi-definite covariance of " + std::to_string(n) +
-                      " x " + std::to_string(n) + " finite numbers with " + value);
+      Fail(place, value +
+                      ", has an invalid covariance; expected a symmetric, positive "
+                      "semi-definite matrix of " +
+                      std::to_string(n) + " x " + std::to_string(n) + " finite numbers");
     }
     return prior;
   }
   std::vector<double> sigma = initial.sigma;
   if (sigma.size() == 1) sigma.assign(static_cast<std::size_t>(n), sigma[0]);
-  const auto good = [](double one) { return std::isfinite(one) && one >= 0.0; };
-  if (std::ssize(sigma) != n || !std::ranges::all_of(sigma, good)) {
-    Refuse(who, "needs a finite standard deviation of at least 0" +
-                    (n == 1 ? "" : ", or " + std::to_string(n) + " of them,") + " with " + value);
+  const auto is_valid = [](double element) { return std::isfinite(element) && element >= 0.0; };
+  if (std::ssize(sigma) != n || !std::ranges::all_of(sigma, is_valid)) {
+    Fail(place, value + ", has an invalid standard deviation; expected a finite number >= 0" +
+                    (n == 1 ? "" : ", or " + std::to_string(n) + " such numbers"));
   }
   prior.covariance = Eigen::Map<const Eigen::VectorXd>(sigma.data(), n).cwiseAbs2().asDiagonal();
   return prior;
 }
 
-/// The index of the stream, a new one if the problem reads none of that name.
-int AddStream(Problem& problem, const StreamInfo& stream, const std::string& who) {
+/// Returns the index of the stream. Appends the stream if its name is new.
+int AddStream(Problem& problem, const StreamInfo& stream, const std::string& place) {
   const auto found = std::ranges::find(problem.streams, stream.name, &StreamInfo::name);
   if (found == problem.streams.end()) {
     problem.streams.push_back(stream);
     return static_cast<int>(problem.streams.size()) - 1;
   }
   if (found->size != stream.size || found->known != stream.known) {
-    const auto numbers = [](const StreamInfo& one) {
-      return std::to_string(one.size) + " and " + std::to_string(one.known) + " known numbers";
+    const auto sizes = [](const StreamInfo& info) {
+      return "size " + std::to_string(info.size) + " and " + std::to_string(info.known) +
+             " known numbers";
     };
-    Refuse(who, "reads " + numbers(stream) + " from stream '" + stream.name + "', and another " +
-                    numbers(*found));
+    Fail(place,
+         "stream '" + stream.name + "' has " + sizes(*found) + "; expected " + sizes(stream));
   }
   return static_cast<int>(found - problem.streams.begin());
 }
 
-/// Refuses a block that cannot fill a role.
+/// Checks that a block can fill a role.
 void CheckRole(const Problem& problem, const Space& role, const RoleBinding& binding,
-               const std::string& who) {
-  const std::string its_role =
-      "role '" + role.name + "', " + internal::WithArticle(ToString(role.geometry));
+               const std::string& place) {
+  const std::string geometry = internal::WithArticle(ToString(role.geometry));
   if (binding.block < 0) {
-    if (!role.optional()) Refuse(who, "needs a block that fills its " + its_role);
+    if (!role.optional()) {
+      Fail(place, "role '" + role.name + "' has no block; expected " + geometry);
+    }
     return;
   }
   if (binding.block >= std::ssize(problem.layout.blocks())) {
-    Refuse(who, "has in its " + its_role + ", a block that is not of this problem");
+    Fail(place, "role '" + role.name + "' has a block of another problem; expected " + geometry);
   }
   const Block& block = problem.layout[binding.block];
   if (block.geometry() == role.geometry) return;
-  Refuse(who, "has a " + its_role + "; block '" + block.name + "' is " +
-                  internal::WithArticle(ToString(block.geometry())));
+  Fail(place, "role '" + role.name + "' has block '" + block.name + "', " +
+                  internal::WithArticle(ToString(block.geometry())) + "; expected " + geometry);
 }
 
 }  // namespace
 
-InitialValue::InitialValue(std::string of_block, std::vector<double> at,
-                           std::vector<double> deviations, BlockStatus use)
-    : block(std::move(of_block)), mean(std::move(at)), sigma(std::move(deviations)), status(use) {}
+InitialValue::InitialValue(std::string block_name, std::vector<double> value,
+                           std::vector<double> deviations, BlockStatus block_status)
+    : block(std::move(block_name)),
+      mean(std::move(value)),
+      sigma(std::move(deviations)),
+      status(block_status) {}
 
-InitialValue::InitialValue(std::string of_block, std::vector<double> at, double deviation,
-                           BlockStatus use)
-    : InitialValue(std::move(of_block), std::move(at), std::vector{deviation}, use) {}
+InitialValue::InitialValue(std::string block_name, std::vector<double> value, double deviation,
+                           BlockStatus block_status)
+    : InitialValue(std::move(block_name), std::move(value), std::vector{deviation}, block_status) {}
 
-InitialValue::InitialValue(std::string of_block, double at, double deviation, BlockStatus use)
-    : InitialValue(std::move(of_block), std::vector{at}, std::vector{deviation}, use) {}
+InitialValue::InitialValue(std::string block_name, double value, double deviation,
+                           BlockStatus block_status)
+    : InitialValue(std::move(block_name), std::vector{value}, std::vector{deviation},
+                   block_status) {}
 
 InitialValue InitialValue::WithCovariance(std::string block, std::vector<double> mean,
                                           Eigen::MatrixXd covariance, BlockStatus status) {
@@ -125,7 +136,7 @@ InitialValue InitialValue::Constant(std::string block, std::vector<double> value
 
 InitialValue InitialValue::FromMeasurement(std::string block, std::string sensor) {
   InitialValue initial(std::move(block), std::vector<double>(), std::vector<double>());
-  initial.from = std::move(sensor);
+  initial.sensor = std::move(sensor);
   return initial;
 }
 
@@ -140,24 +151,25 @@ BlockId StateHandle::operator[](std::string_view block) const {
   const auto found = blocks.find(block);
   if (found != blocks.end()) return found->second;
   std::vector<std::string> names;
-  for (const auto& [known, id] : blocks) names.push_back(known);
-  Refuse("state '" + name + "'",
-         "has no block '" + std::string(block) + "'; its blocks are " + internal::Join(names));
+  for (const auto& entry : blocks) names.push_back(entry.first);
+  Fail("state '" + name + "'",
+       "no block '" + std::string(block) + "'; expected " + internal::Join(names));
 }
 
 StateHandle Problem::AddState(const std::string& name, SharedMotion model,
                               const std::vector<InitialValue>& initial, const InputBinding& input) {
-  const std::string who = "state '" + name + "'";
-  const auto taken = [&](const Block& block) { return block.owner == name; };
-  if (std::ranges::any_of(layout.blocks(), taken)) Refuse(who, "is there already");
+  const std::string place = "state '" + name + "'";
+  const auto has_name = [&](const Block& block) { return block.owner == name; };
+  if (std::ranges::any_of(layout.blocks(), has_name)) {
+    Fail(place, "the name is already used; expected another name");
+  }
   const std::vector<Space>& spaces = model->blocks();
-  for (const InitialValue& one : initial) {
-    if (std::ranges::count(initial, one.block, &InitialValue::block) > 1) {
-      Refuse(who, "has two initial values of '" + one.block + "'");
+  for (const InitialValue& value : initial) {
+    if (std::ranges::count(initial, value.block, &InitialValue::block) > 1) {
+      Fail(place, "two initial values of '" + value.block + "'; expected one");
     }
-    if (std::ranges::count(spaces, one.block, &Space::name) == 0) {
-      Refuse(who,
-             "has no block '" + one.block + "'; its blocks are " + internal::Join(NamesOf(spaces)));
+    if (std::ranges::count(spaces, value.block, &Space::name) == 0) {
+      Fail(place, "no block '" + value.block + "'; expected " + internal::Join(NamesOf(spaces)));
     }
   }
   std::vector<InitialValue> values;  // in the order of the model
@@ -171,21 +183,23 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
       space.geometry.Identity(neutral.data());
       values.push_back(InitialValue::Constant(space.name, neutral));
     } else {
-      Refuse(who, "needs an initial value of '" + space.name + "'");
+      Fail(place, "no initial value of '" + space.name + "'; expected one");
     }
     if (values.back().name.empty()) values.back().name = space.name;
-    added.push_back(PriorOf(values.back(), space, -1, who));
+    added.push_back(PriorOf(values.back(), space, -1, place));
   }
   if (!input.stream.empty() && !model->has_input()) {
-    Refuse(who, "has model '" + model->name() + "', which takes no control input");
+    Fail(place, "model '" + model->name() + "' takes no control input; expected no `input`");
   }
-  Problem changed = *this;  // as a whole, or nothing
+  Problem changed = *this;  // an exception leaves this problem unchanged
   StateHandle handle{name, {}, -1};
   MotionBinding motion{name, std::move(model), {}, {}};
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     const std::string& block = values[i].name;
     const std::string full = name + '.' + block;
-    if (changed.layout.Find(full) >= 0) Refuse(who, "has a block '" + full + "', which is there");
+    if (changed.layout.Find(full) >= 0) {
+      Fail(place, "block '" + full + "' already exists; expected another name");
+    }
     const BlockId id = changed.layout.Declare(full, name, spaces[i], values[i].status);
     handle.blocks.emplace(block, id);
     motion.blocks.push_back(id);
@@ -196,7 +210,7 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
     const Space& space = motion.model->input();
     motion.input = input;
     if (input.stream.empty()) motion.input.stream = name + '.' + space.name;
-    handle.input = AddStream(changed, {motion.input.stream, space.geometry.ambient}, who);
+    handle.input = AddStream(changed, {motion.input.stream, space.geometry.ambient}, place);
   }
   changed.motions.push_back(std::move(motion));
   *this = std::move(changed);
@@ -205,49 +219,50 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
 
 SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
                                 std::vector<RoleBinding> roles, const SensorOptions& options) {
-  const std::string who = "sensor '" + name + "'";
-  if (FindSensor(name) >= 0) Refuse(who, "is there already");
+  const std::string place = "sensor '" + name + "'";
+  if (FindSensor(name) >= 0) Fail(place, "the name is already used; expected another name");
   const std::vector<Space>& spaces = model->roles();
-  const auto of_landmark = std::ranges::count_if(spaces, &Space::landmark);
-  const auto own = std::ssize(spaces) - of_landmark;
-  if (std::ssize(roles) > own) {
-    Refuse(who, "has " + std::to_string(own) + (own == 1 ? " role" : " roles") +
-                    " to be filled, not " + std::to_string(roles.size()) + ": " +
-                    internal::Join(NamesOf(spaces)));
+  const auto landmark_roles = std::ranges::count_if(spaces, &Space::landmark);
+  const auto block_roles = std::ssize(spaces) - landmark_roles;
+  if (std::ssize(roles) > block_roles) {
+    Fail(place, std::to_string(roles.size()) + " blocks for its roles; expected " +
+                    std::to_string(block_roles) + ": " + internal::Join(NamesOf(spaces)));
   }
   roles.resize(spaces.size());
-  const auto brings = [&](std::size_t i) {
+  const auto is_owned = [&](std::size_t i) {
     return (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && roles[i].block < 0;
   };
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    if (!spaces[i].landmark() && !brings(i)) CheckRole(*this, spaces[i], roles[i], who);
+    if (!spaces[i].landmark() && !is_owned(i)) CheckRole(*this, spaces[i], roles[i], place);
     const BlockId block = roles[i].block;
     if (block < 0 || std::ranges::count(roles, block, &RoleBinding::block) < 2) continue;
-    Refuse(who, "has block '" + layout[block].name + "' in two roles; expected one for each");
+    Fail(place, "block '" + layout[block].name + "' fills two roles; expected one block for each");
   }
-  for (const auto& [role, state] : options.owned) {
-    if (role < spaces.size() && brings(role)) continue;
-    Refuse(who, "brings no state in its role " + std::to_string(role) +
-                    ", which the option `owned` names");
+  for (const auto& entry : options.owned) {
+    const std::size_t role = entry.first;
+    if (role < spaces.size() && is_owned(role)) continue;
+    Fail(place, "role " + std::to_string(role) +
+                    " in the option `owned` is not a state of the sensor; expected a role with "
+                    "the flag ALIDADE_ROLE_OWNED and without a block");
   }
   if (options.loss.kind != LossKind::kNone && !(options.loss.scale > 0.0)) {
-    Refuse(who, "has a robust loss of scale " + internal::RoundedText(options.loss.scale) +
+    Fail(place, "the robust loss has the scale " + internal::RoundedText(options.loss.scale) +
                     "; expected > 0");
   }
-  Problem changed = *this;  // as a whole, or nothing
+  Problem changed = *this;  // an exception leaves this problem unchanged
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    if (!brings(i)) continue;
-    const auto given = options.owned.find(i);
+    if (!is_owned(i)) continue;
+    const auto option = options.owned.find(i);
     roles[i] = internal::AddOwnedState(
         changed, name, spaces[i],
-        given != options.owned.end() ? given->second : OwnedState::Of(model->owned(i)));
+        option != options.owned.end() ? option->second : OwnedState::Of(model->owned(i)));
   }
-  if (of_landmark > 0 && !changed.landmarks) changed.landmarks.emplace();
+  if (landmark_roles > 0 && !changed.landmarks) changed.landmarks.emplace();
   const std::string& stream = options.stream.empty() ? name : options.stream;
   const SensorHandle handle{
       static_cast<int>(sensors.size()),
       AddStream(changed, {stream, model->measurement().geometry.ambient, 0.0, model->known_size()},
-                who)};
+                place)};
   changed.sensors.push_back({name, stream, std::move(model), std::move(roles), options.loss,
                              options.xyz, options.outlier_rejection});
   *this = std::move(changed);
@@ -256,14 +271,16 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
 
 BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                                 OwnedState state) {
-  const std::string who = "sensor '" + sensor + "'";
-  if (!state.initial.from.empty()) {
-    Refuse(who, "brings the state '" + role.name + "', which starts from no measurement");
+  const std::string place = "sensor '" + sensor + "'";
+  if (!state.initial.sensor.empty()) {
+    Fail(place,
+         "its state '" + role.name + "' cannot start from a measurement; expected mean and sigma");
   }
   const std::string name = sensor + '.' + role.name;
-  if (problem.layout.Find(name) >= 0)
-    Refuse(who, "brings the state '" + name + "', which is there");
-  Prior prior = PriorOf(state.initial, role, -1, who);
+  if (problem.layout.Find(name) >= 0) {
+    Fail(place, "its state '" + name + "' already exists; expected another name");
+  }
+  Prior prior = PriorOf(state.initial, role, -1, place);
   const BlockStatus status = state.initial.status;
   if (status == BlockStatus::kConstant) state.process.dynamics = OwnedDynamics::kConstant;
   state.process.mean = prior.mean;
@@ -271,7 +288,7 @@ BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, con
   OwnedRole checked = state.process;
   const std::string defect = CheckOwned(role.geometry, checked);
   if (!defect.empty()) {
-    Refuse(who, "brings the state '" + role.name + "', whose dynamics " + defect);
+    Fail(place, "the dynamics of its state '" + role.name + "' " + defect);
   }
   prior.block = problem.layout.Declare(name, sensor, role, status);
   problem.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});
@@ -281,13 +298,13 @@ BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, con
 
 State Problem::InitialState(bool reserved) const {
   State state(layout);
-  std::vector<const Prior*> in_order;
-  for (const Prior& prior : priors) in_order.push_back(&prior);
-  std::ranges::stable_sort(in_order, {}, &Prior::block);
-  for (const Prior* const one : in_order) {
-    const Prior& prior = *one;
-    if (!prior.from.empty() && reserved) state.Reserve(prior.block);
-    if (!prior.from.empty()) continue;
+  std::vector<const Prior*> sorted_priors;
+  for (const Prior& prior : priors) sorted_priors.push_back(&prior);
+  std::ranges::stable_sort(sorted_priors, {}, &Prior::block);
+  for (const Prior* const entry : sorted_priors) {
+    const Prior& prior = *entry;
+    if (!prior.sensor.empty() && reserved) state.Reserve(prior.block);
+    if (!prior.sensor.empty()) continue;
     ALIDADE_EXPECTS(std::ssize(prior.mean) == layout[prior.block].geometry().ambient);
     state.Add(prior.block, prior.mean.data(), prior.covariance);
   }
@@ -301,16 +318,16 @@ int Problem::FindSensor(std::string_view name) const {
 }
 
 BlockId internal::PositionBlockOf(const Problem& problem) {
-  BlockId path = -1;
+  BlockId position = -1;
   for (const SensorBinding& binding : problem.sensors) {
     if (!binding.model->has_landmark()) continue;
     for (std::size_t r = 0; r < binding.roles.size(); ++r) {
       const BlockId id = binding.roles[r].block;
-      const bool position = binding.model->roles()[r].name == "position" && id >= 0;
-      if (position && problem.layout[id].geometry().ambient == 3) path = id;
+      const bool is_position = binding.model->roles()[r].name == "position" && id >= 0;
+      if (is_position && problem.layout[id].geometry().ambient == 3) position = id;
     }
   }
-  return path;
+  return position;
 }
 
 std::string internal::UnitOf(const Problem& problem, BlockId id) {

@@ -21,50 +21,54 @@
 
 namespace alidade {
 
-/// What an update does with the block in a role: correct it; let its uncertainty count but leave it
-/// (Schmidt); take its value as exact (its Jacobian is zero).
-enum class RoleMode { kEstimate, kConsider, kKnown };
+/// Treatment of the block in a role by an update.
+enum class RoleMode {
+  kEstimate,  ///< corrected
+  kConsider,  ///< not corrected, but its uncertainty counts (Schmidt)
+  kKnown,     ///< its value counts as exact: its Jacobian is zero
+};
 
-/// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
-/// measurement itself implies (Initialise of that role).
+/// Value of a role at which the Jacobian of a sensor is evaluated: the prediction, or the value
+/// that the measurement implies (Initialise of that role).
 enum class JacobianAt { kPrediction, kMeasurement };
 
-/// What fills a role of a sensor; a block alone is estimated.
+/// Block that fills a role of a sensor. A block alone is estimated.
 struct RoleBinding {
   RoleBinding() = default;
-  // NOLINTNEXTLINE(google-explicit-constructor): a block alone is a binding
-  RoleBinding(BlockId id, RoleMode use = RoleMode::kEstimate,
-              JacobianAt at = JacobianAt::kPrediction)
-      : block(id), mode(use), jacobian_at(at) {}
+  // NOLINTNEXTLINE(google-explicit-constructor): a block converts to a binding
+  RoleBinding(BlockId id, RoleMode role_mode = RoleMode::kEstimate,
+              JacobianAt jacobian_value = JacobianAt::kPrediction)
+      : block(id), mode(role_mode), jacobian_at(jacobian_value) {}
 
-  BlockId block = -1;  ///< -1: an optional role left unbound
+  BlockId block = -1;  ///< -1: an optional role without a block
   RoleMode mode = RoleMode::kEstimate;
   JacobianAt jacobian_at = JacobianAt::kPrediction;
 };
 
-/// stream -> sensor model -> the blocks that fill its roles. The roles of a landmark, which come
-/// last, have none.
+/// Sensor of a problem: its stream, its model, and the blocks that fill the roles of the model. The
+/// roles of a landmark come last and have no block.
 struct SensorBinding {
   std::string name;
   std::string stream;
   SharedSensor model;
   std::vector<RoleBinding> roles;
   RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
-  /// The same sensor of landmarks that are xyz, where `model` is of another representation and
-  /// landmarks may become xyz or start as such. Its other roles are those of `model`.
+  /// Model of the same sensor for landmarks with the representation xyz. Set if `model` has another
+  /// representation and landmarks are converted to xyz or start as xyz. Its other roles equal those
+  /// of `model`.
   SharedSensor xyz = {};
-  /// How those of its matches are found that agree; none: each is gated on its own alone.
+  /// Outlier rejection among the matches of a frame; nullopt: only the gate.
   std::optional<OnePointRansac> outlier_rejection = {};
 };
 
-/// Stream -> the control input of a motion model.
+/// Control input of a motion model.
 struct InputBinding {
-  std::string stream;  ///< "" where the model takes none
-  /// From this age on an input does not act any more.
+  std::string stream;  ///< "" if the model has no control input
+  /// Age from which on an input no longer acts.
   double timeout_s = std::numeric_limits<double>::infinity();
 };
 
-/// Motion model -> the blocks it moves, and what drives it.
+/// Motion model of a problem: the blocks that it moves, and its control input.
 struct MotionBinding {
   std::string name;
   SharedMotion model;
@@ -72,85 +76,87 @@ struct MotionBinding {
   InputBinding input = {};
 };
 
-/// How a block starts: a value with a covariance, or the first measurement of a sensor.
+/// Prior of a block: a value with a covariance, or the first measurement of a sensor.
 struct Prior {
   BlockId block = -1;
   std::vector<double> mean;
   Eigen::MatrixXd covariance;
-  std::string from;  ///< a sensor's name, or "" where mean and covariance are given
+  std::string sensor;  ///< the sensor that initialises the block; "": mean and covariance do
 };
 
-/// How a block of a state starts: from a mean with standard deviations, or from the first
-/// measurement of a sensor.
+/// Initial value of a block of a state: a mean with standard deviations, or the first measurement
+/// of a sensor.
 struct InitialValue {
-  /// One standard deviation for all elements of the tangent, or one for each.
+  /// `sigma` has one standard deviation for all elements of the tangent space, or one for each.
   InitialValue(std::string block, std::vector<double> mean, std::vector<double> sigma,
                BlockStatus status = BlockStatus::kEstimated);
   InitialValue(std::string block, std::vector<double> mean, double sigma,
                BlockStatus status = BlockStatus::kEstimated);
   InitialValue(std::string block, double mean, double sigma,
                BlockStatus status = BlockStatus::kEstimated);
-  /// A covariance of the tangent in place of standard deviations.
+  /// Returns an initial value with a covariance instead of standard deviations.
   static InitialValue WithCovariance(std::string block, std::vector<double> mean,
                                      Eigen::MatrixXd covariance,
                                      BlockStatus status = BlockStatus::kEstimated);
-  /// A value that is known exactly.
+  /// Returns an initial value that is known exactly.
   static InitialValue Constant(std::string block, std::vector<double> value);
-  /// `sensor` has to have an inverse measurement model of the block; a filter refuses what cannot
-  /// start so.
+  /// Returns an initial value that the first measurement of `sensor` determines. The sensor needs
+  /// an inverse measurement model of the block; otherwise the constructor of a filter throws an
+  /// Error.
   static InitialValue FromMeasurement(std::string block, std::string sensor);
 
-  std::string block;  ///< as the model names it
-  std::string name;   ///< of the block in the problem; empty: as the model names it
+  std::string block;  ///< name of the block in the model
+  std::string name;   ///< name of the block in the problem; empty: the same
   std::vector<double> mean, sigma;
-  Eigen::MatrixXd covariance;  ///< empty: sigma counts
+  Eigen::MatrixXd covariance;  ///< empty: `sigma` counts
   BlockStatus status = BlockStatus::kEstimated;
-  std::string from;  ///< the sensor; empty: mean and sigma count
+  std::string sensor;  ///< empty: mean and sigma count
 };
 
-/// How a state that comes with its sensor, a bias say, starts and moves.
+/// Model parameter state of a sensor, such as a bias: its initial value and process.
 struct OwnedState {
-  /// What the model of a sensor says of one of its roles.
+  /// Converts the prior and dynamics that the model of a sensor provides for one of its roles.
   static OwnedState Of(const OwnedRole& owned);
 
   InitialValue initial;
-  /// Its dynamics, density and time constant count. A Gauss-Markov process returns to the mean of
-  /// `initial`.
+  /// Only the dynamics, density and time constant are used. A Gauss-Markov process returns to the
+  /// mean of `initial`.
   OwnedRole process;
 };
 
-/// A state of a problem: its blocks by their names there.
+/// State of a problem: the ids of its blocks by name.
 struct StateHandle {
-  /// Error kBadConfig if there is no block of that name.
+  /// Returns the id of a block. Error kBadConfig for an unknown name.
   BlockId operator[](std::string_view block) const;
 
   std::string name;
   std::map<std::string, BlockId, std::less<>> blocks;
-  int input = -1;  ///< the stream of its control input; -1: it takes none
+  int input = -1;  ///< the stream of its control input; -1: no control input
 };
 
-/// A sensor of a problem.
+/// Sensor of a problem.
 struct SensorHandle {
   int index = -1;   ///< into Problem::sensors
   int stream = -1;  ///< into Problem::streams
 };
 
-/// What a sensor has besides its model and roles.
+/// Options of a sensor besides its model and roles.
 struct SensorOptions {
-  std::string stream = {};  ///< that it reads; empty: one of its own name
+  std::string stream = {};  ///< empty: the stream with the name of the sensor
   RobustLoss loss = {};
   SharedSensor xyz = {};  ///< as in SensorBinding
   std::optional<OnePointRansac> outlier_rejection = {};
-  /// By role: of states that come with the sensor, in place of what its model says.
+  /// Model parameter states by role, which replace the prior and dynamics of the model.
   std::map<std::size_t, OwnedState> owned = {};
 };
 
-/// The problem that every estimator is given: blocks, how they move, what measures them, how they
-/// start. Add* check what they add at once. Errors: kBadConfig, which says what does not fit.
+/// Estimation problem, the input of every estimator: blocks with their motion models, sensors and
+/// priors. AddState and AddSensor check their arguments; if one is invalid they throw Error
+/// kBadConfig with the reason, and the problem is unchanged.
 struct Problem {
-  /// A state whose blocks are those of the model, each with its initial value. A block with the
-  /// flag ALIDADE_ROLE_OWNED that has none is constant at the neutral element. `input`: of a model
-  /// that takes a control input; without a stream it reads NAME.INPUT.
+  /// Adds a state with the blocks of the model and their initial values. A block with the flag
+  /// ALIDADE_ROLE_OWNED and without an initial value is constant at the neutral element. `input` is
+  /// for a model with a control input; its default stream is NAME.INPUT.
   StateHandle AddState(const std::string& name, SharedMotion model,
                        const std::vector<InitialValue>& initial, const InputBinding& input = {});
   template <MotionStruct Model>
@@ -158,8 +164,8 @@ struct Problem {
                        const std::vector<InitialValue>& initial, const InputBinding& input = {}) {
     return AddState(name, MakeMotion(std::move(model), name), initial, input);
   }
-  /// A sensor with what fills its roles, in their order, but those of a landmark, which a
-  /// measurement names. Roles at the end that are optional may be left out.
+  /// Adds a sensor. `roles` are the blocks of its roles, in their order, without the roles of a
+  /// landmark, which each measurement names. Optional roles at the end may be omitted.
   SensorHandle AddSensor(const std::string& name, SharedSensor model,
                          std::vector<RoleBinding> roles, const SensorOptions& options = {});
   template <SensorStruct Model>
@@ -168,40 +174,40 @@ struct Problem {
     return AddSensor(name, MakeSensor(std::move(model), name), std::move(roles), options);
   }
 
-  /// The state before the first measurement, in the order of the layout: all blocks with a given
-  /// prior are present. `reserved`: those that start from a measurement have their places.
+  /// Returns the state before the first measurement, in the order of the layout. All blocks with a
+  /// mean are present. `reserved`: blocks that start from a measurement have offsets too.
   State InitialState(bool reserved = false) const;
-  /// -1: there is none.
+  /// Returns the index of a sensor, or -1 for an unknown name.
   int FindSensor(std::string_view name) const;
 
   StateLayout layout;
   std::vector<MotionBinding> motions;
   std::vector<SensorBinding> sensors;
   std::vector<Prior> priors;
-  std::vector<StreamInfo> streams;           ///< that it reads, each once, as frames number them
-  std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
-  std::optional<LandmarkOptions> landmarks;  ///< there if a sensor measures landmarks
+  std::vector<StreamInfo> streams;           ///< all streams, in the order of Measurement::stream
+  std::optional<double> initial_time_s;      ///< time of the priors; nullopt: the first frame's
+  std::optional<LandmarkOptions> landmarks;  ///< set if a sensor measures landmarks
 };
 
 namespace internal {
 
-/// The block of a position that landmarks are seen from; -1: there is none.
+/// Returns the block of the position from which landmarks are observed, or -1.
 BlockId PositionBlockOf(const Problem& problem);
 
-/// Adds the state SENSOR.ROLE of a sensor, with its process. Error kBadConfig for an initial value
-/// that does not fit.
+/// Adds the state SENSOR.ROLE of a sensor, with its process. Error kBadConfig for an invalid
+/// initial value.
 BlockId AddOwnedState(Problem& problem, const std::string& sensor, const Space& role,
                       OwnedState state);
 
-/// The unit of a block, or else of a sensor's role that it fills.
+/// Returns the unit of a block, or else of the sensor role that it fills.
 std::string UnitOf(const Problem& problem, BlockId id);
 
 }  // namespace internal
 
-/// Directions of the initial state near the prior that no sensor can see, whatever the input,
-/// from the rank of [H0; H1 F0; H2 F1 F0; ...] under changing ones [Hermann1977]: the block
-/// elements each moves. With landmarks, `scale` is that of trajectory and map; exact priors are
-/// seen.
+/// Returns the directions of the initial state near the prior that are unobservable for any control
+/// input. Each direction is the list of the block elements that it changes. They follow from the
+/// rank of [H0; H1 F0; H2 F1 F0; ...] with changing inputs [Hermann1977]. With landmarks, `scale`
+/// is the scale of trajectory and map. Blocks with an exact prior count as observed.
 std::vector<std::vector<std::string>> UnobservableDirections(const Problem& problem);
 
 }  // namespace alidade

@@ -6,17 +6,17 @@
 namespace alidade::internal {
 namespace {
 
-/// Adds a role: a block's place, in H unless it is known.
-void AddRole(SensorPlace& place, const Block& block, bool known, bool considered) {
+/// Appends a role with the offsets of its block. A known role has no columns in H.
+void AddRole(SensorPlace& place, const Block& block, bool is_known, bool is_consider) {
   place.values.push_back(block.value_offset);
-  place.known.push_back(known ? 1 : 0);
+  place.is_known.push_back(is_known ? 1 : 0);
   place.columns.push_back(-1);
-  if (known || block.tangent_offset < 0) return;
+  if (is_known || block.tangent_offset < 0) return;
   const int size = block.geometry().tangent;
   place.columns.back() = place.width;
   place.parts.push_back({block.tangent_offset, size, place.width});
-  place.consider.push_back(considered);
-  place.considers |= considered;
+  place.is_consider.push_back(is_consider);
+  place.has_consider |= is_consider;
   for (int k = 0; k < size; ++k) place.rows.push_back(block.tangent_offset + k);
   place.width += size;
 }
@@ -29,7 +29,8 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   place.dof = sensor.model->measurement().geometry.tangent;
   place.has_landmark = sensor.model->has_landmark();
   for (const RoleBinding& role : sensor.roles) {
-    place.elsewhere |= role.block >= 0 && role.jacobian_at == JacobianAt::kMeasurement;
+    place.linearises_at_measurement |=
+        role.block >= 0 && role.jacobian_at == JacobianAt::kMeasurement;
     const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
     AddRole(place, block, role.mode == RoleMode::kKnown, role.mode == RoleMode::kConsider);
   }
@@ -37,15 +38,15 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   return place;
 }
 
-/// Adds the value of a block of this geometry at `at` of x; a vector to the one it follows.
-void AddValues(std::vector<MotionPlace::Values>& to, const Geometry& geometry, int at) {
-  const bool curved = geometry.kind != GeometryKind::kVector;
-  const bool follows = !to.empty() && !curved && to.back().geometry == nullptr &&
-                       to.back().at + to.back().size == at;
-  if (follows) {
-    to.back().size += geometry.ambient;
+/// Appends the range of a block with this geometry and this offset in x. Merges adjacent vectors.
+void AddRange(std::vector<MotionPlace::ValueRange>& ranges, const Geometry& geometry, int offset) {
+  const bool is_curved = geometry.kind != GeometryKind::kVector;
+  const bool is_adjacent = !ranges.empty() && !is_curved && ranges.back().geometry == nullptr &&
+                           ranges.back().offset + ranges.back().size == offset;
+  if (is_adjacent) {
+    ranges.back().size += geometry.ambient;
   } else {
-    to.push_back({at, geometry.ambient, curved ? &geometry : nullptr});
+    ranges.push_back({offset, geometry.ambient, is_curved ? &geometry : nullptr});
   }
 }
 
@@ -57,9 +58,9 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
     const Geometry& geometry = motion.model->blocks()[i].geometry;
     const int size = geometry.tangent, offset = block.tangent_offset;
     place.values.push_back(block.value_offset);
-    AddValues(place.all, geometry, block.value_offset);
+    AddRange(place.block_ranges, geometry, block.value_offset);
     if (block.status != BlockStatus::kConstant) {
-      AddValues(place.moved, geometry, block.value_offset);
+      AddRange(place.non_constant_ranges, geometry, block.value_offset);
     }
     for (int k = 0; k < size; ++k) {
       place.at.push_back(offset < 0 ? -1 : offset + k);
@@ -76,21 +77,21 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
 void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
                               const std::vector<BlockId>& blocks) {
   values.resize(first);
-  known.resize(first);
+  is_known.resize(first);
   columns.resize(first);
   for (const BlockId id : blocks) AddRole(*this, layout[id], false, false);
   strides.assign(values.size(), width);
 }
 
-ProblemIndex::ProblemIndex(Problem of, const std::vector<StreamInfo>& from)
-    : problem(std::move(of)),
-      streams(from),
+ProblemIndex::ProblemIndex(Problem indexed_problem, const std::vector<StreamInfo>& source_streams)
+    : problem(std::move(indexed_problem)),
+      streams(source_streams),
       initial(problem.InitialState(true)),
       stream_of_sensor(problem.sensors.size(), -1) {
   for (const SensorBinding& sensor : problem.sensors) {
     sensor_places.push_back(PlaceOf(sensor, initial));
     sensor_places.back().sensor = static_cast<int>(sensor_places.size()) - 1;
-    considers |= sensor_places.back().considers;
+    has_consider |= sensor_places.back().has_consider;
   }
   for (const MotionBinding& motion : problem.motions) {
     motion_places.push_back(PlaceOf(motion, initial.layout()));

@@ -12,16 +12,18 @@
 namespace alidade::internal {
 namespace {
 
-/// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
+/// Returns A + (B - A)+ with the positive part (.)+: a covariance that is at least A and at least B
+/// in every direction.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  const SymmetricEigen above = EigenOf(b - a);
-  const Eigen::VectorXd positive = above.values.cwiseMax(0.0);
-  return a + ProductTransposed(above.vectors * positive.asDiagonal(), above.vectors);
+  const SymmetricEigen difference = EigenOf(b - a);
+  const Eigen::VectorXd positive = difference.values.cwiseMax(0.0);
+  return a + ProductTransposed(difference.vectors * positive.asDiagonal(), difference.vectors);
 }
 
-/// Of the blocks that one motion model moves together with `id`: the values they have are no better
-/// known than at the start, nor than they are. Uncorrelated. `id` itself is initialised after it.
-void DropMotionOf(FilterState& f, BlockId id) {
+/// Resets the covariance of the blocks that share a motion model with block `id` to the upper bound
+/// of prior and current covariance, without correlations. Their values are unchanged. `id` itself
+/// is initialised afterwards.
+void ResetMotionBlocks(FilterState& f, BlockId id) {
   for (const MotionBinding& motion : f.problem_index->problem.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
     for (const Prior& prior : f.problem_index->problem.priors) {
@@ -32,23 +34,23 @@ void DropMotionOf(FilterState& f, BlockId id) {
         continue;
       }
       const double* const value = f.state.value(prior.block);
-      const std::vector<double> kept(value, value + block.geometry().ambient);
-      const int at = block.tangent_offset, n = block.geometry().tangent;
-      f.state.Add(prior.block, kept.data(),
-                  UpperBound(prior.covariance, f.state.covariance().Block(at, n, at, n)));
+      const std::vector<double> copy(value, value + block.geometry().ambient);
+      const int row = block.tangent_offset, n = block.geometry().tangent;
+      f.state.Add(prior.block, copy.data(),
+                  UpperBound(prior.covariance, f.state.covariance().Block(row, n, row, n)));
     }
   }
 }
 
-/// Multiplies the standard deviations of the blocks that a sensor corrects by 10; false where there
-/// are none.
+/// Multiplies the standard deviations of the blocks that a sensor corrects by 10. Returns false if
+/// it corrects no blocks.
 bool Inflate(FilterState& f, const SensorBinding& sensor) {
   constexpr double kInflation = 10.0;
-  bool any = false;
+  bool is_changed = false;
   for (const RoleBinding& role : sensor.roles) {
-    const auto same = [&](const RoleBinding& other) { return other.block == role.block; };
-    const bool again = &role != &*std::ranges::find_if(sensor.roles, same);
-    if (role.block < 0 || role.mode != RoleMode::kEstimate || again) continue;
+    const auto first = std::ranges::find(sensor.roles, role.block, &RoleBinding::block);
+    const bool is_repeated = &role != &*first;
+    if (role.block < 0 || role.mode != RoleMode::kEstimate || is_repeated) continue;
     const Block& block = f.state.layout()[role.block];
     if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;
@@ -56,10 +58,10 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     std::vector<int> rows(static_cast<std::size_t>(n));
     std::iota(rows.begin(), rows.end(), block.tangent_offset);
     f.state.covariance().Propagate(rows, inflation.data());
-    any = true;
+    is_changed = true;
   }
-  if (any) f.motions.EndInterval();
-  return any;
+  if (is_changed) f.motions.EndInterval();
+  return is_changed;
 }
 
 }  // namespace
@@ -79,15 +81,16 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   ++repairs_;
   f.motions.EndInterval();
   p.SetBlock(0, 0, ProductTransposed(root, root));
-  Note(f, "repaired",
-       text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
-           std::to_string(options_.max_covariance_repairs) + ")");
+  AddEvent(f, "repaired",
+           text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
+               std::to_string(options_.max_covariance_repairs) + ")");
 }
 
 [[gnu::noinline]] void Recovery::Recover(FilterState& f, PendingMeasurement& pending) {
   const SensorBinding& sensor = *pending.binding;
-  const std::string why = "sensor '" + sensor.name + "' rejected " +
-                          std::to_string(options_.rejection_recovery_after) + " times in a row: ";
+  const std::string reason = "sensor '" + sensor.name + "' rejected " +
+                             std::to_string(options_.rejection_recovery_after) +
+                             " times in a row: ";
   const int role = sensor.model->inverse().role;
   InverseMeasurement inverse;
   const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
@@ -95,18 +98,18 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
       target->block >= 0 && target->mode == RoleMode::kEstimate &&
       f.state.layout()[target->block].status == BlockStatus::kEstimated &&
       Invert(f, pending, nullptr, inverse) == Outcome::kAccepted) {
-    DropMotionOf(f, target->block);
+    ResetMotionBlocks(f, target->block);
     Initialise(f, pending, inverse);
-    Note(f, "rejection_recovery",
-         why + "reset " + f.state.layout()[target->block].name + " from its measurement");
+    AddEvent(f, "rejection_recovery",
+             reason + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
   char& inflated = f.health.inflated[static_cast<std::size_t>(pending.sensor)];
   if (inflated != 0) return;
   inflated = 1;
-  Note(f, "rejection_recovery",
-       why + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
-                                 : "it corrects no block to inflate"));
+  AddEvent(f, "rejection_recovery",
+           reason + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
+                                        : "it has no estimated block to inflate"));
 }
 
 }  // namespace alidade::internal

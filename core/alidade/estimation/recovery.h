@@ -6,20 +6,20 @@
 
 namespace alidade::internal {
 
-/// Repairs P if it is no longer positive semi-definite, and resets blocks if a sensor is rejected
-/// too often in a row. A copy is a snapshot.
+/// Recovery of a filter: repairs P if rounding made it indefinite, and resets blocks if a sensor is
+/// rejected too often in a row. A copy is a snapshot.
 class Recovery {
  public:
   explicit Recovery(const EkfOptions& options) : options_(options) {}
 
-  /// Called after an update whose S was not positive definite. If P is the cause, sets the negative
-  /// pivots of its L D L' to zero (event `repaired`). After max_covariance_repairs of that it ends
-  /// the filter.
+  /// Sets the negative pivots of the L D L' of P to zero, if P is not positive semi-definite (event
+  /// `repaired`). After max_covariance_repairs repairs the next one ends the filter. Called after
+  /// an update whose S was not positive definite.
   void RepairCovariance(FilterState& f);
-  /// Called when the sensor of a measurement was rejected too often in a row (event
-  /// `rejection_recovery`). Resets the block that the measurement determines, and the covariance of
-  /// the blocks that move with it to the prior, or keeps theirs if it is larger. If a reset is not
-  /// possible, inflates the covariance of the blocks of the sensor, once until its next acceptance.
+  /// Resets the block that the measurement determines, and the covariance of the blocks of its
+  /// motion model to an upper bound of prior and current covariance (event `rejection_recovery`).
+  /// If a reset is not possible, inflates the covariance of the blocks of the sensor, once until
+  /// its next acceptance. Called when the sensor was rejected too often in a row.
   void Recover(FilterState& f, PendingMeasurement& pending);
 
  private:

@@ -13,17 +13,17 @@ enum class LossKind {
   kCauchy,  ///< logarithmic beyond the scale
 };
 
-/// A robust loss rho on the Mahalanobis distance d >= 0 of a residual, with the scale k
-/// [Holland1977]. w(d) = rho'(d) / d is the weight of the squared error that has the same gradient:
-/// a measurement with covariance R counts like one with R / w.
+/// Robust loss rho of the Mahalanobis distance d >= 0 of a residual, with the scale k
+/// [Holland1977]. w(d) = rho'(d) / d is the weight of the squared error with the same gradient: a
+/// measurement with covariance R has the effect of a measurement with covariance R / w.
 struct LossFunctions {
   const char* name;  ///< in configs
   double (*rho)(double d, double k);
   double (*weight)(double d, double k);     ///< w(d), in [0, 1]
-  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: of rho over d^2
+  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: rho as a function of d^2
 };
 
-/// The losses that there are, by LossKind. Another one is a row here.
+/// Functions of all losses, indexed by LossKind.
 inline constexpr std::array kLosses = {
     // rho(d) = d^2 / 2,  w(d) = 1
     LossFunctions{"none", [](double d, double) { return 0.5 * d * d; },
@@ -44,14 +44,14 @@ inline constexpr std::array kLosses = {
 };
 
 static_assert(kLosses.size() == static_cast<std::size_t>(LossKind::kCauchy) + 1);
-/// The row of a kind.
+/// Returns the functions of a loss.
 inline const LossFunctions& FunctionsOf(LossKind kind) {
   return kLosses[static_cast<std::size_t>(kind)];
 }
-/// Its name: `none`, `huber`, `cauchy`.
+/// Returns `none`, `huber` or `cauchy`.
 inline const char* ToString(LossKind kind) { return FunctionsOf(kind).name; }
 
-/// A loss with its scale.
+/// Robust loss with its scale.
 struct RobustLoss {
   LossKind kind = LossKind::kNone;
   double scale = 1.0;  ///< k > 0, in standard deviations
@@ -59,11 +59,11 @@ struct RobustLoss {
   friend bool operator==(const RobustLoss&, const RobustLoss&) = default;
 };
 
-/// rho(d), d >= 0.
+/// Returns rho(d), d >= 0.
 inline double Rho(const RobustLoss& loss, double d) {
   return FunctionsOf(loss.kind).rho(d, loss.scale);
 }
-/// w(d), d >= 0.
+/// Returns w(d), d >= 0.
 inline double Weight(const RobustLoss& loss, double d) {
   return FunctionsOf(loss.kind).weight(d, loss.scale);
 }

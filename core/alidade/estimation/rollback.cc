@@ -18,8 +18,8 @@ Timestamp internal::Lag(Timestamp newest, Timestamp timestamp) {
 }
 
 Snapshots::Snapshots(const Estimator& start) {
-  released_.after = start.Clone();
-  ALIDADE_EXPECTS(released_.after != nullptr);
+  released_.snapshot = start.Clone();
+  ALIDADE_EXPECTS(released_.snapshot != nullptr);
 }
 
 void Snapshots::Replace(std::size_t first, std::vector<Frame> frames,
@@ -27,7 +27,7 @@ void Snapshots::Replace(std::size_t first, std::vector<Frame> frames,
   ALIDADE_EXPECTS(first <= frames_.size());
   std::unique_ptr<Estimator> earlier;
   if (first < frames_.size()) {
-    earlier = (first == 0 ? released_ : frames_[first - 1]).after->Clone();
+    earlier = (first == 0 ? released_ : frames_[first - 1]).snapshot->Clone();
   }
   Estimator& current = earlier ? *earlier : *estimator;
   std::deque<ProcessedFrame> processed;
@@ -35,7 +35,7 @@ void Snapshots::Replace(std::size_t first, std::vector<Frame> frames,
     ProcessedFrame& next = processed.emplace_back();
     if (!current.failed()) next.report = current.Process(frame);
     next.frame = std::move(frame);
-    next.after = current.Clone();
+    next.snapshot = current.Clone();
   }
   if (earlier) estimator = std::move(earlier);
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(first), frames_.end());
@@ -54,39 +54,39 @@ Rollback::Rollback(const Filter& filter, double window_s)
 }
 
 Rollback::Processed Rollback::Process(Frame frame) {
-  const std::deque<ProcessedFrame>& kept = snapshots_.frames();
-  const auto timestamp = [](const ProcessedFrame& one) { return one.frame.timestamp; };
-  const auto later = std::ranges::upper_bound(kept, frame.timestamp, {}, timestamp);
-  if (later != kept.end() && internal::Lag(timestamp(kept.back()), frame.timestamp) > window_) {
-    return Refuse(std::move(frame));
+  const std::deque<ProcessedFrame>& window = snapshots_.frames();
+  const auto timestamp = [](const ProcessedFrame& entry) { return entry.frame.timestamp; };
+  const auto later = std::ranges::upper_bound(window, frame.timestamp, {}, timestamp);
+  if (later != window.end() && internal::Lag(timestamp(window.back()), frame.timestamp) > window_) {
+    return Reject(std::move(frame));
   }
-  const auto first = static_cast<std::size_t>(later - kept.begin());
+  const auto first = static_cast<std::size_t>(later - window.begin());
   std::vector<Frame> frames{std::move(frame)};
-  for (auto one = later; one != kept.end(); ++one) frames.push_back(one->frame);
+  for (auto entry = later; entry != window.end(); ++entry) frames.push_back(entry->frame);
   const std::size_t count = frames.size();
   snapshots_.Replace(first, std::move(frames), filter_);
-  while (internal::Lag(timestamp(kept.back()), timestamp(kept.front())) > window_) {
+  while (internal::Lag(timestamp(window.back()), timestamp(window.front())) > window_) {
     snapshots_.Release();
   }
-  return {kept.end() - static_cast<std::ptrdiff_t>(count), kept.end()};
+  return {window.end() - static_cast<std::ptrdiff_t>(count), window.end()};
 }
 
-/// The report of a stale frame, by a copy of the filter.
-Rollback::Processed Rollback::Refuse(Frame frame) {
+/// Reports a stale frame; a copy of the filter makes the report.
+Rollback::Processed Rollback::Reject(Frame frame) {
   const Timestamp newest = snapshots_.frames().back().frame.timestamp;
-  ProcessedFrame refused{std::move(frame), {}, filter_->Clone()};
-  refused.report = refused.after->Process(refused.frame);
-  refused.report.inputs.clear();
-  refused.report.events = {
-      {refused.frame.timestamp, "stale",
-       "the frame at " + internal::SecondsText(refused.frame.timestamp) + " is " +
-           internal::SecondsText(internal::Lag(newest, refused.frame.timestamp)) +
+  ProcessedFrame rejected{std::move(frame), {}, filter_->Clone()};
+  rejected.report = rejected.snapshot->Process(rejected.frame);
+  rejected.report.inputs.clear();
+  rejected.report.events = {
+      {rejected.frame.timestamp, "stale",
+       "the frame at " + internal::SecondsText(rejected.frame.timestamp) + " is " +
+           internal::SecondsText(internal::Lag(newest, rejected.frame.timestamp)) +
            " older than the newest, beyond the window of " + internal::SecondsText(window_) +
            ": its measurements are not used"}};
-  refused.after = filter_->Clone();
-  refused_.clear();
-  refused_.push_back(std::move(refused));
-  return {refused_.begin(), refused_.end()};
+  rejected.snapshot = filter_->Clone();
+  rejected_.clear();
+  rejected_.push_back(std::move(rejected));
+  return {rejected_.begin(), rejected_.end()};
 }
 
 }  // namespace alidade

@@ -11,50 +11,52 @@
 
 namespace alidade {
 
-/// A frame, its report, and the estimator as it was after it. An estimator that has failed takes no
-/// more frames: their reports are empty.
+/// Processed frame: its report, and a copy of the estimator after it. An estimator that has failed
+/// does not process further frames: their reports are empty.
 struct ProcessedFrame {
   Frame frame;
   UpdateReport report;
-  std::unique_ptr<Estimator> after;
+  std::unique_ptr<Estimator> snapshot;
 };
 
-/// The frames of an estimator since a state to which it can go back, with a copy of it after each
-/// (Estimator::Clone). The rollback of programs (Rollback) and of runs.
+/// Latest frames of an estimator, with a copy of the estimator after each (Estimator::Clone).
+/// Implements the rollback of programs (Rollback) and of runs.
 class Snapshots {
  public:
-  /// Of an estimator as it is before its first frame. ContractViolation if it cannot be copied.
+  /// Starts with a copy of an estimator before its first frame. ContractViolation if it cannot be
+  /// copied.
   explicit Snapshots(const Estimator& start);
 
   const std::deque<ProcessedFrame>& frames() const { return frames_; }
-  /// The last frame that was released; before the first, the state at the start with no frame.
+  /// Returns the last released frame. Before the first Release, returns the initial estimator
+  /// without a frame.
   const ProcessedFrame& released() const { return released_; }
-  /// Takes the estimator back to before the frame of index `first`, and processes `frames` in place
-  /// of that one and of all after it. If `first` is frames().size(), they follow the last. If the
-  /// estimator throws, nothing has changed, except the estimator if `frames` follow the last.
+  /// Sets the estimator back to its copy before the frame `first`, and processes `frames`, which
+  /// replace that frame and all later ones. If `first` is frames().size(), `frames` are appended.
+  /// If the estimator throws, nothing is changed, except the estimator if `frames` are appended.
   void Replace(std::size_t first, std::vector<Frame> frames, std::unique_ptr<Estimator>& estimator);
-  /// Releases the oldest frame: the estimator goes back at most to after it. ContractViolation if
-  /// there is none.
+  /// Releases the oldest frame: it can no longer be replaced. ContractViolation if frames() is
+  /// empty.
   void Release();
-  /// The copy of the estimator after released(), which ends these snapshots.
-  std::unique_ptr<Estimator> ReleasedEstimator() && { return std::move(released_.after); }
+  /// Returns the copy of the estimator after released(). These snapshots are then unusable.
+  std::unique_ptr<Estimator> ReleasedEstimator() && { return std::move(released_.snapshot); }
 
  private:
   ProcessedFrame released_;
   std::deque<ProcessedFrame> frames_;
 };
 
-/// Late measurements by rollback: a filter that takes frames in the order in which they come, and
-/// uses each in the order of the timestamps.
+/// Rollback for out-of-sequence measurements: a filter that accepts frames in any order and
+/// processes them in the order of their timestamps.
 ///
-/// It keeps the frames of the last `window_s` seconds, with a copy of the filter after each. For a
-/// frame that is older than the newest, the filter goes back to the copy before it, and processes
-/// it and those after it again. Its state is then, to the last bit, that of the same frames in
-/// order; of frames of equal timestamps the order in which they came counts. It can be moved, but
-/// not copied; a copy of filter() goes on by itself.
+/// It stores the frames of the last `window_s` seconds, with a copy of the filter after each. If a
+/// frame is older than the newest one, the filter returns to the copy before it, and processes this
+/// frame and the later ones again. Its state then equals, bit by bit, the state after the same
+/// frames in order. Frames with equal timestamps are processed in their order of arrival. Movable,
+/// not copyable; a copy of filter() is independent.
 class Rollback {
  public:
-  /// The frames that a call processed, in the order of their timestamps. Good until the next call.
+  /// Frames that a call processed, in the order of their timestamps. Valid until the next call.
   class Processed {
    public:
     using Iterator = std::deque<ProcessedFrame>::const_iterator;
@@ -72,32 +74,33 @@ class Rollback {
   /// Starts from a copy of `filter`. ContractViolation if window_s is negative or not a number.
   Rollback(const Filter& filter, double window_s);
 
-  /// Processes the frame: the frame itself, followed by the later ones that were processed again. A
-  /// frame more than window_s behind the newest is refused: its report is `stale`, with an event,
-  /// and nothing has changed.
+  /// Processes the frame. Returns it, followed by the later frames that were processed again. A
+  /// frame more than window_s older than the newest is rejected: its report is `stale`, with an
+  /// event, and the filter is unchanged.
   Processed Process(Frame frame);
-  /// Process, of what came of one timestamp. Errors: those of Filter::Push; nothing has changed.
+  /// Calls Process with the readings of one timestamp. Errors: those of Filter::Push; the filter is
+  /// then unchanged.
   template <std::floating_point Seconds>
   Processed Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
   Processed Push(Timestamp timestamp, const std::vector<Reading>& readings) {
     return Process(filter().MakeFrame(timestamp, readings));
   }
-  /// The filter after the newest frame. The reference is good until the next call.
+  /// Returns the filter after the newest frame. The reference is valid until the next call.
   const Filter& filter() const { return static_cast<const Filter&>(*filter_); }
 
  private:
-  Processed Refuse(Frame frame);
+  Processed Reject(Frame frame);
 
   Timestamp window_;
   std::unique_ptr<Estimator> filter_;  // a Filter, as are its copies
   Snapshots snapshots_;
-  std::deque<ProcessedFrame> refused_;  ///< by the last call
+  std::deque<ProcessedFrame> rejected_;  ///< by the last call
 };
 
 namespace internal {
 
-/// How far `timestamp` is behind `newest`, which is not before it; the longest time there is if the
-/// difference overflows.
+/// Returns newest - timestamp, or the largest Timestamp if the difference overflows. Requires
+/// timestamp <= newest.
 Timestamp Lag(Timestamp newest, Timestamp timestamp);
 
 }  // namespace internal

@@ -10,26 +10,28 @@
 namespace alidade {
 namespace internal {
 
-/// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
-/// information. Where the frame starts inside an interval, A has columns for w behind those of x.
+/// Backward step over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A + information. If the
+/// frame starts inside an interval, A has columns for w after those of x.
 struct Adjoint {
   Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
   Eigen::VectorXd b;
   Eigen::MatrixXd information;
 
-  /// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
-  void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const {
-    const Eigen::Index n = a.rows(), before = a.cols() - n;
-    Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
-    whole.topRows(n) = a;
-    if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
-    lambda = whole.transpose() * lambda + b;
-    later = Product(TransposedProduct(whole, later), whole) + information;
-    later = 0.5 * (later + later.transpose()).eval();
+  /// Applies the step to lambda and Lambda. `end_noise` is the number of their rows for w, after
+  /// those for x, at the end of the frame.
+  void StepBack(Eigen::Index end_noise, Eigen::VectorXd& lambda,
+                Eigen::MatrixXd& lambda_matrix) const {
+    const Eigen::Index n = a.rows(), start_noise = a.cols() - n;
+    Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + end_noise, n + start_noise);
+    joint.topRows(n) = a;
+    if (start_noise > 0) joint.bottomRightCorner(end_noise, start_noise).setIdentity();
+    lambda = joint.transpose() * lambda + b;
+    lambda_matrix = Product(TransposedProduct(joint, lambda_matrix), joint) + information;
+    lambda_matrix = 0.5 * (lambda_matrix + lambda_matrix.transpose()).eval();
   }
 };
 
-/// EkfEquations, that takes its steps and updates down as an adjoint.
+/// EkfEquations that record their steps and updates as an adjoint.
 class RecordingEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -45,7 +47,7 @@ class RecordingEquations : public UpdateMethod {
   }
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
-  /// From here on is another frame.
+  /// Starts the record of a new frame.
   void StartFrame(const FilterState& f);
   const Adjoint& frame() const { return frame_; }
 
@@ -56,22 +58,23 @@ class RecordingEquations : public UpdateMethod {
 
 void RecordingEquations::StartFrame(const FilterState& f) {
   const Eigen::Index n = f.size();
-  const Eigen::Index all = n + (f.motions.in_interval() ? f.motions.noise_size() : 0);
-  frame_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
-            Eigen::MatrixXd::Zero(all, all)};
+  const Eigen::Index columns = n + (f.motions.in_interval() ? f.motions.noise_size() : 0);
+  frame_ = {Eigen::MatrixXd::Identity(n, columns), Eigen::VectorXd::Zero(columns),
+            Eigen::MatrixXd::Zero(columns, columns)};
 }
 
 StepError RecordingEquations::Step(FilterState& f, double dt_s) {
   if (StepError error = ekf_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
-  const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
-  if (held > 0) frame_.a.rightCols(held) += f.motions.Held(&Motions::Step::gl, f.size(), f.work);
+  const Eigen::Index noises = frame_.a.cols() - frame_.a.rows();
+  if (noises > 0)
+    frame_.a.rightCols(noises) += f.motions.NoiseColumns(&Motions::Step::gl, f.size(), f.work);
   return {};
 }
 
 Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
-  const std::vector<double> before = f.state.values();
+  const std::vector<double> prediction = f.state.values();
   const Outcome outcome = ekf_.Correct(f, rows);
   if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
   const Workspace::Use use(f.work);
@@ -88,7 +91,7 @@ Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement
   l.triangularView<Eigen::Lower>().solveInPlace(g);
   Eigen::MatrixXd a = -Product(w, g);  // I - K H
   a.diagonal().array() += 1.0;
-  const Workspace::Matrix back = TransportTo(f.state, before, f.work);
+  const Workspace::Matrix back = TransportTo(f.state, prediction, f.work);
   frame_.b += frame_.a.transpose() * (g.transpose() * y);
   const Eigen::MatrixXd weighted = Product(g, frame_.a);
   frame_.information += TransposedProduct(weighted, weighted);
@@ -98,8 +101,8 @@ Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement
 
 }  // namespace internal
 
-/// One frame, and the filter's estimate after it.
-struct RtsSmoother::Passed {
+/// Record of one frame of the forward pass, with the estimate of the filter after it.
+struct RtsSmoother::ForwardFrame {
   internal::Adjoint adjoint;
   std::vector<double> x;
   Eigen::MatrixXd p;
@@ -114,11 +117,11 @@ RtsSmoother::RtsSmoother(Problem problem, const EkfOptions& options,
 
 RtsSmoother::RtsSmoother(Problem problem, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams,
-                         std::unique_ptr<internal::RecordingEquations> tape)
-    : tape_(tape.get()),
+                         std::unique_ptr<internal::RecordingEquations> equations)
+    : equations_(equations.get()),
       engine_(std::make_unique<internal::FilterEngine>(
           CheckedProblem(std::move(problem), "RtsSmoother", kCapabilities),
-          internal::WithoutRecovery(options), streams, std::move(tape))) {}
+          internal::WithoutRecovery(options), streams, std::move(equations))) {}
 
 RtsSmoother::~RtsSmoother() = default;
 
@@ -130,14 +133,15 @@ bool RtsSmoother::failed() const { return engine_->f.health.ended; }
 
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
   const internal::FilterState& f = engine_->f;
-  tape_->StartFrame(f);
+  equations_->StartFrame(f);
   engine_->Process(frame);
   Workspace work;
-  Eigen::MatrixXd held(f.size(), 0);
-  if (f.motions.in_interval()) held = f.motions.Held(&internal::Motions::Step::m, f.size(), work);
-  passed_frames_.push_back(
-      {tape_->frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
-  passed_frames_.back().report.events.clear();  // told already
+  Eigen::MatrixXd m(f.size(), 0);
+  if (f.motions.in_interval())
+    m = f.motions.NoiseColumns(&internal::Motions::Step::m, f.size(), work);
+  forward_frames_.push_back(
+      {equations_->frame(), f.state.values(), f.state.covariance().Dense(), m, f.report});
+  forward_frames_.back().report.events.clear();  // reported by Process
   return f.report;
 }
 
@@ -147,33 +151,34 @@ void RtsSmoother::Smooth(const Emit& emit) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);  // Lambda
   std::vector<Event> events;
   State smoothed = state();
-  for (auto passed = passed_frames_.rbegin(); passed != passed_frames_.rend(); ++passed) {
-    const Eigen::Index held = lambda.size() - n;  // noise inputs, of an interval that goes on
-    Eigen::MatrixXd with(n, n + held);            // Cov(x, (x, w))
-    with.leftCols(n) = passed->p;
-    with.rightCols(held) = passed->m.leftCols(held);
-    const Eigen::MatrixXd p = passed->p - internal::Congruence(with, information);
+  for (auto frame = forward_frames_.rbegin(); frame != forward_frames_.rend(); ++frame) {
+    const Eigen::Index noises = lambda.size() - n;  // discrete noise, if the interval continues
+    Eigen::MatrixXd joint(n, n + noises);           // Cov(x, (x, w))
+    joint.leftCols(n) = frame->p;
+    joint.rightCols(noises) = frame->m.leftCols(noises);
+    const Eigen::MatrixXd p = frame->p - internal::Congruence(joint, information);
     const bool positive = (p.diagonal().array() >= 0.0).all();
     if (!positive) {
       events.push_back({timestamp(), "not_pd",
-                        "a smoothed variance is negative by rounding in frame " +
-                            std::to_string(passed_frames_.rend() - passed - 1) +
-                            "; its covariance is the filter's"});
+                        "a smoothed variance in frame " +
+                            std::to_string(forward_frames_.rend() - frame - 1) +
+                            " is negative because of rounding; the covariance of the filter "
+                            "replaces the smoothed one"});
     }
-    smoothed.values() = passed->x;
-    smoothed.Retract((with * lambda).eval().data(), passed->x);
-    if (positive) passed->p = p;
-    smoothed.covariance().SetBlock(0, 0, passed->p);
-    smoothed.MoveTo(passed->x);
-    passed->p = smoothed.covariance().Dense();
-    passed->adjoint.GoBack(held, lambda, information);
+    smoothed.values() = frame->x;
+    smoothed.Retract((joint * lambda).eval().data(), frame->x);
+    if (positive) frame->p = p;
+    smoothed.covariance().SetBlock(0, 0, frame->p);
+    smoothed.MoveTo(frame->x);
+    frame->p = smoothed.covariance().Dense();
+    frame->adjoint.StepBack(noises, lambda, information);
   }
-  for (std::size_t k = 0; k < passed_frames_.size(); ++k) {
-    Passed& passed = passed_frames_[k];
-    smoothed.values() = passed.x;
-    smoothed.covariance().SetBlock(0, 0, passed.p);
-    if (k + 1 == passed_frames_.size()) passed.report.events = events;
-    emit(k, smoothed, passed.report);
+  for (std::size_t k = 0; k < forward_frames_.size(); ++k) {
+    ForwardFrame& frame = forward_frames_[k];
+    smoothed.values() = frame.x;
+    smoothed.covariance().SetBlock(0, 0, frame.p);
+    if (k + 1 == forward_frames_.size()) frame.report.events = events;
+    emit(k, smoothed, frame.report);
   }
 }
 

@@ -14,27 +14,28 @@ namespace internal {
 class RecordingEquations;
 }
 
-/// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
-/// Kalman filter goes forward; the way back is that of Rauch, Tung and Striebel in the adjoint form
-/// of Bryson and Frazier, which inverts no covariance: P may be singular. n = size of P.
+/// Fixed-interval smoother: estimates the state at every frame from the measurements of all frames.
+/// The forward pass is an extended Kalman filter. The backward pass is the smoother of Rauch, Tung
+/// and Striebel in the adjoint form of Bryson and Frazier. It does not invert a covariance, so that
+/// P may be singular. n = size of P.
 ///
-///   estimate   x_s = x (+) P lambda,   P_s = P - P Lambda P      x, P: the filter's, of the frame
+///   estimate   x_s = x (+) P lambda,   P_s = P - P Lambda P      x, P: of the filter at the frame
 ///   start      lambda = 0, Lambda = 0                            at the last frame
 ///   step       lambda <- F' lambda,   Lambda <- F' Lambda F
 ///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
 ///              A = I - K H
 ///
-/// Discrete noise w, held over an interval, is smoothed with x. At frames inside an interval lambda
-/// and Lambda are those of (x, w), with [P M] for P, M = Cov(x, w), and [F G Lq; 0 I] for F. Where
-/// the interval starts, what they have of w is dropped.
+/// Discrete noise w, which is constant over an interval, is smoothed with x. At frames inside an
+/// interval lambda and Lambda belong to (x, w); [P M] replaces P, M = Cov(x, w), and [F G Lq; 0 I]
+/// replaces F. At the start of the interval the elements of w are removed from them.
 ///
-/// All Jacobians are those of the filter, and so are R and its weight under a robust loss.
+/// All Jacobians, R and the robust weights are those of the filter.
 ///
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
 class RtsSmoother : public Estimator {
  public:
-  /// No consider blocks and roles, none that start or are linearised at a measurement, no
-  /// rejection recovery, no landmarks.
+  /// No consider blocks or roles, no blocks that start from a measurement, no roles with
+  /// `jacobian_at: measurement`, no rejection recovery, no landmarks.
   static constexpr EstimatorCapabilities kCapabilities = {};
 
   /// `options.rejection_recovery` counts as kNone. Errors: kBadConfig if `problem` asks for more
@@ -47,8 +48,8 @@ class RtsSmoother : public Estimator {
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
-  /// The reports are the filter's. Event `not_pd` where rounding would leave a smoothed variance
-  /// negative: the covariance of that frame is then the filter's.
+  /// The reports are those of the filter. If rounding makes a smoothed variance negative, the
+  /// covariance of the frame is that of the filter (event `not_pd`).
   void Smooth(const Emit& emit) override;
   const State& state() const override;
   Timestamp timestamp() const override;
@@ -56,13 +57,13 @@ class RtsSmoother : public Estimator {
   bool failed() const override;
 
  private:
-  struct Passed;
+  struct ForwardFrame;
   RtsSmoother(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
-              std::unique_ptr<internal::RecordingEquations> tape);
+              std::unique_ptr<internal::RecordingEquations> equations);
 
-  internal::RecordingEquations* tape_;  ///< the method of the loop
+  internal::RecordingEquations* equations_;  ///< the method of engine_
   std::unique_ptr<internal::FilterEngine> engine_;
-  std::vector<Passed> passed_frames_;
+  std::vector<ForwardFrame> forward_frames_;
 };
 
 }  // namespace alidade

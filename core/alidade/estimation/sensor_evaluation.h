@@ -4,12 +4,12 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem_index.h"
 
-/// A sensor model at any values x of the whole state: that of a filter, an iterate, a sigma point,
-/// a point of a batch. m: tangent size of the measurement.
+/// Evaluation of sensor models at values x of the whole state, such as the estimate of a filter, an
+/// iterate, a sigma point or an iterate of a batch. m: tangent size of the measurement.
 namespace alidade::internal {
 
-/// Pointers to the values of the roles of a sensor in x; of roles that it knows, in `known_roles`.
-/// Null for a role that is not bound.
+/// Sets the pointers to the values of the roles of a sensor: in x, or in `known_roles` for known
+/// roles. The pointer of a role without a block is null.
 void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
 
 /// Destinations of an evaluation, row-major; null: not computed.
@@ -21,9 +21,9 @@ struct EvaluationOutput {
 /// Evaluates a sensor model at the roles.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
-                   const EvaluationOutput& to);
+                   const EvaluationOutput& output);
 
-/// R = L L', m x m, row-major.
+/// Computes R = L L', m x m, row-major.
 inline void Square(const double* l, int m, double* r) {
   if (m == 1) {
     r[0] = l[0] * l[0];
@@ -38,8 +38,8 @@ inline void Square(const double* l, int m, double* r) {
   }
 }
 
-/// Computes R at the roles, or copies that of the measurement, m x m, row-major. `l` is memory of
-/// the same size.
+/// Computes R at the roles, or copies the covariance of the measurement, m x m, row-major. `l` is
+/// temporary memory of the same size.
 Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
                 const double* const* roles, double* l, double* r);
 

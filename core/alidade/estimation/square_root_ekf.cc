@@ -15,8 +15,8 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
-/// it lies what is of no use. `work`: n numbers.
+/// Replaces A, m x n, m >= n, by the factor R of A = Q R, in the upper triangle of the first n
+/// rows. The elements below it are unspecified. `work`: n numbers.
 void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
   for (Eigen::Index k = 0; k < a.cols(); ++k) {
     const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
@@ -28,9 +28,9 @@ void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
   }
 }
 
-/// root, n x n, with root root' = a a' + b b', for a n x n.
-void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
-              Eigen::MatrixXd& root) {
+/// Computes `root`, n x n, with root root' = a a' + b b', for a n x n.
+void ComputeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
+                 Eigen::MatrixXd& root) {
   const Workspace::Use use(f.work);
   const Eigen::Index n = a.rows();
   Workspace::Matrix tall = f.work.Take(n + b.cols(), n);
@@ -41,7 +41,8 @@ void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matri
   root = tall.topRows(n).transpose();
 }
 
-/// EkfEquations, with a root of P stepped and corrected beside it, of which P is made.
+/// Equations of SquareRootEkf: Jacobians from EkfEquations, and a root of P from which P is
+/// computed.
 class SquareRootEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -60,7 +61,7 @@ class SquareRootEquations : public UpdateMethod {
  private:
   void SetCovariance(FilterState& f) const;
 
-  /// Of a sensor's R.
+  /// Square root of R.
   struct NoiseRoot {
     Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt;
     Eigen::MatrixXd root;
@@ -68,8 +69,8 @@ class SquareRootEquations : public UpdateMethod {
 
   EkfEquations ekf_;
   Eigen::MatrixXd root_;
-  Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
-  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
+  Eigen::MatrixXd conditional_root_;    ///< B, during an interval of discrete noise
+  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; reused memory
 };
 
 void SquareRootEquations::Begin(FilterState& f) {
@@ -79,7 +80,7 @@ void SquareRootEquations::Begin(FilterState& f) {
   SetCovariance(f);
 }
 
-/// P = L L'.
+/// Sets P = L L'.
 void SquareRootEquations::SetCovariance(FilterState& f) const {
   const Workspace::Use use(f.work);
   Workspace::Matrix p = f.work.Take(root_.rows(), root_.rows());
@@ -89,38 +90,38 @@ void SquareRootEquations::SetCovariance(FilterState& f) const {
 }
 
 StepError SquareRootEquations::Step(FilterState& f, double dt_s) {
-  const bool goes_on = f.motions.in_interval();
+  const bool continues_interval = f.motions.in_interval();
   if (StepError error = ekf_.Step(f, dt_s)) return error;
   const Workspace::Use use(f.work);
   const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
   Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
-                    noise = f.motions.Held(&Motions::Step::gl, f.size(), f.work, true);
+                    noise = f.motions.NoiseColumns(&Motions::Step::gl, f.size(), f.work, true);
   moved.setZero();
-  AddProduct(moved, transition, goes_on ? without_held_ : root_);
-  if (f.motions.holds()) {
-    noise -= f.motions.Held(&Motions::Step::gl, f.size(), f.work);
+  AddProduct(moved, transition, continues_interval ? conditional_root_ : root_);
+  if (f.motions.has_discrete_noise()) {
+    noise -= f.motions.NoiseColumns(&Motions::Step::gl, f.size(), f.work);
     if ((noise.array() != 0.0).any()) {
-      TakeRoot(f, moved, noise, without_held_);
+      ComputeRoot(f, moved, noise, conditional_root_);
     } else {
-      without_held_ = moved;
+      conditional_root_ = moved;
     }
-    noise += f.motions.Held(&Motions::Step::m, f.size(), f.work);
+    noise += f.motions.NoiseColumns(&Motions::Step::m, f.size(), f.work);
   }
-  TakeRoot(f, moved, noise, root_);
+  ComputeRoot(f, moved, noise, root_);
   SetCovariance(f);
   return {};
 }
 
-/// S = (H L) (H L)' + R, which rounding does not turn negative.
+/// Computes S = (H L) (H L)' + R, which is positive semi-definite despite rounding.
 double SquareRootEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
   const Workspace::Use use(f.work);
-  PendingMeasurement* const one[] = {&pending};
-  const Stacked all = Stack(f, one);
-  const Eigen::Index m = all.h.rows();
+  PendingMeasurement* const rows[] = {&pending};
+  const StackedMeasurements stacked = Stack(f, rows);
+  const Eigen::Index m = stacked.h.rows();
   Workspace::Matrix hl = f.work.Take(m, root_.cols()), s(pending.s, m, m);
   hl.setZero();
-  AddProduct(hl, all.h, root_);
-  s = all.noise;
+  AddProduct(hl, stacked.h, root_);
+  s = stacked.noise;
   AddProductWithTransposed(s, hl, hl);
   pending.report->s = {pending.s, pending.R.size()};
   return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
@@ -128,20 +129,20 @@ double SquareRootEquations::ComputeNis(FilterState& f, PendingMeasurement& pendi
 
 Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Workspace::Use use(f.work);
-  const Stacked all = Stack(f, rows);
-  const Eigen::Index n = root_.rows(), m = all.h.rows();
+  const StackedMeasurements stacked = Stack(f, rows);
+  const Eigen::Index n = root_.rows(), m = stacked.h.rows();
   Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);  // array: transposed
   array.setZero();
-  Eigen::Index at = 0;
+  Eigen::Index offset = 0;
   for (const PendingMeasurement* pending : rows) {
     const Eigen::Index k = pending->report->dof;
     auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(pending->sensor)];
-    SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
-    array.block(at, at, k, k) = root.transpose();
-    at += k;
+    SquareRootOf(stacked.noise.block(offset, offset, k, k), ldlt, root);
+    array.block(offset, offset, k, k) = root.transpose();
+    offset += k;
   }
   hl.setZero();
-  AddProduct(hl, all.h, root_);
+  AddProduct(hl, stacked.h, root_);
   array.bottomLeftCorner(n, m) = hl.transpose();
   array.bottomRightCorner(n, n) = root_.transpose();
   Triangularise(array, f.work.Take(m + n).data());
@@ -152,7 +153,7 @@ Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasuremen
   gain = array.topRightCorner(m, n).transpose();
   l = array.topLeftCorner(m, m).transpose();
   Divide(l, gain);
-  dx.noalias() = gain * all.innovation;
+  dx.noalias() = gain * stacked.innovation;
   if (!f.state.Retract(dx.data(), f.moved)) return Outcome::kNotFinite;
   const Workspace::Matrix transport = TransportTo(f.state, f.moved, f.work);
   f.state.MoveTo(f.moved);

@@ -6,13 +6,13 @@
 namespace alidade::internal {
 namespace {
 
-/// Calls take(row, at) for each row, `at` of the update's m where it begins.
-template <class Take>
-void ForEachPlace(std::span<PendingMeasurement* const> rows, const Take& take) {
-  Eigen::Index at = 0;
+/// Calls visit(measurement, offset) for each measurement; `offset` is its first of the m rows.
+template <class Visit>
+void ForEachOffset(std::span<PendingMeasurement* const> rows, const Visit& visit) {
+  Eigen::Index offset = 0;
   for (const PendingMeasurement* pending : rows) {
-    take(*pending, at);
-    at += pending->report->dof;
+    visit(*pending, offset);
+    offset += pending->report->dof;
   }
 }
 
@@ -20,11 +20,12 @@ void ForEachPlace(std::span<PendingMeasurement* const> rows, const Take& take) {
 
 void RecordGain(const FilterState& f, std::span<PendingMeasurement* const> rows,
                 const ConstMatrix& gain) {
-  RecordGainBy(f, rows, [&](std::span<const int> kept, int column, int count, double* to) {
-    for (int j = column; j < column + count; ++j) {
-      for (const int i : kept) *to++ = gain(i, j);
-    }
-  });
+  RecordGainBy(f, rows,
+               [&](std::span<const int> p_rows, int column, int count, double* destination) {
+                 for (int j = column; j < column + count; ++j) {
+                   for (const int i : p_rows) *destination++ = gain(i, j);
+                 }
+               });
 }
 
 int TotalDof(std::span<PendingMeasurement* const> rows) {
@@ -33,18 +34,19 @@ int TotalDof(std::span<PendingMeasurement* const> rows) {
   return m;
 }
 
-Stacked Stack(FilterState& f, std::span<PendingMeasurement* const> rows) {
+StackedMeasurements Stack(FilterState& f, std::span<PendingMeasurement* const> rows) {
   return {JacobianOf(f, rows), NoiseOf(f, rows), InnovationOf(f, rows)};
 }
 
 Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const> rows) {
   Workspace::Matrix h = f.work.Take(TotalDof(rows), f.size());
   h.setZero();
-  ForEachPlace(rows, [&](const PendingMeasurement& pending, Eigen::Index at) {
-    const JacobianRows& own = pending.linearised.h;
-    const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.width());
-    for (int c = 0; c < own.width(); ++c) {
-      h.col(own.columns[static_cast<std::size_t>(c)]).segment(at, own.rows) += compact.col(c);
+  ForEachOffset(rows, [&](const PendingMeasurement& pending, Eigen::Index offset) {
+    const JacobianRows& jacobian = pending.linearised.h;
+    const Eigen::Map<const RowMajor> compact(jacobian.data, jacobian.rows, jacobian.width());
+    for (int c = 0; c < jacobian.width(); ++c) {
+      h.col(jacobian.columns[static_cast<std::size_t>(c)]).segment(offset, jacobian.rows) +=
+          compact.col(c);
     }
   });
   return h;
@@ -53,17 +55,17 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const
 Workspace::Matrix NoiseOf(FilterState& f, std::span<PendingMeasurement* const> rows) {
   Workspace::Matrix noise = f.work.Take(TotalDof(rows), TotalDof(rows));
   noise.setZero();
-  ForEachPlace(rows, [&](const PendingMeasurement& pending, Eigen::Index at) {
+  ForEachOffset(rows, [&](const PendingMeasurement& pending, Eigen::Index offset) {
     const Eigen::Index k = pending.report->dof;
-    noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(pending.R.data(), k, k);
+    noise.block(offset, offset, k, k) = Eigen::Map<const RowMajor>(pending.R.data(), k, k);
   });
   return noise;
 }
 
 Workspace::Vector InnovationOf(FilterState& f, std::span<PendingMeasurement* const> rows) {
   Workspace::Vector innovation = f.work.Take(TotalDof(rows));
-  ForEachPlace(rows, [&](const PendingMeasurement& pending, Eigen::Index at) {
-    std::ranges::copy(pending.report->innovation, innovation.data() + at);
+  ForEachOffset(rows, [&](const PendingMeasurement& pending, Eigen::Index offset) {
+    std::ranges::copy(pending.report->innovation, innovation.data() + offset);
   });
   return innovation;
 }

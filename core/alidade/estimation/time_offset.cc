@@ -12,23 +12,22 @@
 namespace alidade::internal {
 namespace {
 
-/// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
-/// ones stay.
+/// Motion model that moves roles of a sensor: its blocks are `count` roles from `first` on.
 struct Mover {
   SharedMotion model;
   int first, count;
-  std::vector<bool> stays;
+  std::vector<bool> is_constant;  ///< by block
 };
 
-/// The sensor at another time.
+/// Sensor model that evaluates another one at the time t + delta.
 class OffsetSensor final : public SensorModel {
  public:
-  OffsetSensor(SharedSensor sensor, std::vector<Mover> movers, std::vector<int> place_of_role,
+  OffsetSensor(SharedSensor sensor, std::vector<Mover> movers, std::vector<int> role_map,
                std::vector<Space> roles, int offset_role)
-      : SensorModel(Describe(*sensor, movers, place_of_role, std::move(roles))),
+      : SensorModel(Describe(*sensor, movers, role_map, std::move(roles))),
         sensor_(std::move(sensor)),
         movers_(std::move(movers)),
-        place_(std::move(place_of_role)),
+        role_map_(std::move(role_map)),
         offset_(offset_role) {
     for (const Mover& mover : movers_) {
       for (const Space& block : mover.model->blocks()) {
@@ -42,7 +41,7 @@ class OffsetSensor final : public SensorModel {
   }
 
  private:
-  /// What a call needs besides its arguments, kept from one to the next in a thread.
+  /// Temporary memory of a call, reused by the calls of a thread.
   struct Memory {
     std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
     std::vector<double> shifted, jacobian;
@@ -55,43 +54,44 @@ class OffsetSensor final : public SensorModel {
     return memory;
   }
 
-  static bool IsMoved(const std::vector<Mover>& movers, int place) {
+  static bool IsMoved(const std::vector<Mover>& movers, int role) {
     return std::ranges::any_of(movers, [&](const Mover& mover) {
-      return place >= mover.first && place < mover.first + mover.count;
+      return role >= mover.first && role < mover.first + mover.count;
     });
   }
-  bool IsMoved(int place) const { return IsMoved(movers_, place); }
+  bool IsMoved(int role) const { return IsMoved(movers_, role); }
 
   static Description Describe(const SensorModel& sensor, const std::vector<Mover>& movers,
-                              const std::vector<int>& place_of_role, std::vector<Space> roles) {
+                              const std::vector<int>& role_map, std::vector<Space> roles) {
     Description description = sensor.description();
     description.owned.clear();
     description.roles = std::move(roles);
     for (Space& role : description.roles) role.flags &= ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED;
     int& inverse = description.inverse.role;
-    if (inverse >= 0) inverse = place_of_role[static_cast<std::size_t>(inverse)];
+    if (inverse >= 0) inverse = role_map[static_cast<std::size_t>(inverse)];
     if (IsMoved(movers, inverse)) description.inverse = {};
     return description;
   }
 
-  /// x' of one mover after dt_s, its blocks one after the other; its F unless null.
+  /// Computes x' of one mover after dt_s, block after block, and F unless it is null.
   static Status Move(const Mover& mover, const double* const* x, double dt_s, double* next,
                      Memory& memory, double* f) {
-    std::array<double*, kMaxRoles> to;
-    double* at = next;
+    std::array<double*, kMaxRoles> destinations;
+    double* destination = next;
     for (std::size_t b = 0; b < mover.model->blocks().size(); ++b) {
-      to[b] = at;
-      at += mover.model->blocks()[b].geometry.ambient;
+      destinations[b] = destination;
+      destination += mover.model->blocks()[b].geometry.ambient;
     }
     const int n = mover.model->tangent_size();
-    const Status status = mover.model->Step(
-        x, nullptr, nullptr, dt_s, {to.data(), f, f == nullptr ? nullptr : memory.g.data()});
+    const Status status =
+        mover.model->Step(x, nullptr, nullptr, dt_s,
+                          {destinations.data(), f, f == nullptr ? nullptr : memory.g.data()});
     int row = 0;
     for (std::size_t b = 0; status == Status::kOk && b < mover.model->blocks().size(); ++b) {
       const Geometry& geometry = mover.model->blocks()[b].geometry;
-      geometry.Normalise(to[b]);
-      if (mover.stays[b]) std::copy_n(x[b], geometry.ambient, to[b]);
-      for (int r = row; r < row + geometry.tangent && mover.stays[b] && f != nullptr; ++r) {
+      geometry.Normalise(destinations[b]);
+      if (mover.is_constant[b]) std::copy_n(x[b], geometry.ambient, destinations[b]);
+      for (int r = row; r < row + geometry.tangent && mover.is_constant[b] && f != nullptr; ++r) {
         std::fill_n(f + r * n, n, 0.0);
         f[r * n + r] = 1.0;
       }
@@ -100,24 +100,24 @@ class OffsetSensor final : public SensorModel {
     return status;
   }
 
-  /// df/ddelta of one mover at x' = next, in its tangent.
+  /// Computes df/ddelta of one mover at x' = next, in the tangent space.
   static Status Differentiate(const Mover& mover, const double* const* x, double dt_s,
                               const double* next, Memory& memory, double* rate) {
     constexpr double kStep = 1e-3;
     const std::array<std::pair<double, double>, 4> points{
         {{-2.0, 1.0 / 12.0}, {-1.0, -2.0 / 3.0}, {1.0, 2.0 / 3.0}, {2.0, -1.0 / 12.0}}};
     std::fill_n(rate, mover.model->tangent_size(), 0.0);
-    std::vector<double>& there = memory.shifted;
+    std::vector<double>& shifted = memory.shifted;
     for (const auto& [steps, weight] : points) {
-      const Status status = Move(mover, x, dt_s + steps * kStep, there.data(), memory, nullptr);
+      const Status status = Move(mover, x, dt_s + steps * kStep, shifted.data(), memory, nullptr);
       if (status != Status::kOk) return status;
       int a = 0, t = 0;
       for (const Space& block : mover.model->blocks()) {
         std::array<double, 64> d;
-        double* const apart = block.geometry.tangent <= 64 ? d.data() : memory.jacobian.data();
-        block.geometry.Minus(there.data() + a, next + a, apart);
+        double* const difference = block.geometry.tangent <= 64 ? d.data() : memory.jacobian.data();
+        block.geometry.Minus(shifted.data() + a, next + a, difference);
         for (int i = 0; i < block.geometry.tangent; ++i) {
-          rate[t + i] += weight / kStep * apart[i];
+          rate[t + i] += weight / kStep * difference[i];
         }
         a += block.geometry.ambient;
         t += block.geometry.tangent;
@@ -126,7 +126,8 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// The roles of the sensor at t + delta, in memory.roles; with `derivatives` F and df/ddelta.
+  /// Computes the roles of the sensor at t + delta, in memory.roles; with `derivatives` also F and
+  /// df/ddelta.
   Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
     memory.next.resize(ambient_);
     memory.shifted.resize(ambient_);
@@ -135,9 +136,9 @@ class OffsetSensor final : public SensorModel {
     memory.g.resize(noise_);
     memory.jacobian.resize(std::max(memory.jacobian.size(), tangent_));
     const double dt_s = roles[offset_][0];
-    memory.roles.assign(place_.size(), nullptr);
-    for (std::size_t i = 0; i < place_.size(); ++i) {
-      if (place_[i] >= 0) memory.roles[i] = roles[place_[i]];
+    memory.roles.assign(role_map_.size(), nullptr);
+    for (std::size_t i = 0; i < role_map_.size(); ++i) {
+      if (role_map_[i] >= 0) memory.roles[i] = roles[role_map_[i]];
     }
     double *next = memory.next.data(), *f = memory.f.data(), *rate = memory.rate.data();
     for (const Mover& mover : movers_) {
@@ -147,12 +148,12 @@ class OffsetSensor final : public SensorModel {
         status = Differentiate(mover, x, dt_s, next, memory, rate);
       }
       if (status == Status::kError) {
-        status = NoteModelError(this, "motion model '" + mover.model->name() +
-                                          "' of its roles: " + mover.model->error_text());
+        status = RecordModelError(this, "motion model '" + mover.model->name() +
+                                            "' of its roles: " + mover.model->error_text());
       }
       if (status != Status::kOk) return status;
-      for (std::size_t i = 0; i < place_.size(); ++i) {
-        const int block = place_[i] - mover.first;
+      for (std::size_t i = 0; i < role_map_.size(); ++i) {
+        const int block = role_map_[i] - mover.first;
         if (block < 0 || block >= mover.count) continue;
         memory.roles[i] = next;
         for (int b = 0; b < block; ++b) {
@@ -167,38 +168,39 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// Gives the sensor where to write its Jacobians, of m rows: for roles that stay the caller's
-  /// place, for others one in memory.
-  void PlaceJacobians(int m, double* const* jacobians, const int* strides, Memory& memory) const {
+  /// Sets the destinations of the Jacobians of the sensor, of m rows: those of the caller for roles
+  /// that do not move, and temporary memory for roles that move.
+  void SetJacobianDestinations(int m, double* const* jacobians, const int* strides,
+                               Memory& memory) const {
     std::size_t size = 0;
     for (const Space& role : sensor_->roles())
       size += static_cast<std::size_t>(m * role.geometry.tangent);
     memory.jacobian.resize(std::max(memory.jacobian.size(), size));
-    memory.jacobians.assign(place_.size(), nullptr);
-    memory.strides.assign(place_.size(), 0);
+    memory.jacobians.assign(role_map_.size(), nullptr);
+    memory.strides.assign(role_map_.size(), 0);
     double* next = memory.jacobian.data();
-    for (std::size_t i = 0; i < place_.size(); ++i) {
+    for (std::size_t i = 0; i < role_map_.size(); ++i) {
       const int n = sensor_->roles()[i].geometry.tangent;
-      if (place_[i] < 0) continue;
-      if (IsMoved(place_[i])) {
+      if (role_map_[i] < 0) continue;
+      if (IsMoved(role_map_[i])) {
         memory.jacobians[i] = next;
         memory.strides[i] = n;
       } else {
-        memory.jacobians[i] = jacobians[place_[i]];
-        memory.strides[i] = strides[place_[i]];
+        memory.jacobians[i] = jacobians[role_map_[i]];
+        memory.strides[i] = strides[role_map_[i]];
       }
       next += m * n;
     }
   }
 
-  /// J_c = sum_i J_i F_ic of the blocks c of all movers, and J_delta = sum_i J_i df_i/ddelta, from
-  /// the Jacobians J_i, of m rows, of the roles i that move.
+  /// Computes J_c = sum_i J_i F_ic for the blocks c of all movers, and J_delta = sum_i J_i
+  /// df_i/ddelta, from the Jacobians J_i, of m rows, of the roles i that move.
   void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
-    const auto to = [&](int role, int columns) {
+    const auto output = [&](int role, int columns) {
       return Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>(jacobians[role], m, columns,
                                                            Eigen::OuterStride<>(strides[role]));
     };
-    if (jacobians[offset_] != nullptr) to(offset_, 1).setZero();
+    if (jacobians[offset_] != nullptr) output(offset_, 1).setZero();
     const double *f = memory.f.data(), *rate = memory.rate.data();
     for (const Mover& mover : movers_) {
       const std::vector<Space>& blocks = mover.model->blocks();
@@ -207,23 +209,23 @@ class OffsetSensor final : public SensorModel {
       };
       const int n = mover.model->tangent_size();
       for (int c = 0; c < mover.count; ++c) {
-        if (jacobians[mover.first + c] != nullptr) to(mover.first + c, tangent(c)).setZero();
+        if (jacobians[mover.first + c] != nullptr) output(mover.first + c, tangent(c)).setZero();
       }
-      for (std::size_t i = 0; i < place_.size(); ++i) {
-        const int block = place_[i] - mover.first;
+      for (std::size_t i = 0; i < role_map_.size(); ++i) {
+        const int block = role_map_[i] - mover.first;
         if (block < 0 || block >= mover.count) continue;
         int row = 0;
         for (int b = 0; b < block; ++b) row += tangent(b);
-        const Eigen::Map<const RowMajor> own(memory.jacobians[i], m, tangent(block));
+        const Eigen::Map<const RowMajor> j(memory.jacobians[i], m, tangent(block));
         for (int k = 0; k < tangent(block); ++k) {
-          if (jacobians[offset_] != nullptr) to(offset_, 1) += own.col(k) * rate[row + k];
-          const double* from = f + (row + k) * n;
+          if (jacobians[offset_] != nullptr) output(offset_, 1) += j.col(k) * rate[row + k];
+          const double* f_row = f + (row + k) * n;
           for (int c = 0; c < mover.count; ++c) {
-            const Eigen::Map<const Eigen::RowVectorXd> of_c(from, tangent(c));
+            const Eigen::Map<const Eigen::RowVectorXd> f_block(f_row, tangent(c));
             if (jacobians[mover.first + c] != nullptr) {
-              to(mover.first + c, tangent(c)).noalias() += own.col(k) * of_c;
+              output(mover.first + c, tangent(c)).noalias() += j.col(k) * f_block;
             }
-            from += tangent(c);
+            f_row += tangent(c);
           }
         }
       }
@@ -232,30 +234,30 @@ class OffsetSensor final : public SensorModel {
     }
   }
 
-  Status DoEvaluate(const Observation& seen, const double* const* roles,
+  Status DoEvaluate(const Observation& observation, const double* const* roles,
                     const Output& out) const override {
     Memory& memory = MemoryOfThread();
     const bool derivatives = out.jacobians != nullptr;
     Status status = Shift(roles, derivatives, memory);
     if (status != Status::kOk) return status;
     const int m = measurement().geometry.tangent;
-    Output there{out.h, nullptr, nullptr, out.sqrt_noise};
+    Output sensor_output{out.h, nullptr, nullptr, out.sqrt_noise};
     if (derivatives) {
-      PlaceJacobians(m, out.jacobians, out.strides, memory);
-      there.jacobians = memory.jacobians.data();
-      there.strides = memory.strides.data();
+      SetJacobianDestinations(m, out.jacobians, out.strides, memory);
+      sensor_output.jacobians = memory.jacobians.data();
+      sensor_output.strides = memory.strides.data();
     }
-    status = sensor_->Evaluate(seen, memory.roles.data(), there);
-    if (status == Status::kError) status = NoteModelError(this, sensor_->error_text());
+    status = sensor_->Evaluate(observation, memory.roles.data(), sensor_output);
+    if (status == Status::kError) status = RecordModelError(this, sensor_->error_text());
     if (status == Status::kOk && derivatives) Chain(m, out.jacobians, out.strides, memory);
     return status;
   }
-  Status DoValid(const Observation& seen) const override {
-    const Status status = sensor_->Valid(seen);
-    return status == Status::kError ? NoteModelError(this, sensor_->error_text()) : status;
+  Status DoValid(const Observation& observation) const override {
+    const Status status = sensor_->Valid(observation);
+    return status == Status::kError ? RecordModelError(this, sensor_->error_text()) : status;
   }
-  Status DoInitialise(const double* const* roles, const Observation& seen, const double* prior,
-                      const InverseOutput& out) const override {
+  Status DoInitialise(const double* const* roles, const Observation& observation,
+                      const double* prior, const InverseOutput& out) const override {
     Memory& memory = MemoryOfThread();
     const bool derivatives = out.jx != nullptr;
     Status status = Shift(roles, derivatives, memory);
@@ -265,35 +267,34 @@ class OffsetSensor final : public SensorModel {
     for (auto role = first; role != first + sensor_->inverse().count; ++role) {
       rows += role->geometry.tangent;
     }
-    InverseOutput there = out;
+    InverseOutput sensor_output = out;
     if (derivatives) {
-      PlaceJacobians(rows, out.jx, out.strides, memory);
-      there.jx = memory.jacobians.data();
-      there.strides = memory.strides.data();
+      SetJacobianDestinations(rows, out.jx, out.strides, memory);
+      sensor_output.jx = memory.jacobians.data();
+      sensor_output.strides = memory.strides.data();
     }
-    status = sensor_->Initialise(memory.roles.data(), seen, prior, there);
-    if (status == Status::kError) status = NoteModelError(this, sensor_->error_text());
+    status = sensor_->Initialise(memory.roles.data(), observation, prior, sensor_output);
+    if (status == Status::kError) status = RecordModelError(this, sensor_->error_text());
     if (status == Status::kOk && derivatives) Chain(rows, out.jx, out.strides, memory);
     return status;
   }
 
   SharedSensor sensor_;
   std::vector<Mover> movers_;
-  std::vector<int> place_;  ///< by role of the sensor: which role of this; -1: unbound
+  std::vector<int> role_map_;  ///< by role of the sensor: role of this model; -1: no block
   int offset_;
   std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;  ///< of Memory
 };
 
-/// How the roles of a sensor and the blocks of its motion models become the roles of an
-/// OffsetSensor.
+/// Roles of an OffsetSensor, made from the roles of a sensor and the blocks of its motion models.
 struct Arrangement {
   std::vector<Mover> movers;
   std::vector<Space> roles;
   std::vector<RoleBinding> bindings;
-  std::vector<int> place_of_role;
-  int offset = -1;
+  std::vector<int> role_map;  ///< by role of the sensor: index into `roles`, or -1
+  int offset = -1;            ///< index of the role of delta
 
-  /// Appends a role; its index.
+  /// Appends a role and returns its index.
   int Add(Space space, RoleBinding binding, const std::string& name) {
     space.name = name;
     roles.push_back(std::move(space));
@@ -302,63 +303,67 @@ struct Arrangement {
   }
 };
 
-/// Of one model of the sensor: its own, or that of landmarks that are xyz.
+/// Arranges the roles for a model of the sensor: SensorBinding::model or SensorBinding::xyz.
 Arrangement Arrange(const Problem& problem, BlockId offset, const SensorBinding& sensor,
                     const SensorModel& model) {
-  Arrangement all;
-  all.place_of_role.assign(model.roles().size(), -1);
+  Arrangement arrangement;
+  arrangement.role_map.assign(model.roles().size(), -1);
   const auto role_of = [&](BlockId block) {
     const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
     return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
   };
   for (const MotionBinding& motion : problem.motions) {
-    const bool moves =
+    const bool moves_role =
         !motion.model->stationary() &&
         std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
-    if (!moves) continue;
-    all.movers.push_back({motion.model,
-                          static_cast<int>(all.roles.size()),
-                          static_cast<int>(motion.blocks.size()),
-                          {}});
-    // What brings the motion model decides how its other blocks take part.
+    if (!moves_role) continue;
+    arrangement.movers.push_back({motion.model,
+                                  static_cast<int>(arrangement.roles.size()),
+                                  static_cast<int>(motion.blocks.size()),
+                                  {}});
+    // The blocks of the motion model that are not roles of the sensor get the mode of its first
+    // role.
     const auto moved =
         std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
     for (const BlockId id : motion.blocks) {
-      all.movers.back().stays.push_back(problem.layout[id].status == BlockStatus::kConstant);
+      arrangement.movers.back().is_constant.push_back(problem.layout[id].status ==
+                                                      BlockStatus::kConstant);
       const int role = role_of(id);
       if (role < 0) {
-        all.Add(problem.layout[id].space, RoleBinding{id, mode}, problem.layout[id].name);
+        arrangement.Add(problem.layout[id].space, RoleBinding{id, mode}, problem.layout[id].name);
         continue;
       }
       const auto index = static_cast<std::size_t>(role);
-      all.place_of_role[index] =
-          all.Add(model.roles()[index], sensor.roles[index], model.roles()[index].name);
+      arrangement.role_map[index] =
+          arrangement.Add(model.roles()[index], sensor.roles[index], model.roles()[index].name);
     }
   }
   for (std::size_t i = 0; i < std::min(sensor.roles.size(), model.roles().size()); ++i) {
     const Space& role = model.roles()[i];
-    if (role.landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) continue;
-    all.place_of_role[i] = all.Add(role, sensor.roles[i], role.name);
+    if (role.landmark() || sensor.roles[i].block < 0 || arrangement.role_map[i] >= 0) continue;
+    arrangement.role_map[i] = arrangement.Add(role, sensor.roles[i], role.name);
   }
-  all.offset = all.Add(problem.layout[offset].space, RoleBinding{offset}, "time_offset");
+  arrangement.offset =
+      arrangement.Add(problem.layout[offset].space, RoleBinding{offset}, "time_offset");
   for (std::size_t i = 0; i < model.roles().size(); ++i) {
     const Space& role = model.roles()[i];
-    if (role.landmark()) all.place_of_role[i] = all.Add(role, {}, role.name);
+    if (role.landmark()) arrangement.role_map[i] = arrangement.Add(role, {}, role.name);
   }
-  return all;
+  return arrangement;
 }
 
-SharedSensor Offset(const SharedSensor& model, Arrangement all) {
-  return std::make_shared<OffsetSensor>(model, std::move(all.movers), std::move(all.place_of_role),
-                                        std::move(all.roles), all.offset);
+SharedSensor Offset(const SharedSensor& model, Arrangement arrangement) {
+  return std::make_shared<OffsetSensor>(model, std::move(arrangement.movers),
+                                        std::move(arrangement.role_map),
+                                        std::move(arrangement.roles), arrangement.offset);
 }
 
 }  // namespace
 
 std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& sensor) {
-  Arrangement all = Arrange(problem, offset, sensor, *sensor.model);
-  for (const Mover& mover : all.movers) {
+  Arrangement arrangement = Arrange(problem, offset, sensor, *sensor.model);
+  for (const Mover& mover : arrangement.movers) {
     if (mover.model->has_input()) {
       return "motion model '" + mover.model->name() + "' of its roles takes a control input";
     }
@@ -369,12 +374,14 @@ std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& 
   if (std::ranges::any_of(sensor.roles, at_measurement)) {
     return "a role has jacobian_at: measurement";
   }
-  if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
+  if (arrangement.movers.empty()) {
+    return "no motion model moves its roles, so that a time offset has no effect";
+  }
   if (sensor.xyz) {
     sensor.xyz = Offset(sensor.xyz, Arrange(problem, offset, sensor, *sensor.xyz));
   }
-  std::vector<RoleBinding> bindings = std::move(all.bindings);
-  sensor.model = Offset(sensor.model, std::move(all));
+  std::vector<RoleBinding> bindings = std::move(arrangement.bindings);
+  sensor.model = Offset(sensor.model, std::move(arrangement));
   sensor.roles = std::move(bindings);
   return {};
 }

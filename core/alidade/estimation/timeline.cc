@@ -14,130 +14,133 @@ namespace {
 
 constexpr Timestamp kForever = std::numeric_limits<Timestamp>::max();
 
-/// timeout_s in whole nanoseconds, at least one.
+/// Returns timeout_s in whole nanoseconds, at least one.
 Timestamp TimeoutOf(double timeout_s) {
-  constexpr double kBeyond = 9.2e9;  // what a Timestamp cannot hold
-  return timeout_s < kBeyond ? std::max<Timestamp>(1, TimestampFromSeconds(timeout_s)) : kForever;
+  constexpr double kLimit_s = 9.2e9;  // longer times overflow a Timestamp
+  return timeout_s < kLimit_s ? std::max<Timestamp>(1, TimestampFromSeconds(timeout_s)) : kForever;
 }
 
-/// Why an input cannot be used; empty: it can.
+/// Returns the reason why an input cannot be used, or "".
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
   if (!AllFinite(value)) return "not finite";
   if (DistanceFrom(geometry, value.data()) > kUnitTolerance) return "not of unit length";
   return {};
 }
 
-/// max_dt_s in whole nanoseconds, at least one.
-Timestamp LongestStep(double max_dt_s) {
-  constexpr double kBeyond = 9.2e18;  // what a Timestamp cannot hold
+/// Returns max_dt_s in whole nanoseconds, at least one.
+Timestamp MaxStep(double max_dt_s) {
+  constexpr double kLimit_ns = 9.2e18;  // longer times overflow a Timestamp
   const double ns = std::round(1e9 * max_dt_s);
-  return ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns)) : kForever;
+  return ns < kLimit_ns ? std::max<Timestamp>(1, static_cast<Timestamp>(ns)) : kForever;
 }
 
 }  // namespace
 
 Timeline::Timeline(const Problem& problem, const std::vector<StreamInfo>& streams, double max_dt_s)
-    : max_dt_s_(max_dt_s), longest_(LongestStep(max_dt_s)) {
+    : max_dt_s_(max_dt_s), max_dt_(MaxStep(max_dt_s)) {
   if (problem.initial_time_s) start_ = TimestampFromSeconds(*problem.initial_time_s);
   for (std::size_t i = 0; i < problem.motions.size(); ++i) {
     const MotionBinding& motion = problem.motions[i];
     if (!motion.model->has_input()) continue;
-    Held& held = held_.emplace_back();
-    held.motion = i;
-    held.name = motion.name;
-    held.binding = motion.input;
-    held.geometry = motion.model->input().geometry;
-    held.timeout = TimeoutOf(motion.input.timeout_s);
-    held.neutral.resize(static_cast<std::size_t>(held.geometry.ambient));
-    held.geometry.Identity(held.neutral.data());
-    held.value = held.neutral;
+    StoredInput& input = inputs_.emplace_back();
+    input.motion = i;
+    input.name = motion.name;
+    input.binding = motion.input;
+    input.geometry = motion.model->input().geometry;
+    input.timeout = TimeoutOf(motion.input.timeout_s);
+    input.neutral.resize(static_cast<std::size_t>(input.geometry.ambient));
+    input.geometry.Identity(input.neutral.data());
+    input.value = input.neutral;
     const auto stream = std::ranges::find(streams, motion.input.stream, &StreamInfo::name);
     if (stream != streams.end()) {
-      ALIDADE_EXPECTS(stream->size == held.geometry.ambient);
-      held.stream = static_cast<int>(stream - streams.begin());
+      ALIDADE_EXPECTS(stream->size == input.geometry.ambient);
+      input.stream = static_cast<int>(stream - streams.begin());
     }
   }
 }
 
-StepError Timeline::NextSubStep(Timestamp from, Timestamp to, std::vector<Event>& events,
+StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Event>& events,
                                 SubStep& sub_step) {
-  constexpr Timestamp kMostSteps = 1'000'000;
-  sub_step.start = from;
-  sub_step.end = to;
-  for (const Held& held : held_) {  // u changes where one stops acting
-    if (Acts(held, from)) sub_step.end = std::min(sub_step.end, held.until);
+  constexpr Timestamp kMaxSteps = 1'000'000;
+  sub_step.start = start;
+  sub_step.end = end;
+  for (const StoredInput& input : inputs_) {  // u changes when an input expires
+    if (IsActive(input, start)) sub_step.end = std::min(sub_step.end, input.expiration);
   }
   Timestamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(sub_step.end, from, &elapsed);
-  sub_step.steps = overflow ? 0 : (elapsed <= longest_ ? 1 : (elapsed - 1) / longest_ + 1);
-  if (overflow || sub_step.steps > kMostSteps) {
-    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(from)) +
+  const bool overflow = __builtin_sub_overflow(sub_step.end, start, &elapsed);
+  sub_step.steps = overflow ? 0 : (elapsed <= max_dt_ ? 1 : (elapsed - 1) / max_dt_ + 1);
+  if (overflow || sub_step.steps > kMaxSteps) {
+    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(start)) +
                                      " s would need more than " +
-                                     RoundedText(static_cast<double>(kMostSteps)) + " steps of " +
+                                     RoundedText(static_cast<double>(kMaxSteps)) + " steps of " +
                                      RoundedText(max_dt_s_) + " s"};
   }
   sub_step.dt_s = Seconds(elapsed);
   if (sub_step.steps > 1) sub_step.dt_s /= static_cast<double>(sub_step.steps);
-  if (sub_step.steps >= 2 * most_steps_) {
-    events.push_back({from, "substeps",
+  if (sub_step.steps >= 2 * max_reported_steps_) {
+    events.push_back({start, "substeps",
                       "a gap of " + RoundedText(Seconds(elapsed)) +
                           " s, longer than max_dt_s = " + RoundedText(max_dt_s_) +
-                          ", is stepped in " + std::to_string(sub_step.steps) + " equal parts"});
-    most_steps_ = sub_step.steps;
+                          ", is divided into " + std::to_string(sub_step.steps) + " equal steps"});
+    max_reported_steps_ = sub_step.steps;
   }
   return {};
 }
 
-std::string Timeline::WhyNone(const Held& held) {
-  const std::string input =
-      "control input of '" + held.name + "' from stream '" + held.binding.stream + "'";
-  if (held.timestamp == kNoTimestamp) return "no " + input + " has come yet: steps with u = 0";
-  return "the " + input + " is older than " + NumberText(held.binding.timeout_s) +
+std::string Timeline::DescribeMissing(const StoredInput& input) {
+  const std::string description =
+      "control input of '" + input.name + "' from stream '" + input.binding.stream + "'";
+  if (input.timestamp == kNoTimestamp) {
+    return "no " + description + " has arrived yet: steps with u = 0";
+  }
+  return "the " + description + " is older than " + NumberText(input.binding.timeout_s) +
          " s: steps with u = 0";
 }
 
-std::span<const double> Timeline::Input(std::size_t motion, Timestamp from,
+std::span<const double> Timeline::Input(std::size_t motion, Timestamp start,
                                         std::vector<Event>& events) {
-  const auto found = std::ranges::find(held_, motion, &Held::motion);
-  if (found == held_.end()) return {};
-  if (Acts(*found, from)) {
-    found->stale_noted = false;
+  const auto found = std::ranges::find(inputs_, motion, &StoredInput::motion);
+  if (found == inputs_.end()) return {};
+  if (IsActive(*found, start)) {
+    found->stale_reported = false;
     return found->value;
   }
-  if (!found->stale_noted) events.push_back({from, "input_stale", WhyNone(*found)});
-  found->stale_noted = true;
+  if (!found->stale_reported) events.push_back({start, "input_stale", DescribeMissing(*found)});
+  found->stale_reported = true;
   return found->neutral;
 }
 
-void Timeline::UseInputs(Timestamp from, Motions& motions, std::vector<Event>& events) {
+void Timeline::UseInputs(Timestamp start, Motions& motions, std::vector<Event>& events) {
   if (!has_inputs()) return;
   for (std::size_t i = 0; i < motions.steps().size(); ++i) {
     Motions::Step& step = motions.steps()[i];
     if (!step.active) continue;
-    const std::span<const double> u = Input(i, from, events);
+    const std::span<const double> u = Input(i, start, events);
     step.u.assign(u.begin(), u.end());
   }
 }
 
 [[gnu::noinline]] void Timeline::TakeInputs(const Frame& frame, UpdateReport& report) {
-  for (Held& held : held_) {
+  for (StoredInput& input : inputs_) {
     for (const Measurement& m : frame.measurements) {
-      if (m.stream != held.stream || frame.timestamp < held.timestamp) continue;
-      ALIDADE_EXPECTS(m.values.size() == held.value.size());
-      const std::string defect = Defect(held.geometry, m.values);
-      if (!defect.empty() && !held.refusal_noted) {
+      if (m.stream != input.stream || frame.timestamp < input.timestamp) continue;
+      ALIDADE_EXPECTS(m.values.size() == input.value.size());
+      const std::string defect = Defect(input.geometry, m.values);
+      if (!defect.empty() && !input.refusal_reported) {
         report.events.push_back({frame.timestamp, "input_refused",
-                                 "a control input of '" + held.name + "' from stream '" +
-                                     held.binding.stream + "' is " + defect +
-                                     ": the one before it goes on acting"});
+                                 "a control input of '" + input.name + "' from stream '" +
+                                     input.binding.stream + "' is " + defect +
+                                     ": the previous input continues to act"});
       }
-      held.refusal_noted = !defect.empty();
-      if (held.refusal_noted) continue;
-      std::ranges::copy(m.values, held.value.begin());
-      held.geometry.Normalise(held.value.data());
-      held.timestamp = frame.timestamp;
-      if (__builtin_add_overflow(frame.timestamp, held.timeout, &held.until)) held.until = kForever;
-      report.inputs.push_back(static_cast<int>(held.motion));
+      input.refusal_reported = !defect.empty();
+      if (input.refusal_reported) continue;
+      std::ranges::copy(m.values, input.value.begin());
+      input.geometry.Normalise(input.value.data());
+      input.timestamp = frame.timestamp;
+      if (__builtin_add_overflow(frame.timestamp, input.timeout, &input.expiration))
+        input.expiration = kForever;
+      report.inputs.push_back(static_cast<int>(input.motion));
     }
   }
 }

@@ -12,79 +12,80 @@
 
 namespace alidade::internal {
 
-/// Divides the time between two timestamps into sub-steps during which no control input changes,
-/// each of equal steps of at most max_dt_s. Control inputs are held until the next one (zero-order
-/// hold).
+/// Division of the time between two timestamps into sub-steps. Control inputs are constant during a
+/// sub-step (zero-order hold), and a sub-step has equal steps of at most max_dt_s.
 ///
 ///   u(t) = u_k   for t_k <= t < min(t_{k+1}, t_k + timeout)
 ///   u(t) = 0     for any other t: the neutral element of the input's geometry
 ///
 ///   symbol    unit         meaning
-///   u_k       the model's  an input that was taken
+///   u_k       the model's  a control input
 ///   t_k       s            timestamp of its frame
 ///   timeout   s            InputBinding::timeout_s
 ///
 /// A copy is a snapshot.
 class Timeline {
  public:
-  /// Equal steps from `start` to `end`.
+  /// Sequence of equal steps from `start` to `end`.
   struct SubStep {
     Timestamp start = 0, end = 0;
     Timestamp steps = 0;
     double dt_s = 0.0;
-    /// The end of step `i`, counted from 1.
+    /// Returns the end of step `i`, counted from 1.
     Timestamp EndOf(Timestamp i) const {
       return i == steps ? end : start + (end - start) / steps * i;
     }
   };
 
-  /// `streams` are the source's, in the order of Measurement::stream. ContractViolation where the
-  /// stream of an input has another size than the model's input.
+  /// `streams` are the streams of the source, in the order of Measurement::stream.
+  /// ContractViolation if a stream has another size than the control input that it provides.
   Timeline(const Problem& problem, const std::vector<StreamInfo>& streams, double max_dt_s);
 
-  /// The time of the priors, where nothing else sets it: initial_time_s, or the first frame's.
+  /// Returns the time of the priors: initial_time_s, or else the timestamp of the first frame.
   Timestamp StartFor(const Frame& first) const { return start_.value_or(first.timestamp); }
-  /// Computes the next sub-step from `from` towards `to`, which is later. If it has at least twice
-  /// as many steps as any before, the event `substeps` reports it. Returns an error if it would
-  /// need too many steps.
-  StepError NextSubStep(Timestamp from, Timestamp to, std::vector<Event>& events,
+  /// Computes the next sub-step from `start` towards the later `end`. If it has at least twice as
+  /// many steps as any sub-step before, the event `substeps` reports it. Returns an error if it
+  /// would need too many steps.
+  StepError NextSubStep(Timestamp start, Timestamp end, std::vector<Event>& events,
                         SubStep& sub_step);
 
-  /// Whether a model takes a control input.
-  bool has_inputs() const { return !held_.empty(); }
-  /// u (ambient) over the piece that starts at `from`, for Problem::motions[motion]; empty where it
-  /// takes none. Where none acts, an event `input_stale`, once until one does. Good until the next
-  /// TakeInputs.
-  std::span<const double> Input(std::size_t motion, Timestamp from, std::vector<Event>& events);
+  /// Returns whether a model has a control input.
+  bool has_inputs() const { return !inputs_.empty(); }
+  /// Returns u (ambient) during the sub-step that starts at `start`, for Problem::motions[motion];
+  /// empty if the model has no control input. If no input acts, the event `input_stale` reports it,
+  /// once until an input acts. Valid until the next TakeInputs.
+  std::span<const double> Input(std::size_t motion, Timestamp start, std::vector<Event>& events);
   /// Sets the control inputs of the active motion models.
-  void UseInputs(Timestamp from, Motions& motions, std::vector<Event>& events);
-  /// Takes the inputs of a frame, which then act from its timestamp on, and lists them in
-  /// `report.inputs`. One that is older than the one held is passed over; one that is not finite or
-  /// not of unit length is refused, with an event `input_refused`, once until one is taken. Their
-  /// noise is that of the model: a covariance that comes with one is not used.
+  void UseInputs(Timestamp start, Motions& motions, std::vector<Event>& events);
+  /// Stores the control inputs of a frame, which act from its timestamp on, and appends their
+  /// motion models to `report.inputs`. Inputs older than the stored one are ignored. An input that
+  /// is not finite or does not have unit length is rejected. The event `input_refused` reports
+  /// this, once until an input is accepted. The covariance of an input is not used; its noise is
+  /// that of the model.
   void TakeInputs(const Frame& frame, UpdateReport& report);
 
  private:
-  struct Held {
+  /// Latest control input of a motion model.
+  struct StoredInput {
     std::size_t motion = 0;
     std::string name;  ///< of the state entry
     InputBinding binding;
     Geometry geometry;
-    int stream = -1;  ///< -1: the source has none of that name
+    int stream = -1;  ///< -1: the source has no stream of that name
     Timestamp timeout = 0;
     std::vector<double> value, neutral;
-    Timestamp timestamp = kNoTimestamp;  ///< of the value
-    Timestamp until = kNoTimestamp;      ///< when it stops acting
-    bool stale_noted = false, refusal_noted = false;
+    Timestamp timestamp = kNoTimestamp;   ///< of the value
+    Timestamp expiration = kNoTimestamp;  ///< time at which it stops acting
+    bool stale_reported = false, refusal_reported = false;
   };
-  static bool Acts(const Held& held, Timestamp at) { return at < held.until; }
-  static std::string WhyNone(const Held& held);
+  static bool IsActive(const StoredInput& input, Timestamp time) { return time < input.expiration; }
+  static std::string DescribeMissing(const StoredInput& input);
 
-  std::vector<Held> held_;  ///< of the models that take an input
+  std::vector<StoredInput> inputs_;  ///< of the models with a control input
   std::optional<Timestamp> start_;
   double max_dt_s_;
-  Timestamp longest_;         ///< max_dt_s, in whole ns and at least one
-  Timestamp most_steps_ = 1;  ///< of a piece, as far as they were noted
+  Timestamp max_dt_;                  ///< max_dt_s in whole ns, at least one
+  Timestamp max_reported_steps_ = 1;  ///< of a sub-step
 };
 
 }  // namespace alidade::internal

@@ -19,22 +19,22 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
-/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. The mean is found where the step to the
-/// next one is rounding: each of the 2N f_i, and the centre in all of them, may be 16 eps off.
-/// False where the iteration does not settle, the points being too far apart.
+/// Computes the mean of `centre` and the columns y_i of `points`, f_i = (y_i (-) mean) -
+/// (centre (-) mean) in `f` (tangent x 2N), and m = w sum f_i. The iteration has converged when its
+/// step is at most the rounding error: 16 eps for each of the 2N f_i, and for the centre in each of
+/// them. Returns false if it does not converge, because the points are too far apart.
 bool MeanOf(const Geometry& geometry, const double* centre,
             const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
-  constexpr int kMostIterations = 200;
+  constexpr int kMaxIterations = 200;
   constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
   const Workspace::Use use(work);
   const Eigen::Map<const Eigen::VectorXd> x(centre, geometry.ambient);
-  const double settled = kRounding * (1.0 + w * static_cast<double>(points.cols())) *
-                         std::max(1.0, x.lpNorm<Eigen::Infinity>());
+  const double tolerance = kRounding * (1.0 + w * static_cast<double>(points.cols())) *
+                           std::max(1.0, x.lpNorm<Eigen::Infinity>());
   std::copy_n(centre, geometry.ambient, mean);
   Workspace::Vector from_mean = work.Take(geometry.tangent);
-  for (int k = 0; k < kMostIterations; ++k) {
+  for (int k = 0; k < kMaxIterations; ++k) {
     geometry.Minus(centre, mean, from_mean.data());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
       geometry.Minus(points.col(i).data(), mean, f.col(i).data());
@@ -46,19 +46,19 @@ bool MeanOf(const Geometry& geometry, const double* centre,
       return true;
     }
     from_mean += m;
-    if (k > 0 && from_mean.norm() <= settled) return true;
+    if (k > 0 && from_mean.norm() <= tolerance) return true;
     geometry.Plus(mean, from_mean.data(), mean);
   }
   return false;
 }
 
-/// Weights of the transform with 2N sigma points besides the centre.
+/// Spread and weights of the transform with 2N sigma points besides the centre.
 struct Transform {
   double c, w;
   double centre;  ///< beta - alpha^2
 };
 
-/// moments = w f f' + centre m m'
+/// Computes moments = w f f' + centre m m'.
 void MomentsOf(const Transform& transform, const Eigen::Ref<const Eigen::MatrixXd>& f,
                const Eigen::Ref<const Eigen::VectorXd>& m, Workspace::Matrix& moments) {
   moments.setZero();
@@ -68,16 +68,16 @@ void MomentsOf(const Transform& transform, const Eigen::Ref<const Eigen::MatrixX
   for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += transform.centre * m[i] * m;
 }
 
-/// By sigma points, in place of Jacobians.
+/// Equations of Ukf, which use sigma points instead of Jacobians.
 class UkfEquations : public UpdateMethod {
  public:
-  explicit UkfEquations(const UkfOptions& options) : spread_(options) {}
+  explicit UkfEquations(const UkfOptions& options) : options_(options) {}
 
   std::unique_ptr<UpdateMethod> Clone() const override {
     return std::make_unique<UkfEquations>(*this);
   }
   void Begin(FilterState& f) override {
-    guarded_.assign(f.problem_index->sensor_places.size() + 1, false);
+    is_guarded_.assign(f.problem_index->sensor_places.size() + 1, false);
   }
   StepError Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, PendingMeasurement& pending) override;
@@ -85,8 +85,8 @@ class UkfEquations : public UpdateMethod {
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
  private:
-  /// What the sigma points make of one measurement.
-  struct Predicted {
+  /// Prediction of one measurement by sigma points.
+  struct SigmaPrediction {
     int halvings = 0;                       ///< of the spread
     std::vector<double> centre;             ///< h(x0)
     std::vector<double> h, innovation;      ///< the mean, and z (-) h
@@ -100,50 +100,50 @@ class UkfEquations : public UpdateMethod {
 
   Transform TransformOf(Eigen::Index directions, int halvings) const;
   template <class Attempt>
-  Outcome Narrow(int& halvings, const Attempt& attempt) const;
+  Outcome ReduceSpread(int& halvings, const Attempt& attempt) const;
   const Eigen::MatrixXd& RootOf(FilterState& f);
-  const Eigen::MatrixXd& RootWithoutHeld(const FilterState& f);
-  void TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c);
+  const Eigen::MatrixXd& ConditionalRootOf(const FilterState& f);
+  void UpdateNoiseCross(FilterState& f, const Workspace::Matrix& deviations, double c);
   Outcome StepPoints(FilterState& f, int halvings, double dt_s);
-  Outcome StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
-                    double* to);
+  Outcome StepPoint(FilterState& f, const double* point, const double* noise, double dt_s,
+                    double* destination);
   Outcome PredictPoints(FilterState& f, PendingMeasurement& pending, int halvings);
-  Predicted& PredictedOf(const FilterState& f, const PendingMeasurement& pending);
+  SigmaPrediction& PredictionOf(const FilterState& f, const PendingMeasurement& pending);
   Outcome StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows, int halvings,
-                      Stacked& all, Workspace::Vector& mean);
-  void NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough);
+                      StackedMeasurements& stacked, Workspace::Vector& mean);
+  void ReportGuard(FilterState& f, std::size_t index, int halvings, bool is_sufficient);
 
-  UkfOptions spread_;
+  UkfOptions options_;
   Eigen::MatrixXd root_;  ///< of P
   bool root_is_current_ = false;
-  Eigen::MatrixXd held_;              ///< M, while an interval goes on
-  std::vector<Predicted> predicted_;  ///< by report
-  std::vector<bool> guarded_;         ///< by sensor; the last: the motion
-  // Memory that is kept from step to step.
-  Eigen::MatrixXd rest_, root_of_rest_;
+  Eigen::MatrixXd noise_cross_;               ///< M, during an interval of discrete noise
+  std::vector<SigmaPrediction> predictions_;  ///< by report
+  std::vector<bool> is_guarded_;              ///< by sensor; the last element: the motion models
+  // Reused memory.
+  Eigen::MatrixXd conditional_covariance_, conditional_root_;
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
-  const MotionBinding* failed_ = nullptr;  ///< whose plugin failed last
+  const MotionBinding* failed_motion_ = nullptr;  ///< motion model whose plugin failed last
 };
 
 Transform UkfEquations::TransformOf(Eigen::Index directions, int halvings) const {
-  const double alpha = std::ldexp(spread_.alpha, -halvings);
-  if (directions == 0) return {0.0, 0.0, spread_.beta - alpha * alpha};  // no point but the centre
-  const double c2 = alpha * alpha * (static_cast<double>(directions) + spread_.kappa);
-  return {std::sqrt(c2), 0.5 / c2, spread_.beta - alpha * alpha};
+  const double alpha = std::ldexp(options_.alpha, -halvings);
+  if (directions == 0) return {0.0, 0.0, options_.beta - alpha * alpha};  // only the centre
+  const double c2 = alpha * alpha * (static_cast<double>(directions) + options_.kappa);
+  return {std::sqrt(c2), 0.5 / c2, options_.beta - alpha * alpha};
 }
 
-/// What `attempt` makes of the widest spread at which no point is out of its domain, or else of the
-/// last that keeps its digits, after so many halvings.
+/// Calls attempt(halvings) with a spread that is halved each time, until no point is out of its
+/// domain or alpha reaches its minimum. Returns the last outcome and sets `halvings`.
 template <class Attempt>
-Outcome UkfEquations::Narrow(int& halvings, const Attempt& attempt) const {
+Outcome UkfEquations::ReduceSpread(int& halvings, const Attempt& attempt) const {
   for (halvings = 0;; ++halvings) {
     const Outcome outcome = attempt(halvings);
-    const bool last = !(std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha);
-    if (outcome != Outcome::kOutOfDomain || last) return outcome;
+    const bool is_last = !(std::ldexp(options_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha);
+    if (outcome != Outcome::kOutOfDomain || is_last) return outcome;
   }
 }
 
-/// A with P = A A'; repairs P where it is not positive semi-definite.
+/// Returns A with P = A A'. Repairs P if it is not positive semi-definite.
 const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
@@ -153,59 +153,64 @@ const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   if (defect < -kRounding) {
     f.motions.EndInterval();
     p.SetBlock(0, 0, root_ * root_.transpose());
-    Note(f, "repaired",
-         "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
-             " of its largest variance; negative pivots count as zero");
+    AddEvent(f, "repaired",
+             "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
+                 " of its largest variance; negative pivots count as zero");
   }
   return root_;
 }
 
-/// B with P - M M' = B B', the covariance of x given the noise that is held. M M' is a part of P: a
-/// negative pivot is rounding.
-const Eigen::MatrixXd& UkfEquations::RootWithoutHeld(const FilterState& f) {
-  rest_ = f.state.covariance().lower();  // of which the lower triangle counts
-  AddOuterProduct(rest_, held_, -1.0);
-  SquareRootOf(rest_, ldlt_, root_of_rest_);
-  return root_of_rest_;
+/// Returns B with P - M M' = B B', the covariance of x given the discrete noise. Since P includes
+/// M M', negative pivots are rounding errors.
+const Eigen::MatrixXd& UkfEquations::ConditionalRootOf(const FilterState& f) {
+  conditional_covariance_ = f.state.covariance().lower();  // only its lower triangle is used
+  AddOuterProduct(conditional_covariance_, noise_cross_, -1.0);
+  SquareRootOf(conditional_covariance_, ldlt_, conditional_root_);
+  return conditional_root_;
 }
 
-/// M from the deviations of the points: along w_j alone they are those at +c and -c.
-void UkfEquations::TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c) {
-  if (!f.motions.holds()) return;
-  const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
-  held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
+/// Computes M from the deviations of the points. Column j is the difference of the deviations at +c
+/// and -c along w_j, divided by 2 c.
+void UkfEquations::UpdateNoiseCross(FilterState& f, const Workspace::Matrix& deviations, double c) {
+  if (!f.motions.has_discrete_noise()) return;
+  const Eigen::Index n = deviations.rows(), directions = deviations.cols() / 2;
+  noise_cross_ =
+      (deviations.middleCols(n, directions - n) - deviations.rightCols(directions - n)) / (2.0 * c);
   Eigen::Index column = 0;
   for (std::size_t i = 0; i < f.problem_index->motion_places.size(); ++i) {
     if (!f.motions.steps()[i].active) continue;
     const Eigen::Index inputs = f.problem_index->problem.motions[i].model->noise_size();
-    if (!f.problem_index->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
+    if (!f.problem_index->motion_places[i].holds) noise_cross_.middleCols(column, inputs).setZero();
     column += inputs;
   }
 }
 
-/// Of sensor `index`, or of the motion, where that is beyond them; `narrow_enough`: the points at
-/// this spread are of use.
-void UkfEquations::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
-  const bool guarded = halvings > 0 || !narrow_enough;
-  if (guarded && !guarded_[index]) {
-    const std::string who = index < f.problem_index->sensor_places.size()
-                                ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
-                                : "motion";
-    Note(f, "guarded",
-         who + ": sigma points leave its domain or have no mean" +
-             (narrow_enough ? "" : ", and their spread can be narrowed no further") +
-             "; their spread is divided by " + std::to_string(1 << halvings));
+/// Reports once that the spread was reduced, for sensor `index` or, with the index after the last
+/// sensor, for the motion models. `is_sufficient`: the points with this spread can be used.
+void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
+                               bool is_sufficient) {
+  const bool guarded = halvings > 0 || !is_sufficient;
+  if (guarded && !is_guarded_[index]) {
+    const std::string subject =
+        index < f.problem_index->sensor_places.size()
+            ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
+            : "motion";
+    AddEvent(f, "guarded",
+             subject + ": sigma points leave its domain or have no mean" +
+                 (is_sufficient ? "" : ", and their spread can be narrowed no further") +
+                 "; their spread is divided by " + std::to_string(1 << halvings));
   }
-  guarded_[index] = guarded;
+  is_guarded_[index] = guarded;
 }
 
-/// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
-Outcome UkfEquations::StepPoint(FilterState& f, const double* from, const double* noise,
-                                double dt_s, double* to) {
+/// Steps one sigma point by all active models, with their `noise` for w, and writes x' to
+/// `destination`.
+Outcome UkfEquations::StepPoint(FilterState& f, const double* point, const double* noise,
+                                double dt_s, double* destination) {
   const Workspace::Use use(f.work);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
   Workspace::Vector next = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
-  std::copy_n(from, size, to);
+  std::copy_n(point, size, destination);
   for (std::size_t i = 0; i < f.motions.steps().size(); ++i) {
     const Motions::Step& step = f.motions.steps()[i];
     if (!step.active) continue;
@@ -216,40 +221,41 @@ Outcome UkfEquations::StepPoint(FilterState& f, const double* from, const double
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
     const MotionPlace& place = f.problem_index->motion_places[i];
     const Outcome outcome =
-        StepAt(motion, place, from, step.u.data(), w.data(), dt_s, {.next = next.data()});
+        StepAt(motion, place, point, step.u.data(), w.data(), dt_s, {.next = next.data()});
     if (outcome == Outcome::kFailed) {
-      failed_ = &motion;
+      failed_motion_ = &motion;
       return outcome;
     }
     if (outcome != Outcome::kAccepted) return Outcome::kOutOfDomain;
-    TakeStep(place, next.data(), to);
+    TakeStep(place, next.data(), destination);
     noise += inputs;
   }
   return Outcome::kAccepted;
 }
 
-/// Moves state and covariance, which stay as they are where a point is out of its domain.
+/// Propagates state and covariance. If a point is out of its domain, both are unchanged.
 Outcome UkfEquations::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
-  const bool goes_on = f.motions.in_interval();
-  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : RootOf(f);
+  const bool continues_interval = f.motions.in_interval();
+  const Eigen::MatrixXd& root = continues_interval ? ConditionalRootOf(f) : RootOf(f);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
-  const Eigen::Index n = root.cols(), noises = f.motions.noise_size(), all = n + noises;
-  const Transform transform = TransformOf(all, halvings);
+  const Eigen::Index n = root.cols(), noises = f.motions.noise_size(), directions = n + noises;
+  const Transform transform = TransformOf(directions, halvings);
   Workspace::Vector centre = f.work.Take(size), dx = f.work.Take(n), noise = f.work.Take(noises);
-  Workspace::Matrix points = f.work.Take(size, 2 * all), deviations = f.work.Take(n, 2 * all);
+  Workspace::Matrix points = f.work.Take(size, 2 * directions),
+                    deviations = f.work.Take(n, 2 * directions);
   noise.setZero();
   Outcome outcome = StepPoint(f, f.state.values().data(), noise.data(), dt_s, centre.data());
-  for (Eigen::Index i = 0; i < 2 * all && outcome == Outcome::kAccepted; ++i) {
-    const double c = i < all ? transform.c : -transform.c;
-    const Eigen::Index direction = i % all;
+  for (Eigen::Index i = 0; i < 2 * directions && outcome == Outcome::kAccepted; ++i) {
+    const double c = i < directions ? transform.c : -transform.c;
+    const Eigen::Index direction = i % directions;
     dx.setZero();
     noise.setZero();
     if (direction < n) {
       dx = c * root.col(direction);
     } else {
       noise[direction - n] = c;
-      if (goes_on) dx = c * held_.col(direction - n);
+      if (continues_interval) dx = c * noise_cross_.col(direction - n);
     }
     f.state.Retract(dx.data(), f.moved);
     outcome = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
@@ -275,30 +281,31 @@ Outcome UkfEquations::StepPoints(FilterState& f, int halvings, double dt_s) {
   if (!mean.allFinite() || !p.allFinite()) return Outcome::kOutOfDomain;
   std::copy_n(mean.data(), size, f.state.values().data());
   f.state.covariance().SetBlock(0, 0, p);
-  TakeHeld(f, deviations, transform.c);
+  UpdateNoiseCross(f, deviations, transform.c);
   root_is_current_ = false;
   return Outcome::kAccepted;
 }
 
 StepError UkfEquations::Step(FilterState& f, double dt_s) {
   if (std::ranges::none_of(f.motions.steps(), &Motions::Step::active)) return {};
-  // The centre, and Lq.
+  // Computes x' of the centre and Lq.
   if (StepError error = f.motions.Evaluate(f.state, dt_s, /*derivatives=*/false)) return error;
   int halvings = 0;
-  const Outcome outcome = Narrow(halvings, [&](int k) { return StepPoints(f, k, dt_s); });
+  const Outcome outcome = ReduceSpread(halvings, [&](int k) { return StepPoints(f, k, dt_s); });
   if (outcome == Outcome::kAccepted) {
-    NoteGuard(f, guarded_.size() - 1, halvings, true);
+    ReportGuard(f, is_guarded_.size() - 1, halvings, true);
     return {};
   }
   if (outcome == Outcome::kFailed) {
-    return {"plugin_failed", "motion model of '" + failed_->name +
-                                 "' cannot step a sigma point: " + failed_->model->error_text()};
+    return {"plugin_failed",
+            "motion model of '" + failed_motion_->name +
+                "' cannot step a sigma point: " + failed_motion_->model->error_text()};
   }
-  return {"diverged", "the sigma points cannot step, also with their spread divided by " +
+  return {"diverged", "the sigma points cannot step, even with their spread divided by " +
                           std::to_string(1 << halvings)};
 }
 
-/// h at the sigma points of one measurement, where it is defined at the estimate.
+/// Computes h of one measurement at the sigma points. Requires that h is defined at the estimate.
 Outcome UkfEquations::PredictPoints(FilterState& f, PendingMeasurement& pending, int halvings) {
   const Workspace::Use use(f.work);
   const Geometry& geometry = pending.model->measurement().geometry;
@@ -313,82 +320,83 @@ Outcome UkfEquations::PredictPoints(FilterState& f, PendingMeasurement& pending,
     const Outcome outcome = PredictAt(f, pending, f.moved, points.col(i).data());
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  Predicted& predicted = PredictedOf(f, pending);
-  predicted.halvings = halvings;
-  predicted.h.resize(static_cast<std::size_t>(geometry.ambient));
-  predicted.innovation.resize(static_cast<std::size_t>(geometry.tangent));
-  predicted.deviations.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
-  predicted.shift.resize(static_cast<std::size_t>(geometry.tangent));
-  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, f.work, predicted.h.data(),
-              predicted.f(), predicted.m())) {
+  SigmaPrediction& prediction = PredictionOf(f, pending);
+  prediction.halvings = halvings;
+  prediction.h.resize(static_cast<std::size_t>(geometry.ambient));
+  prediction.innovation.resize(static_cast<std::size_t>(geometry.tangent));
+  prediction.deviations.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
+  prediction.shift.resize(static_cast<std::size_t>(geometry.tangent));
+  if (!MeanOf(geometry, prediction.centre.data(), points, transform.w, f.work, prediction.h.data(),
+              prediction.f(), prediction.m())) {
     return Outcome::kOutOfDomain;
   }
-  geometry.Minus(pending.z, predicted.h.data(), predicted.innovation.data());
+  geometry.Minus(pending.z, prediction.h.data(), prediction.innovation.data());
   return Outcome::kAccepted;
 }
 
 Outcome UkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
-  Predicted& predicted = PredictedOf(f, pending);
-  predicted.centre.resize(static_cast<std::size_t>(pending.model->measurement().geometry.ambient));
-  Outcome outcome = PredictAt(f, pending, f.state.values(), predicted.centre.data());
-  bool too_wide = false;
-  if (outcome == Outcome::kAccepted) {  // at the estimate itself
+  SigmaPrediction& prediction = PredictionOf(f, pending);
+  prediction.centre.resize(static_cast<std::size_t>(pending.model->measurement().geometry.ambient));
+  Outcome outcome = PredictAt(f, pending, f.state.values(), prediction.centre.data());
+  bool is_too_wide = false;
+  if (outcome == Outcome::kAccepted) {  // h is defined at the estimate
     int halvings = 0;
-    outcome = Narrow(halvings, [&](int k) { return PredictPoints(f, pending, k); });
-    too_wide = outcome == Outcome::kOutOfDomain;
-    if (outcome == Outcome::kAccepted || too_wide) {
-      NoteGuard(f, static_cast<std::size_t>(pending.sensor), halvings, !too_wide);
+    outcome = ReduceSpread(halvings, [&](int k) { return PredictPoints(f, pending, k); });
+    is_too_wide = outcome == Outcome::kOutOfDomain;
+    if (outcome == Outcome::kAccepted || is_too_wide) {
+      ReportGuard(f, static_cast<std::size_t>(pending.sensor), halvings, !is_too_wide);
     }
   }
   if (outcome == Outcome::kAccepted) {
     outcome = NoiseAt(pending, RolesAt(f, pending, f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
-    std::ranges::copy(predicted.h, pending.h);
-    std::ranges::copy(predicted.innovation, pending.innovation);
-    pending.report->h = {pending.h, predicted.h.size()};
-    pending.report->innovation = {pending.innovation, predicted.innovation.size()};
-    pending.H.clear();  // there is none
-  } else if (!too_wide) {
-    NoteRefusal(f, pending, outcome);
+    std::ranges::copy(prediction.h, pending.h);
+    std::ranges::copy(prediction.innovation, pending.innovation);
+    pending.report->h = {pending.h, prediction.h.size()};
+    pending.report->innovation = {pending.innovation, prediction.innovation.size()};
+    pending.H.clear();  // the UKF has no Jacobian
+  } else if (!is_too_wide) {
+    ReportRefusal(f, pending, outcome);
   }
   return outcome;
 }
 
-/// S = Cov(h) + R.
+/// Computes S = Cov(h) + R.
 double UkfEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
-  Predicted& predicted = PredictedOf(f, pending);
+  SigmaPrediction& prediction = PredictionOf(f, pending);
   const Eigen::Index m = pending.report->dof;
   Workspace::Matrix s(pending.s, m, m);
-  MomentsOf(TransformOf(RootOf(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
+  MomentsOf(TransformOf(RootOf(f).cols(), prediction.halvings), prediction.f(), prediction.m(), s);
   s += Eigen::Map<const RowMajor>(pending.R.data(), m, m);
   pending.report->s = {pending.s, pending.R.size()};
   return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
 }
 
-/// All rows at one spread, also those that the gate saw at a wider one: f in place of H, R,
-/// innovation and m below one another.
+/// Stacks the predictions of all measurements: f instead of H, R, the innovation and m. Predictions
+/// with a larger spread are computed again with `halvings`.
 Outcome UkfEquations::StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows,
-                                  int halvings, Stacked& all, Workspace::Vector& mean) {
-  all.noise.setZero();
-  Eigen::Index at = 0;
+                                  int halvings, StackedMeasurements& stacked,
+                                  Workspace::Vector& mean) {
+  stacked.noise.setZero();
+  Eigen::Index offset = 0;
   for (PendingMeasurement* pending : rows) {
-    Predicted& predicted = PredictedOf(f, *pending);
-    if (predicted.halvings < halvings) {
+    SigmaPrediction& prediction = PredictionOf(f, *pending);
+    if (prediction.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *pending, halvings);
-      if (outcome != Outcome::kAccepted) {  // h is defined at the estimate: it does not diverge
-        if (outcome == Outcome::kFailed) NotePluginFailure(f, *pending);
+      if (outcome != Outcome::kAccepted) {  // not a divergence: h is defined at the estimate
+        if (outcome == Outcome::kFailed) ReportPluginFailure(f, *pending);
         pending->report->outcome = outcome;
         return Outcome::kNotFinite;
       }
     }
     const Eigen::Index k = pending->report->dof;
-    all.h.middleRows(at, k) = predicted.f();
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(pending->R.data(), k, k);
-    all.innovation.segment(at, k) =
-        Eigen::Map<const Eigen::VectorXd>(predicted.innovation.data(), k);
-    mean.segment(at, k) = predicted.m();
-    at += k;
+    stacked.h.middleRows(offset, k) = prediction.f();
+    stacked.noise.block(offset, offset, k, k) = Eigen::Map<const RowMajor>(pending->R.data(), k, k);
+    stacked.innovation.segment(offset, k) =
+        Eigen::Map<const Eigen::VectorXd>(prediction.innovation.data(), k);
+    mean.segment(offset, k) = prediction.m();
+    offset += k;
   }
   return Outcome::kAccepted;
 }
@@ -397,35 +405,36 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   const Workspace::Use use(f.work);
   const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols(), m = TotalDof(rows);
-  int halvings = 0;  // of the narrowest
+  int halvings = 0;  // of the smallest spread
   for (const PendingMeasurement* pending : rows) {
-    halvings = std::max(halvings, PredictedOf(f, *pending).halvings);
+    halvings = std::max(halvings, PredictionOf(f, *pending).halvings);
   }
-  Stacked all{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
+  StackedMeasurements stacked{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
   Workspace::Vector mean = f.work.Take(m), centre = f.work.Take(n), step = f.work.Take(n);
-  Workspace::Matrix s = f.work.Take(m, m), p = f.work.Take(n, n), rest = f.work.Take(n, 2 * n);
-  Workspace::Matrix gain = f.work.Take(n, m), spread = f.work.Take(n, m);
-  const Outcome stacked = StackPoints(f, rows, halvings, all, mean);
-  if (stacked != Outcome::kAccepted) return stacked;
+  Workspace::Matrix s = f.work.Take(m, m), p = f.work.Take(n, n),
+                    deviations = f.work.Take(n, 2 * n);  // dx_i, then dx_i - K f_i
+  Workspace::Matrix gain = f.work.Take(n, m), gain_noise = f.work.Take(n, m);  // K, K R
+  const Outcome outcome = StackPoints(f, rows, halvings, stacked, mean);
+  if (outcome != Outcome::kAccepted) return outcome;
   const Transform transform = TransformOf(n, halvings);
-  MomentsOf(transform, all.h, mean, s);
-  s += all.noise;
+  MomentsOf(transform, stacked.h, mean, s);
+  s += stacked.noise;
   if (!Factorise(s)) return Outcome::kNotPd;
   if (n == 0) return Outcome::kAccepted;  // nothing to correct
-  rest.leftCols(n) = transform.c * root;
-  rest.rightCols(n) = -transform.c * root;
+  deviations.leftCols(n) = transform.c * root;
+  deviations.rightCols(n) = -transform.c * root;
   gain.setZero();
-  AddProductWithTransposed(gain, rest, all.h);
+  AddProductWithTransposed(gain, deviations, stacked.h);
   gain *= transform.w;
   DivideByTransposed(s, gain);
   Divide(s, gain);
-  AddProduct(rest, gain, all.h, -1.0);
+  AddProduct(deviations, gain, stacked.h, -1.0);
   centre.noalias() = gain * mean;
-  step.noalias() = gain * all.innovation;
-  MomentsOf(transform, rest, centre, p);
-  spread.setZero();
-  AddProduct(spread, gain, all.noise);
-  AddProductWithTransposed(p, spread, gain);
+  step.noalias() = gain * stacked.innovation;
+  MomentsOf(transform, deviations, centre, p);
+  gain_noise.setZero();
+  AddProduct(gain_noise, gain, stacked.noise);
+  AddProductWithTransposed(p, gain_noise, gain);
   if (!f.state.Retract(step.data(), f.moved) || !p.allFinite()) return Outcome::kNotFinite;
   f.state.covariance().SetBlock(0, 0, p);
   f.state.MoveTo(f.moved);
@@ -434,12 +443,12 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   return Outcome::kAccepted;
 }
 
-/// By the place of its report.
-UkfEquations::Predicted& UkfEquations::PredictedOf(const FilterState& f,
-                                                   const PendingMeasurement& pending) {
+/// Returns the prediction of a measurement, stored by the index of its report.
+UkfEquations::SigmaPrediction& UkfEquations::PredictionOf(const FilterState& f,
+                                                          const PendingMeasurement& pending) {
   const auto index = static_cast<std::size_t>(pending.report - f.report.measurements().data());
-  if (predicted_.size() <= index) predicted_.resize(index + 1);
-  return predicted_[index];
+  if (predictions_.size() <= index) predictions_.resize(index + 1);
+  return predictions_[index];
 }
 
 }  // namespace

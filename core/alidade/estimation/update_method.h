@@ -13,28 +13,28 @@ namespace alidade::internal {
 class UpdateMethod {
  public:
   virtual ~UpdateMethod() = default;
-  /// A copy with everything that the method stores besides x and P.
+  /// Returns a copy of the method, with its own data.
   virtual std::unique_ptr<UpdateMethod> Clone() const = 0;
 
-  /// The square root of P if the method stores one, else null.
+  /// Returns the square root of P if the method stores one, else null.
   virtual const Eigen::MatrixXd* Root() const { return nullptr; }
   /// Called once, before the first frame, with the initial x and P.
   virtual void Begin(FilterState& /*f*/) {}
   /// Propagates x and P by dt_s. If it fails, both are unchanged and the error is returned.
   virtual StepError Step(FilterState& f, double dt_s) = 0;
-  /// Starts an update by at most `capacity` rows.
+  /// Starts an update by measurements of at most `capacity` rows in total.
   virtual void BeginUpdate(FilterState& /*f*/, int /*capacity*/) {}
   /// Computes h, the innovation and R of one measurement at the state. Returns kAccepted, or the
   /// reason for a failure, which it also reports as an event.
   virtual Outcome Predict(FilterState& f, PendingMeasurement& pending) = 0;
-  /// Computes S of a measurement that Predict accepted, and writes it into its report. Returns the
-  /// NIS, which is NaN unless S is finite and positive definite. The measurement has the columns of
-  /// the update from linearised.column on, those that passed before it the columns before.
+  /// Computes S of a measurement that Predict accepted, and writes it to its report. Returns the
+  /// NIS, which is NaN unless S is finite and positive definite. linearised.column is its first
+  /// column in the update; accepted measurements have the columns before it.
   virtual double ComputeNis(FilterState& f, PendingMeasurement& pending) = 0;
-  /// Corrects x and P by one stacked update, in the order of ComputeNis; R and S have their robust
-  /// weights by now. Returns kAccepted, with the gains in the reports (RecordGain). Otherwise x and
-  /// P are unchanged, and it returns the reason and reports it as an event, except kNotPd and
-  /// kNotFinite. A measurement that is the reason may have an outcome of its own in its report.
+  /// Corrects x and P by one stacked update, in the order of ComputeNis. R and S include the robust
+  /// weights. Returns kAccepted and writes the gains to the reports (RecordGain). Otherwise x and P
+  /// are unchanged, and the reason is returned. The reason is also reported as an event, except
+  /// kNotPd and kNotFinite. The report of the measurement that caused it may have another outcome.
   virtual Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) = 0;
 };
 

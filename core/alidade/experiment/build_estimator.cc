@@ -112,7 +112,7 @@ void RefuseUnsupported(const std::string& type, const EstimatorCapabilities& cap
   const auto defect = FindUnsupported(problem, capabilities);
   if (!defect) return;
   FindDefectNode(*defect, root, problem)
-      .Fail("estimator type '" + type + "' does not support " + defect->what,
+      .Fail("estimator type '" + type + "' does not support " + defect->description,
             defect->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 

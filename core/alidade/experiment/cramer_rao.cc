@@ -123,7 +123,7 @@ bool CramerRaoBound::Add(const SourceFrame& frame) {
     engine_.Process(frame);
   } else if (!is_lost_) {
     Frame at_truth = frame;
-    bool has_all = !f.blocks.waiting;
+    bool has_all = !f.blocks.has_missing;
     is_lost_ = !ReplaceByPrediction(at_truth, has_all);
     engine_.Process(at_truth);
     is_lost_ = is_lost_ || (!has_all && f.report.landmarks.initialised > 0);
@@ -143,7 +143,7 @@ bool CramerRaoBound::ReplaceByPrediction(Frame& frame, bool& has_all) const {
     if (index < 0) continue;
     const SensorBinding& sensor = f.problem_index->problem.sensors[static_cast<std::size_t>(index)];
     const SensorModel& model = *sensor.model;
-    if (f.blocks.waiting ||
+    if (f.blocks.has_missing ||
         model.Valid({measurement.values.data(), measurement.known.data()}) != Status::kOk)
       continue;
     std::vector<const double*> roles;

@@ -36,7 +36,7 @@ Frame WithoutFailedStreams(const Frame& frame, const std::vector<StreamInfo>& st
 EstimatorRun::FrameResult EstimatorRun::Process(const Frame& frame,
                                                 const std::vector<StreamInfo>& streams,
                                                 const ProcessedFrame* rolled_back) const {
-  if (rolled_back != nullptr) return {*rolled_back->after, rolled_back->report, {}};
+  if (rolled_back != nullptr) return {*rolled_back->snapshot, rolled_back->report, {}};
   Frame visible;
   const bool sees_all = failed_sensors.empty();
   if (!sees_all) visible = WithoutFailedStreams(frame, streams, spec.problem, failed_sensors);
@@ -118,10 +118,10 @@ EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& exper
   const BlockId position = PositionBlockOf(spec.problem);
   if (position >= 0) result.position_block = spec.problem.layout[position].name;
   result.unobservable = UnobservableDirections(spec.problem);
-  if (!ObservabilityIsTold(spec.problem)) {
-    result.events.push_back(
-        {kNoTimestamp, "observability",
-         "not analysed: the state has more than " + std::to_string(kMostObserved) + " elements"});
+  if (!IsObservabilityComputed(spec.problem)) {
+    result.events.push_back({kNoTimestamp, "observability",
+                             "not analysed: the state has more than " +
+                                 std::to_string(kMaxObservabilityElements) + " elements"});
   }
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoTimestamp, "unobservable",

@@ -114,7 +114,7 @@ InitialValue ReadInitial(const Node& initial, const Space& space, const std::str
   value.name = name;
   value.status = status;
   if (const auto sensor = initial.Find("from_measurement")) {
-    value.from = sensor->Text();
+    value.sensor = sensor->Text();
   } else {
     value.mean = ReadMean(initial.At("mean", "the initial value"), space.geometry);
     if (status != BlockStatus::kConstant) {
@@ -496,7 +496,7 @@ Problem ReadProblem(const Node& root, const PluginHost& host,
   if (std::ranges::none_of(problem.sensors, observes_landmarks)) problem.landmarks.reset();
   if (const auto defect = FindDefect(problem)) {
     internal::FindDefectNode(*defect, root, problem)
-        .Fail(defect->what, defect->remedy, defect->nearest);
+        .Fail(defect->description, defect->remedy, defect->nearest);
   }
   return problem;
 }

@@ -17,12 +17,12 @@ Status StatusOf(const void* model, const ModelInstance& instance, const char* na
   try {
     const std::int32_t code = call();
     if (code >= ALIDADE_OK && code < ALIDADE_ERROR) return static_cast<Status>(code);
-    return internal::NoteModelError(model, instance.error_text());
+    return internal::RecordModelError(model, instance.error_text());
   } catch (...) {
     const std::string exception_text = internal::CatchExceptionText([] { throw; });
-    return internal::NoteModelError(model, std::string(name) + " of model '" + instance.name() +
-                                               "' of plugin " + instance.plugin() +
-                                               " threw: " + exception_text);
+    return internal::RecordModelError(model, std::string(name) + " of model '" + instance.name() +
+                                                 "' of plugin " + instance.plugin() +
+                                                 " threw: " + exception_text);
   }
 }
 

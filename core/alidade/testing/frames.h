@@ -12,10 +12,10 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem.h"
 
-/// Frames for an estimator, and what came of them, for tests of filters.
+/// Helpers for tests of filters: frames, and access to reports and states.
 namespace alidade::testing {
 
-/// A stream for each sensor of the problem, in their order.
+/// Returns a stream for each sensor of the problem, in their order.
 inline std::vector<StreamInfo> StreamsOf(const Problem& problem) {
   std::vector<StreamInfo> streams;
   for (const SensorBinding& sensor : problem.sensors) {
@@ -25,7 +25,7 @@ inline std::vector<StreamInfo> StreamsOf(const Problem& problem) {
   return streams;
 }
 
-/// A frame with one scalar for each (stream, value).
+/// Returns a frame with one scalar measurement for each (stream, value).
 inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
   Frame frame;
   frame.timestamp = TimestampFromSeconds(t_s);
@@ -35,24 +35,24 @@ inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& valu
   return frame;
 }
 
-/// Whether the report has an event of this kind.
+/// Returns whether the report has an event of this kind.
 inline bool HasEvent(const UpdateReport& report, std::string_view kind) {
   return std::ranges::count(report.events, kind, &Event::kind) > 0;
 }
 
-/// The block of that name. ContractViolation if there is none.
+/// Returns the block with this name. ContractViolation for an unknown name.
 inline const Block& BlockOf(const State& state, std::string_view name) {
   const BlockId id = state.layout().Find(name);
   ALIDADE_EXPECTS(id >= 0);
   return state.layout()[id];
 }
 
-/// The value of a scalar block. ContractViolation if it is not there.
+/// Returns the value of a scalar block. ContractViolation for an unknown name.
 inline double ValueOf(const State& state, std::string_view block) {
   return state.values()[static_cast<std::size_t>(BlockOf(state, block).value_offset)];
 }
 
-/// The covariance of two scalar blocks. ContractViolation if one of them is not there.
+/// Returns the covariance of two scalar blocks. ContractViolation for an unknown name.
 inline double CovarianceOf(const State& state, std::string_view a, std::string_view b) {
   return state.covariance().Block(BlockOf(state, a).tangent_offset, 1,
                                   BlockOf(state, b).tangent_offset, 1)(0);

@@ -10,20 +10,20 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/models.h"
 
-/// Jacobians of models, by the model and by differences, for tests of models.
+/// Helpers for tests of models: Jacobians from the model and from numeric differentiation.
 namespace alidade::testing {
 
 /// Ambient values of roles or blocks, one after the other.
 using Blocks = std::vector<std::vector<double>>;
 
-/// The tangent size of all spaces together.
+/// Returns the sum of the tangent sizes of the spaces.
 inline int TangentSize(const std::vector<Space>& spaces) {
   int size = 0;
   for (const Space& space : spaces) size += space.geometry.tangent;
   return size;
 }
 
-/// The blocks as models take them; null for an empty one.
+/// Returns pointers to the blocks, as models expect them. The pointer to an empty block is null.
 inline std::vector<const double*> Pointers(const Blocks& blocks) {
   std::vector<const double*> pointers;
   for (const auto& block : blocks) pointers.push_back(block.empty() ? nullptr : block.data());
@@ -35,7 +35,7 @@ inline std::vector<double*> Pointers(Blocks& blocks) {
   return pointers;
 }
 
-/// Blocks that hold `value` everywhere.
+/// Returns blocks with all elements equal to `value`.
 inline Blocks Filled(const std::vector<Space>& spaces, double value) {
   Blocks blocks;
   for (const Space& space : spaces) {
@@ -44,32 +44,34 @@ inline Blocks Filled(const std::vector<Space>& spaces, double value) {
   return blocks;
 }
 
-/// d f / d x in the tangent of both, row-major, by central differences through (+) and (-) with one
-/// Richardson step: (4 D(h/2) - D(h)) / 3, whose error is of order h^4 f'''''.
+/// Returns d f / d x in the tangent spaces of both, row-major. x is in `inputs`, f(x) in `outputs`.
+/// Central differences by (+) and (-) with one Richardson step, (4 D(h/2) - D(h)) / 3, have an
+/// error of order h^4 f'''''.
 template <class F>
-std::vector<double> NumericJacobian(const std::vector<Space>& from, const Blocks& x,
-                                    const std::vector<Space>& to, const F& f, double h = 1e-3) {
-  const int rows = TangentSize(to), columns = TangentSize(from);
+std::vector<double> NumericJacobian(const std::vector<Space>& inputs, const Blocks& x,
+                                    const std::vector<Space>& outputs, const F& f,
+                                    double h = 1e-3) {
+  const int rows = TangentSize(outputs), columns = TangentSize(inputs);
   std::vector<double> j(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
   const Blocks center = f(x);
   const auto add = [&](std::size_t block, int k, double step, int column, double weight) {
     Blocks moved = x;
-    std::vector<double> d(static_cast<std::size_t>(from[block].geometry.tangent));
+    std::vector<double> d(static_cast<std::size_t>(inputs[block].geometry.tangent));
     d[static_cast<std::size_t>(k)] = step;
-    from[block].geometry.Plus(x[block].data(), d.data(), moved[block].data());
+    inputs[block].geometry.Plus(x[block].data(), d.data(), moved[block].data());
     const Blocks y = f(moved);
     int row = 0;
-    for (std::size_t i = 0; i < to.size(); ++i) {
-      std::vector<double> difference(static_cast<std::size_t>(to[i].geometry.tangent));
-      to[i].geometry.Minus(y[i].data(), center[i].data(), difference.data());
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      std::vector<double> difference(static_cast<std::size_t>(outputs[i].geometry.tangent));
+      outputs[i].geometry.Minus(y[i].data(), center[i].data(), difference.data());
       for (const double element : difference) {
         j[static_cast<std::size_t>(row++ * columns + column)] += weight * element;
       }
     }
   };
   int column = 0;
-  for (std::size_t block = 0; block < from.size(); ++block) {
-    for (int k = 0; k < from[block].geometry.tangent; ++k, ++column) {
+  for (std::size_t block = 0; block < inputs.size(); ++block) {
+    for (int k = 0; k < inputs[block].geometry.tangent; ++k, ++column) {
       for (const double sign : {1.0, -1.0}) {
         add(block, k, sign * h / 2, column, sign * 4.0 / (3.0 * h));
         add(block, k, sign * h, column, -sign / (6.0 * h));
@@ -79,14 +81,14 @@ std::vector<double> NumericJacobian(const std::vector<Space>& from, const Blocks
   return j;
 }
 
-/// An output that a model has to write: not a number everywhere.
+/// Returns an output with NaN in all elements, which a model has to overwrite.
 inline std::vector<double> UnwrittenOutput(int size) {
   return std::vector<double>(static_cast<std::size_t>(size),
                              std::numeric_limits<double>::quiet_NaN());
 }
 
-/// The Jacobian of h by all roles side by side, m x n row-major, as the model gives it.
-/// ContractViolation if h is not defined there.
+/// Returns the Jacobian of h that the model computes, m x n row-major, with the columns of all
+/// roles side by side. ContractViolation if h is not defined at the roles.
 inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Blocks& roles,
                                           const double* known = nullptr) {
   const int m = sensor->measurement().geometry.tangent, n = TangentSize(sensor->roles());
@@ -105,7 +107,8 @@ inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Bloc
   return j;
 }
 
-/// The same by differences. ContractViolation if h is not defined there, or 1e-3 beside it.
+/// Returns the Jacobian of h from numeric differentiation. ContractViolation if h is not defined at
+/// the roles, or at a distance of 1e-3.
 inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, const Blocks& roles,
                                                  const double* known = nullptr) {
   const auto predict = [&](const Blocks& x) {
@@ -117,15 +120,16 @@ inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, con
   return NumericJacobian(sensor->roles(), roles, {sensor->measurement()}, predict);
 }
 
-/// A step of a motion model.
+/// Step of a motion model.
 struct StepResult {
   Blocks next;
   std::vector<double> f;  ///< d next / d x, n x n row-major
   std::vector<double> g;  ///< d next / d w, n x n_w row-major
 };
 
-/// A step from x with control input u (null: the model takes none) and noise w (null: zero), with
-/// its Jacobians as the model gives them. ContractViolation if the step is not defined.
+/// Steps from x with control input u (null if the model has no control input) and noise w (null:
+/// zero). Returns x' and the Jacobians that the model computes. ContractViolation if the step is
+/// not defined.
 inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                     const double* w, double dt_s) {
   const int n = motion->tangent_size();
@@ -138,7 +142,8 @@ inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x,
   return result;
 }
 
-/// The same by differences. ContractViolation if the step is not defined there, or 1e-3 beside it.
+/// As StepWithJacobians, but with Jacobians from numeric differentiation. ContractViolation if the
+/// step is not defined at x and w, or at a distance of 1e-3.
 inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const double* u,
                               const double* w, double dt_s) {
   Space noise;
@@ -160,7 +165,7 @@ inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const
                           [&](const Blocks& drawn) { return step(x, drawn); })};
 }
 
-/// max |a_i - b_i| / (1 + |b_i|); infinite if the sizes differ or an element is not a number.
+/// Returns max |a_i - b_i| / (1 + |b_i|). Infinite if the sizes differ or an element is NaN.
 inline double LargestDifference(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (a.size() != b.size()) return kInfinity;

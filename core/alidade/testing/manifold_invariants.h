@@ -10,14 +10,14 @@
 
 #include "alidade/state/manifold.h"
 
-/// An assertion of GoogleTest about geometries. The only header of alidade that needs it.
+/// Assertion of GoogleTest for geometries. No other header of alidade needs GoogleTest.
 namespace alidade::testing {
 
-/// Whether the invariants of a manifold hold at its points x, y and for the step d, each to
-/// `tolerance`. The failure names the first that does not.
+/// Checks that the invariants of a manifold hold at its points x, y and for the step d, each to
+/// `tolerance`. The failure message names the first one that does not hold.
 ///
 ///   (1)  x (+) 0 = x
-///   (2)  (x (+) d) (-) x = d      of rotations for |d| < pi alone
+///   (2)  (x (+) d) (-) x = d      for rotations only if |d| < pi
 ///   (3)  x (+) (y (-) x) = y
 ///   (4)  x (+) d is a point of the manifold
 ///
@@ -33,9 +33,9 @@ inline ::testing::AssertionResult ManifoldInvariantsHold(const Geometry& geometr
     geometry.Plus(x.data(), step.data(), point.data());
     return point;
   };
-  const auto minus = [&](const std::vector<double>& to, const std::vector<double>& from) {
+  const auto minus = [&](const std::vector<double>& end, const std::vector<double>& start) {
     std::vector<double> step(static_cast<std::size_t>(geometry.tangent));
-    geometry.Minus(to.data(), from.data(), step.data());
+    geometry.Minus(end.data(), start.data(), step.data());
     return step;
   };
   const auto distance = [](const std::vector<double>& a, const std::vector<double>& b) {
@@ -52,7 +52,7 @@ inline ::testing::AssertionResult ManifoldInvariantsHold(const Geometry& geometr
               {"(3) x (+) (y (-) x) = y", distance(minus(plus(minus(y, x)), y), zero)},
               {"(4) x (+) d is a point of the manifold", DistanceFrom(geometry, moved.data())}};
   for (const auto& [law, defect] : laws) {
-    if (defect <= tolerance) continue;  // false for not a number
+    if (defect <= tolerance) continue;  // false if the defect is NaN
     return ::testing::AssertionFailure()
            << law << " does not hold for " << ToString(geometry) << ": off by " << defect
            << ", more than " << tolerance << "; x = " << ::testing::PrintToString(x)

@@ -151,9 +151,9 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
   const UpdateReport& report = ekf.Process(FrameOf(kDrive[1]));
   ASSERT_EQ(report.events.size(), 2u);
   EXPECT_EQ(report.events[0].text,
-            "no control input of 'car' from stream 'odometry' has come yet: steps with u = 0");
+            "no control input of 'car' from stream 'odometry' has arrived yet: steps with u = 0");
   EXPECT_EQ(report.events[1].text,
-            "a gap of 0.5 s, longer than max_dt_s = 0.1, is stepped in 5 equal parts");
+            "a gap of 0.5 s, longer than max_dt_s = 0.1, is divided into 5 equal steps");
   EXPECT_EQ(report.events[1].timestamp, 500'000'000);
 }
 

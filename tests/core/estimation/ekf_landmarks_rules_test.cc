@@ -211,7 +211,7 @@ TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
   problem.motions.push_back({"other", walk, {waits}});
   Prior prior;
   prior.block = waits;
-  prior.from = "gps";
+  prior.sensor = "gps";
   problem.priors.push_back(prior);
   problem.sensors[0].roles[0].block = waits;
   problem.AddSensor("gps", Gps(), {waits});  // which does not measure here

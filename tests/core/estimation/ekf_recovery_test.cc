@@ -412,8 +412,8 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
   };
   const std::string why = "sensor 'disparity' rejected 20 times in a row: ";
   EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "inflated the covariance of its blocks");
-  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "it corrects no block to inflate");
-  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "it corrects no block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "it has no estimated block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "it has no estimated block to inflate");
 }
 
 TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {

@@ -20,7 +20,7 @@ Problem WithAConsideredBlock() {
 
 Problem WithABlockFromAMeasurement() {
   Problem problem = DepthFilter();
-  problem.priors[0].from = "disparity";
+  problem.priors[0].sensor = "disparity";
   return problem;
 }
 
@@ -50,7 +50,7 @@ TEST(EstimatorCapabilities, NamesTheFirstThingThatIsLacking) {
                           const char* what, int block, int sensor, int role) {
     const auto found = FindUnsupported(problem, nothing);
     ASSERT_TRUE(found) << what;
-    EXPECT_EQ(found->what, what);
+    EXPECT_EQ(found->description, what);
     EXPECT_EQ(found->block, block) << what;
     EXPECT_EQ(found->sensor, sensor) << what;
     EXPECT_EQ(found->role, role) << what;

@@ -215,8 +215,8 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   ASSERT_EQ(report.events.size(), 1u);
   EXPECT_EQ(report.events[0].kind, "not_converged");
   EXPECT_EQ(report.events[0].text,
-            "an update stopped after 1 iterations where h has no Jacobian; the last iterate is "
-            "kept");
+            "an update stopped after 1 iterations because h has no Jacobian; the last iterate is "
+            "used");
   // H = 5 at the prediction: 1 / P = 1 + 1 + 25, and the step from there is P 5 (0 - 2.5^2).
   EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0 / 27.0, 1e-12);
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 2.5 - 5.0 * 6.25 / 27.0, 1e-12);

@@ -147,28 +147,28 @@ TEST(Problem, WhatIsRefusedChangesNothing) {
 TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   const StereoDisparity stereo(400.0, 0.065, 1.0);
   EXPECT_EQ(Refusal([](Problem& p, auto&) { p.AddState("target", Constant<1>(1), {}); }),
-            "state 'target' is there already");
+            "state 'target': the name is already used; expected another name");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"position", 0.0, 1.0}});
             }),
-            "state 'b' needs an initial value of 'velocity'");
+            "state 'b': no initial value of 'velocity'; expected one");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Point(1.0), {{"depth", 0.0, 1.0}, {"velocity", 0.0, 1.0}});
             }),
-            "state 'b' has no block 'depth'; its blocks are position, velocity");
+            "state 'b': no block 'depth'; expected position, velocity");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<3>(3), {{"value", {0.0, 1.0}, 1.0}});
             }),
-            "state 'b' needs 3 numbers as the initial value of 'value', a vector(3), not 2");
+            "state 'b': the initial value of 'value', a vector(3), has 2 numbers; expected 3");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, -1.0}});
             }),
-            "state 'b' needs a finite standard deviation of at least 0 with the initial value of "
-            "'value', a vector(1)");
+            "state 'b': the initial value of 'value', a vector(1), has an invalid standard "
+            "deviation; expected a finite number >= 0");
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, 1.0}, {"value", 1.0, 1.0}});
             }),
-            "state 'b' has two initial values of 'value'");
+            "state 'b': two initial values of 'value'; expected one");
   EXPECT_EQ(
       Refusal([](Problem& p, auto&) {
         p.AddState("b", Constant<3>(3),
@@ -176,40 +176,41 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
                        "value", {0.0, 0.0, 0.0},
                        Eigen::Vector3d(1.0, -1.0, 1.0).asDiagonal().toDenseMatrix())});
       }),
-      "state 'b' needs a symmetric, positive semi-definite covariance of 3 x 3 finite numbers "
-      "with the initial value of 'value', a vector(3)");
+      "state 'b': the initial value of 'value', a vector(3), has an invalid covariance; expected a "
+      "symmetric, positive semi-definite matrix of 3 x 3 finite numbers");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"]}, {.loss = {LossKind::kHuber, -1.0}});
             }),
-            "sensor 's' has a robust loss of scale -1; expected > 0");
+            "sensor 's': the robust loss has the scale -1; expected > 0");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"]}, {.owned = {{0, OwnedState::Of({})}}});
             }),
-            "sensor 's' brings no state in its role 0, which the option `owned` names");
+            "sensor 's': role 0 in the option `owned` is not a state of the sensor; expected a "
+            "role with the flag ALIDADE_ROLE_OWNED and without a block");
   EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
-            "state 'target' has no block 'depth'; its blocks are position, velocity");
+            "state 'target': no block 'depth'; expected position, velocity");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) { p.AddSensor("s", stereo, {}); }),
-            "sensor 's' needs a block that fills its role 'depth', a vector(1)");
+            "sensor 's': role 'depth' has no block; expected a vector(1)");
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"], t["velocity"]});
             }),
-            "sensor 's' has 1 role to be filled, not 2: depth");
+            "sensor 's': 2 blocks for its roles; expected 1: depth");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) {
               const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
               p.AddSensor("s", stereo, {wide["value"]});
             }),
-            "sensor 's' has a role 'depth', a vector(1); block 'wide.value' is a vector(2)");
+            "sensor 's': role 'depth' has block 'wide.value', a vector(2); expected a vector(1)");
   EXPECT_EQ(Refusal([](Problem& p, auto& t) {
               p.AddSensor("s", Scale2d::FromPixels(300.0, 1.0), {t["position"], t["position"]});
             }),
-            "sensor 's' has block 'target.position' in two roles; expected one for each");
+            "sensor 's': block 'target.position' fills two roles; expected one block for each");
   EXPECT_EQ(
       Refusal([&](Problem& p, auto& t) {
         p.AddSensor("a", stereo, {t["position"]}, {.stream = "camera"});
         const auto wide = p.AddState("wide", Constant<3>(3), {{"value", {0.0, 0.0, 0.0}, 1.0}});
         p.AddSensor("b", Pseudorange(1.0), {wide["value"]}, {.stream = "camera"});
       }),
-      "sensor 'b' reads 1 and 3 known numbers from stream 'camera', and another 1 and 0 known "
+      "sensor 'b': stream 'camera' has size 1 and 0 known numbers; expected size 1 and 3 known "
       "numbers");
   EXPECT_EQ(
       Refusal([](Problem& p, auto&) {
@@ -217,8 +218,8 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
             "b", Constant<3>(3),
             {InitialValue::WithCovariance("value", {0.0, 0.0, 0.0}, Eigen::Matrix2d::Identity())});
       }),
-      "state 'b' needs a symmetric, positive semi-definite covariance of 3 x 3 finite numbers "
-      "with the initial value of 'value', a vector(3)");
+      "state 'b': the initial value of 'value', a vector(3), has an invalid covariance; expected a "
+      "symmetric, positive semi-definite matrix of 3 x 3 finite numbers");
 }
 
 TEST(Problem, AFilterRefusesABlockThatCannotStart) {
@@ -239,7 +240,8 @@ TEST(Problem, AFilterRefusesABlockThatCannotStart) {
             "sensor of this estimator; did you mean 'stereo'?");
   EXPECT_EQ(refusal("velocity", "stereo"),
             "Ekf: from_measurement: sensor 'stereo' does not determine this block (block "
-            "'target.velocity'); expected a sensor whose inverse measurement model is this block");
+            "'target.velocity'); expected a sensor whose inverse measurement model determines this "
+            "block");
 }
 
 TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
@@ -251,7 +253,7 @@ TEST(Problem, AFilterRefusesACycleOfFirstMeasurements) {
   problem.AddSensor("b_by_a", Scale2d::FromPixels(300.0, 1.0), {a["value"], b["value"]});
   EXPECT_EQ(RefusalOf([&] { Ekf filter(problem); }),
             "Ekf: from_measurement: cyclic: a.value <- b.value <- a.value (block 'a.value'); "
-            "expected one block of the cycle with a mean of its own");
+            "expected a mean for one block of the cycle");
 }
 
 TEST(Problem, AFilterRefusesARoleThatNoMeasurementImplies) {

@@ -84,7 +84,7 @@ void ExpectTheBitsOfTheInOrderRun(const Options& options) {
   for (const Frame& frame : Delayed(frames, kWindow_s)) {
     for (const ProcessedFrame& one : late.Process(frame)) {
       found[one.frame.timestamp] = Text(one.report);
-      EXPECT_EQ(one.after->timestamp(), one.frame.timestamp);
+      EXPECT_EQ(one.snapshot->timestamp(), one.frame.timestamp);
       ++processed;
     }
   }
@@ -222,7 +222,7 @@ TEST(Snapshots, AnEstimatorThatThrowsLeavesThemAsTheyWere) {
                Error);
   EXPECT_EQ(SumOf(sum), 3.0);
   ASSERT_EQ(snapshots.frames().size(), 2u);
-  EXPECT_EQ(SumOf(snapshots.frames()[1].after), 3.0);
+  EXPECT_EQ(SumOf(snapshots.frames()[1].snapshot), 3.0);
 }
 
 TEST(Snapshots, AFailedEstimatorTakesNoMoreFrames) {
@@ -231,9 +231,9 @@ TEST(Snapshots, AFailedEstimatorTakesNoMoreFrames) {
   snapshots.Replace(0, {FrameAt(0.0, {{0, 101.0}}), FrameAt(1.0, {{0, 2.0}})}, sum);
   EXPECT_EQ(SumOf(sum), 101.0);
   snapshots.Release();
-  EXPECT_EQ(SumOf(snapshots.released().after), 101.0);
+  EXPECT_EQ(SumOf(snapshots.released().snapshot), 101.0);
   ASSERT_EQ(snapshots.frames().size(), 1u);
-  EXPECT_TRUE(snapshots.frames()[0].after->failed());
+  EXPECT_TRUE(snapshots.frames()[0].snapshot->failed());
 }
 
 }  // namespace

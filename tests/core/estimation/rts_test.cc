@@ -199,7 +199,7 @@ TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
   considered.layout = layout;
   EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), Error);
   Problem waiting = DepthFilter();
-  waiting.priors[0].from = "disparity";
+  waiting.priors[0].sensor = "disparity";
   EXPECT_THROW(RtsSmoother(waiting, {}, StreamsOf(waiting)), Error);
 }
 

@@ -153,7 +153,7 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
   AddMotion(still, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(still, "z", LinearSensor(1.0, 0.1), {"p.x"});
   const BlockId offset = AddOffset(still, 0.0, 0.1);
-  EXPECT_NE(internal::OffsetInTime(still, offset, still.sensors[0]).find("sees the same"),
+  EXPECT_NE(internal::OffsetInTime(still, offset, still.sensors[0]).find("has no effect"),
             std::string::npos);
   Problem moving = testing::MovingPoint();
   AddSensor(moving, "z", LinearSensor(1.0, 0.1), {"p.x"});

@@ -43,7 +43,7 @@ TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   Problem problem = LinearSystem();
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(problem, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
-  problem.priors.back().from = "y";
+  problem.priors.back().sensor = "y";
   const auto process = [&](const std::vector<std::pair<int, double>>& values, bool fails) {
     const auto batch = MakeBatch(problem, "solver: dense\nmax_dt_s: 0.001\n");
     batch->Process(FrameAt(0.0, {}));
@@ -129,7 +129,7 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   AddSensor(problem, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
-  problem.priors.back().from = "y";
+  problem.priors.back().sensor = "y";
   const auto batch = MakeBatch(problem);
   Failing::budget = 0;
   std::vector<std::string> said;

@@ -27,7 +27,7 @@ Problem ConstantSystem(BlockStatus status) {
 }
 Problem StartsFromItsSensor() {
   Problem problem = ConstantSystem(BlockStatus::kEstimated);
-  problem.priors[0].from = "z";
+  problem.priors[0].sensor = "z";
   return problem;
 }
 

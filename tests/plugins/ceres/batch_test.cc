@@ -230,7 +230,7 @@ TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
 // correlation.
 TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
-  problem.priors[0].from = "z";
+  problem.priors[0].sensor = "z";
   std::vector<Frame> frames = LinearFrames(30);
   frames[0].measurements.clear();
   frames[1].measurements.clear();

@@ -151,7 +151,7 @@ TEST(FixedLag, WhatIsKnownStays) {
 // The first value of p.x comes from the third frame, after two have left no trace of it.
 TEST(FixedLag, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
-  problem.priors[0].from = "z";
+  problem.priors[0].sensor = "z";
   std::vector<Frame> frames = LinearFrames(30);
   for (std::size_t k = 0; k < 4; ++k)
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.stream == 0; });

@@ -61,8 +61,8 @@ std::string SigmasText(const Eigen::MatrixXd& covariance) {
 }
 
 std::string PriorText(const Prior& prior, const Block& block) {
-  const bool measured = !prior.from.empty();
-  std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
+  const bool measured = !prior.sensor.empty();
+  std::string text = measured ? "first measurement of " + prior.sensor : ListText(prior.mean);
   if (block.status == BlockStatus::kConstant) return text + ", exact";
   if (measured) return text;
   return text + " +- " + SigmasText(prior.covariance);
@@ -236,9 +236,9 @@ std::string Unobservable(const Problem& problem) {
   if (problem.landmarks && !internal::PlaceLandmarks(problem)) {
     return "  observability depends on the landmarks\n";
   }
-  if (!internal::ObservabilityIsTold(problem)) {
+  if (!internal::IsObservabilityComputed(problem)) {
     return "  observability is not analysed: the state has more than " +
-           std::to_string(internal::kMostObserved) + " elements\n";
+           std::to_string(internal::kMaxObservabilityElements) + " elements\n";
   }
   const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(problem);
   std::map<std::vector<std::string>, int> directions;

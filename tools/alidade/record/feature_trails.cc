@@ -9,7 +9,7 @@ namespace alidade::internal {
 Mark MarkOf(Outcome outcome) {
   const OutcomeInfo& info = InfoOf(outcome);
   return outcome == Outcome::kAccepted ? Mark::kAccepted
-         : info.starts                 ? Mark::kNew
+         : info.is_initialisation      ? Mark::kNew
          : info.is_gated               ? Mark::kRejected
                                        : Mark::kUnused;
 }

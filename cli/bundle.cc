@@ -152,7 +152,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
                                                     : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
-  const double before = BundleRms(*sensor, file.problem);
+  const double rms_before = BundleRms(*sensor, file.problem);
 
   Progress progress("iterations", arguments.quiet);
   BundleOptions options;
@@ -161,21 +161,21 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   for (const std::string& list : arguments.fixed)
     for (const std::string& name : SplitNames(list)) options.fixed.push_back(name);
   options.stop = StopRequested;
-  options.progress = [&](int done) { progress.Show(done, -1); };
+  options.progress = [&](int iteration) { progress.Show(iteration, -1); };
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
   const BundleResult result = AdjustBundle(*sensor, file.problem, options);
   progress.Clear();
-  const double after = BundleRms(*sensor, file.problem);
+  const double rms_after = BundleRms(*sensor, file.problem);
 
   std::string text = Describe(file, left_out) + '\n';
-  text += "rms " + Short(before) + " px -> " + Short(after) + " px, " + ToString(result.end) +
-          " after " + std::to_string(result.iterations) + " iterations, " +
+  text += "rms " + Short(rms_before) + " px -> " + Short(rms_after) + " px, " +
+          ToString(result.end) + " after " + std::to_string(result.iterations) + " iterations, " +
           std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
           " unknowns\n";
   for (const std::string& line : DescribeUndetermined(file.problem, *sensor, result))
     text += line + '\n';
   if (folder && result.end != BundleEnd::kFailed) {
-    const std::vector<std::string> names = folder->Save(file, result, before, after);
+    const std::vector<std::string> names = folder->Save(file, result, rms_before, rms_after);
     text += "wrote " + arguments.folder + '\n';
     for (const std::string& name : names)
       text += "  " + (std::filesystem::path(arguments.folder) / name).string() + '\n';

@@ -84,7 +84,7 @@ void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
 }
 
-/// `83 s`, `12 min`, `3.4 h`
+/// Formats a duration: `83 s`, `12 min`, `3.4 h`.
 std::string DurationText(double s) {
   if (s < 120.0) return internal::RoundedText(s, 2) + " s";
   return s < 7200.0 ? internal::RoundedText(s / 60.0, 2) + " min"

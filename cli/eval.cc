@@ -156,7 +156,7 @@ ExitCode RunEval(const EvalArguments& arguments) {
   return code;
 }
 
-/// Rejects options that exclude each other.
+/// Rejects options that are invalid together.
 void CheckCombinations(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {

@@ -155,7 +155,7 @@ PluginHost Input::Host(const Config& loaded) const {
 
 PluginHost Input::HostFor(const Config& loaded, const std::vector<Config>& other_configs) const {
   std::set<std::string> names = KeysAndScalarsOf(loaded);
-  for (const Config& other : other_configs) names.merge(KeysAndScalarsOf(other));
+  for (const Config& other_config : other_configs) names.merge(KeysAndScalarsOf(other_config));
   return PluginHost(PluginPathsOf(*this, loaded), OnRefusal::kThrow, names);
 }
 
@@ -222,7 +222,8 @@ fs::path PreferredFolder(const std::string& requested, const Config& config, con
   return fs::path(kRuns) / (prefix + DefaultOutputName(input.config));
 }
 
-/// `folder`, or the first of FOLDER-2, FOLDER-3, ... that neither exists nor is being written.
+/// Returns `folder`, or the first of FOLDER-2, FOLDER-3, ... that neither exists nor is being
+/// written.
 fs::path FreeFolder(const fs::path& folder) {
   const auto exists = [](const fs::path& path) {
     std::error_code error;

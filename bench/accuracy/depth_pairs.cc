@@ -178,12 +178,12 @@ std::vector<double> Report(const char* title, const Bench& bench, const Settings
   std::vector<double> differences;
   for (const std::string& file : files) {
     const RmseByEstimator masked = bench.Rmse(file, settings, true);
-    const RmseByEstimator whole = bench.Rmse(file, settings, false);
+    const RmseByEstimator unmasked = bench.Rmse(file, settings, false);
     const PairSeries series = bench.Read(file);
     const double fused = masked.at("fused"), line = LineRmse(series);
     table.Add(series.name,
               {fused, line, masked.at("stereo_only"), masked.at("hold_last"), AnchoredRmse(series),
-               BestConstantRmse(series), whole.at("fused"), whole.at("stereo_only")});
+               BestConstantRmse(series), unmasked.at("fused"), unmasked.at("stereo_only")});
     differences.push_back(std::log(fused / line));
   }
   table.Medians();

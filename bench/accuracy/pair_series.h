@@ -54,8 +54,8 @@ inline double LineRmse(const PairSeries& series) {
 }
 
 /// Returns the RMSE [m] in the blind half of Z = Za sa / s, with the reference depth Za and the
-/// scale sa of the last row that stereo sees: the error that the drift of the scale adds to an
-/// exact depth.
+/// scale sa of the last row that stereo sees. This is the error that the drift of the scale adds to
+/// an exact depth.
 inline double AnchoredRmse(const PairSeries& series) {
   const PairRow& last = series.rows[series.seen_count - 1];
   return BlindRmse(series, last.depth_m * last.scale);

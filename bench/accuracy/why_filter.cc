@@ -227,9 +227,9 @@ void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
         "unset logscale y", "column('bits')");
   std::filesystem::create_directories(folder / "figures");
   std::ofstream(folder / "figures" / "why_filter.gp") << script.Text();
-  const auto drawn = alidade::internal::RunGnuplot(folder, {"figures/why_filter.gp"}, {});
-  if (drawn.end == alidade::internal::GnuplotResult::End::kFailed) {
-    std::fprintf(stderr, "%s\n", drawn.complaint.c_str());
+  const auto gnuplot = alidade::internal::RunGnuplot(folder, {"figures/why_filter.gp"}, {});
+  if (gnuplot.end == alidade::internal::GnuplotResult::End::kFailed) {
+    std::fprintf(stderr, "%s\n", gnuplot.complaint.c_str());
   }
 }
 

@@ -261,8 +261,8 @@ Times TimeBatch(const Scene& scene, int iterations) {
   }
   ceres_batch::KktSystem kkt(run);
   Eigen::VectorXd z = kkt.Join(Eigen::VectorXd::Zero(run.shape().inputs));
-  const auto require = [&](bool done) {
-    if (!done) throw std::runtime_error("the batch failed: " + run.problem());
+  const auto require = [&](bool succeeded) {
+    if (!succeeded) throw std::runtime_error("the batch failed: " + run.problem());
   };
   require(kkt.LineariseAbout(linearisation_trajectory, z) && kkt.Solve());
   z += kkt.step().dz;
@@ -270,12 +270,12 @@ Times TimeBatch(const Scene& scene, int iterations) {
   Times times;
   const double begin = NowS();
   for (int i = 0; i < iterations; ++i) {
-    double now = NowS();
+    double start_s = NowS();
     require(kkt.Linearise(z, 0.0));
-    times.linearise_s += (NowS() - now) / iterations;
-    now = NowS();
+    times.linearise_s += (NowS() - start_s) / iterations;
+    start_s = NowS();
     require(kkt.Solve());
-    times.solve_s += (NowS() - now) / iterations;
+    times.solve_s += (NowS() - start_s) / iterations;
     z += kkt.step().dz;
     require(kkt.Cost(z).has_value());
   }
@@ -295,10 +295,10 @@ Times TimeBatch(const Scene& scene, int iterations) {
 struct PoseManifold : ceres::Manifold {
   int AmbientSize() const override { return 7; }
   int TangentSize() const override { return 6; }
-  bool Plus(const double* x, const double* d, double* moved) const override {
-    for (int i = 0; i < 3; ++i) moved[i] = x[i] + d[i];
+  bool Plus(const double* x, const double* d, double* x_plus_d) const override {
+    for (int i = 0; i < 3; ++i) x_plus_d[i] = x[i] + d[i];
     const Quaterniond q(x[6], x[3], x[4], x[5]);
-    Eigen::Map<Quaterniond>{moved + 3} = (q * Exp({d[3], d[4], d[5]})).normalized();
+    Eigen::Map<Quaterniond>{x_plus_d + 3} = (q * Exp({d[3], d[4], d[5]})).normalized();
     return true;
   }
   bool PlusJacobian(const double*, double* jacobian) const override {

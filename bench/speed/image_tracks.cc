@@ -132,7 +132,7 @@ class Times {
 
   void Print() const {
     const double lk = lk_.Mean(), front_end = next_.Mean() - read_.Mean();
-    const double both = front_end + filter_.Mean();
+    const double total = front_end + filter_.Mean();
     const char* const name = is_guided_ ? "guided" : "not guided";
     std::printf("%s, %.0f features per frame\n", name, features_ / frames_);
     std::printf("%-40s %8s %8s\n", "CPU time per frame", "ms", "to LK");
@@ -156,11 +156,11 @@ class Times {
     }
     line("  align, check, search for new ones", remaining_ns);
     line("filter", filter_.Mean());
-    line("front end and filter", both);
+    line("front end and filter", total);
     const std::string prefix = is_guided_ ? "guided_" : "";
     std::printf("ratio %sfront_end/lk %.3f\n", prefix.c_str(), front_end / lk);
     std::printf("ratio %sfilter/lk %.3f\n", prefix.c_str(), filter_.Mean() / lk);
-    std::printf("ratio %sfront_end_and_filter/lk %.3f\n", prefix.c_str(), both / lk);
+    std::printf("ratio %sfront_end_and_filter/lk %.3f\n", prefix.c_str(), total / lk);
   }
 
  private:
@@ -206,8 +206,8 @@ int Main(int argc, char** argv) {
   const auto scene = CreateSource(host, Config::FromFile(example + "/scene.yaml"), 1);
   SourceFrame frame;
   for (int k = 0; scene->Next(frame); ++k) {
-    GreyImage drawn = scene->Draw(0);
-    const cv::Mat image(drawn.height, drawn.width, CV_8UC1, drawn.pixels.data());
+    GreyImage grey_image = scene->Draw(0);
+    const cv::Mat image(grey_image.height, grey_image.width, CV_8UC1, grey_image.pixels.data());
     if (!cv::imwrite(FileOf(temporary.path(), k), image)) throw std::runtime_error("cannot write");
   }
   Config config = Config::FromFile(example + "/config.yaml");

@@ -12,9 +12,9 @@ namespace alidade::ceres_batch {
 template <class G>
 void Difference(const double* z, const double* h, double* d, double* j) {
   using Jet = alidade::Jet<double, G::kTangent>;
-  Jet moved[G::kAmbient], difference[G::kTangent];
-  alidade::detail::LiftBlock<G>(h, 0, moved);
-  G::Minus(z, moved, difference);
+  Jet h_jet[G::kAmbient], difference[G::kTangent];
+  alidade::detail::LiftBlock<G>(h, 0, h_jet);
+  G::Minus(z, h_jet, difference);
   for (int i = 0; i < G::kTangent; ++i) {
     d[i] = difference[i].a;
     if (j != nullptr) std::copy_n(difference[i].v, G::kTangent, j + i * G::kTangent);

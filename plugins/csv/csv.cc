@@ -222,16 +222,18 @@ class CsvSource : public Source {
     }
     const Timestamp timestamp =
         cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
-    const bool same = timestamp == last_timestamp_;
+    const bool is_same_time = timestamp == last_timestamp_;
     if (!any_order_ && rows_ > 0 && timestamp <= last_timestamp_ &&
-        !(same && layout_.time_repeats)) {
-      const bool late = timestamp < last_timestamp_;
+        !(is_same_time && layout_.time_repeats)) {
+      const bool is_earlier = timestamp < last_timestamp_;
       FailCell(
-          column, (late ? "is before line " : "is equal to line ") + std::to_string(last_line_),
-          late ? "increasing times, or 'out_of_sequence.policy: buffer' or 'rollback'"
-               : "increasing times, or 'time.repeats: true', which joins rows of one time into a "
-                 "frame, or 'out_of_sequence.policy: buffer', which joins rows of different "
-                 "streams");
+          column,
+          (is_earlier ? "is before line " : "is equal to line ") + std::to_string(last_line_),
+          is_earlier
+              ? "increasing times, or 'out_of_sequence.policy: buffer' or 'rollback'"
+              : "increasing times, or 'time.repeats: true', which joins rows of one time into a "
+                "frame, or 'out_of_sequence.policy: buffer', which joins rows of different "
+                "streams");
     }
     return timestamp;
   }

@@ -32,8 +32,7 @@ inline constexpr const char* kCsvKeys =
 ///
 /// Keys         kCsvKeys.
 /// Errors       kBadData with file, line and column of the first invalid cell; kInputMissing; kIo
-/// if
-///              the file changes during the run; kBadConfig.
+///              if the file changes during the run; kBadConfig.
 std::unique_ptr<Source> CreateCsv(const SourceArguments& arguments);
 
 }  // namespace alidade

@@ -101,21 +101,22 @@ class DepthTarget : public Source {
 
     const double exact_px = bf_px_m_ / depth_m;
     const double disparity_px = exact_px + sigma_disparity_px_ * disparity_noise_.Normal();
-    const bool sees = !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
+    const bool is_in_range =
+        !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
     // Poor texture: no match, or a wrong match anywhere in the search range.
     const double nearest_px = bf_px_m_ / (depth_mean_m_ - amplitude_m_);
-    const bool missing = texture_.Uniform() < missing_;
-    const bool wrong = texture_.Uniform() < outlier_share_;
+    const bool is_missing = texture_.Uniform() < missing_;
+    const bool is_wrong = texture_.Uniform() < outlier_share_;
     const double anywhere_px = std::min(nearest_px, disparity_limit_px_) * texture_.Uniform();
-    const double matched_px = wrong ? anywhere_px : disparity_px;
+    const double matched_px = is_wrong ? anywhere_px : disparity_px;
     const double exact_scale = template_depth_m_ / depth_m;
     const double scale = exact_scale + relative_sigma_ / exact_scale * scale_noise_.Normal();
 
     frame.measurements.clear();
-    if (sees && !missing) Emit(kDisparity, matched_px, frame);
-    if (!missing) Emit(kDisparityAll, matched_px, frame);
+    if (is_in_range && !is_missing) Emit(kDisparity, matched_px, frame);
+    if (!is_missing) Emit(kDisparityAll, matched_px, frame);
     Emit(kInverseScale, 1.0 / scale, frame);
-    Emit(sees ? kInverseScaleSeeing : kInverseScaleBlind, 1.0 / scale, frame);
+    Emit(is_in_range ? kInverseScaleSeeing : kInverseScaleBlind, 1.0 / scale, frame);
     return true;
   }
 

@@ -11,7 +11,7 @@ namespace alidade {
 /// and a tracker measures the size of its image.
 ///
 ///   truth      Z(t) = Zm + A sin(2 pi f t),   Zdot = dZ/dt,   lambda = 1 / Z0
-///   stereo     d = F B / Z + sigma_d n1,   n1 ~ N(0, 1);   seen unless d > F B / Zn
+///   stereo     d = F B / Z + sigma_d n1,   n1 ~ N(0, 1);   emitted unless d > F B / Zn
 ///   size       scale = Z0 / Z + (2 sigma_e / (w Z0 / Z)) n2,   n2 ~ N(0, 1);   emitted: 1 / scale
 ///
 ///   symbol   parameter           unit  frame  2017   meaning
@@ -40,13 +40,13 @@ namespace alidade {
 /// n1 and n2 come from streams 0 and 1 of the seed. Each sample draws one of each, regardless of
 /// the measurements that are emitted.
 ///
-/// In the images the target is a textured square of w Z0 / F metres that faces the pair, on the
-/// axis of the left camera, in front of a textured wall. Images have image.width times image.height
-/// pixels and their principal points in the middle. Image noise comes from stream 2 of the seed;
-/// missing and wrong disparities come from stream 3.
+/// In the images the target is a textured square of w Z0 / F metres that faces the pair. It is on
+/// the axis of the left camera, in front of a textured wall. Images have image.width times
+/// image.height pixels and their principal points in the middle. Image noise comes from stream 2 of
+/// the seed; missing and wrong disparities come from stream 3.
 ///
-/// Differences from the notebook: it applies the threshold to the NOISY disparity, so the accepted
-/// disparities are biased: by -0.85 px if F B / Z is within 1 px of the limit, by -0.33 px within 3
+/// Differences from the notebook: it applies the threshold to the NOISY disparity. This biases the
+/// accepted disparities: by -0.85 px if F B / Z is within 1 px of the limit, by -0.33 px within 3
 /// px (sigma_d 1 px, example 01). `blind_test: true_depth` applies the threshold to F B / Z
 /// instead. The text of the notebook has 25 cm and 1 Hz; its code has 30 cm and 0.4 Hz, the
 /// defaults here. The notebook replaces a blind disparity by 1e9 px; here it is missing. Its scale

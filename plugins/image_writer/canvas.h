@@ -85,8 +85,7 @@ class Canvas {
             double size = 0.45, Align align = Align::kLeft, int thickness = 1) {
     std::string ascii;
     for (const char c : text) {
-      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U)
-        continue;  // continuation of a UTF-8 letter
+      if ((static_cast<unsigned char>(c) & 0xC0U) == 0x80U) continue;  // UTF-8 continuation
       ascii += c >= ' ' && c <= '~' ? c : '?';
     }
     int baseline = 0;

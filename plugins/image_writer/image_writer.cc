@@ -97,8 +97,7 @@ class VideoWriter : public MatWriter {
   /// Returns true if the file is as long as its RIFF header states. OpenCV does not report failed
   /// writes.
   bool IsComplete() const {
-    constexpr std::uintmax_t kHeaderSize =
-        8;  // bytes: "RIFF" and the number of the remaining bytes
+    constexpr std::uintmax_t kHeaderSize = 8;  // "RIFF" and the number of remaining bytes
     unsigned char header[kHeaderSize] = {};
     std::ifstream(destination_.path, std::ios::binary)
         .read(reinterpret_cast<char*>(header), sizeof header);

@@ -12,9 +12,8 @@ namespace alidade {
 
 /// Image writer that draws each frame. A derived class writes or shows the image.
 ///
-/// Pixels (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px, with the
-/// number of the frame in dark grey at the lower left. The centre of the upper left pixel is (0,
-/// 0).
+/// Pixels (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px. The number
+/// of the frame is at the lower left, in dark grey. The centre of the upper left pixel is (0, 0).
 class MatWriter : public ImageWriter {
  public:
   /// Size of the images that are drawn from points, px.

@@ -111,8 +111,8 @@ class Models : public Source {
     Eigen::VectorXd n(p.rows());
     for (double& value : n) value = random.Normal();
     n = root.vectorD().cwiseMax(0.0).cwiseSqrt().cwiseProduct(n);
-    const Eigen::VectorXd drawn = root.matrixL() * n;
-    return root.transpositionsP().transpose() * drawn;
+    const Eigen::VectorXd sample = root.matrixL() * n;
+    return root.transpositionsP().transpose() * sample;
   }
 
   void DrawStart(const Node& entry, std::uint64_t seed) {
@@ -361,9 +361,9 @@ class Models : public Source {
     const auto n = static_cast<Eigen::Index>(motion.w.size());
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(n, n);
     const Status status = motion.binding->model->SqrtQ(blocks.data(), input, dt_s_, l.data());
-    Eigen::VectorXd drawn(n);
-    for (double& value : drawn) value = motion.noise.Normal();
-    Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;
+    Eigen::VectorXd sample(n);
+    for (double& value : sample) value = motion.noise.Normal();
+    Eigen::VectorXd::Map(motion.w.data(), n) = l * sample;
     motion.is_noise_held = true;
     return status;
   }

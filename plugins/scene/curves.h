@@ -19,7 +19,8 @@ using Quaternion = std::array<double, 4>;  ///< w x y z
 ///          = 6 ((y_i+1 - y_i) / h_i - (y_i - y_i-1) / h_i-1),   M_0 = M_n = 0
 ///
 /// A single point is constant; two points form a straight line. The outer cubics continue beyond
-/// the ends. Source       [Press2007] sec. 3.3.
+/// the ends.
+/// Source       [Press2007] sec. 3.3.
 class CubicSpline {
  public:
   /// `times_s` and `points` have the same size, at least one.
@@ -45,7 +46,8 @@ class CubicSpline {
 /// so that the angular velocity at q_i is omega_i. omega_i is the mean of the rates of the
 /// rotations Log(q_i^-1 q_i+1) before and after q_i, each weighted with the duration of the other.
 /// At the ends it is the rate of the only rotation. Two key frames form a slerp, and so do several
-/// with the same rate about the same axis. Source       [Kim1995] sec. 4.
+/// with the same rate about the same axis.
+/// Source       [Kim1995] sec. 4.
 class RotationCurve {
  public:
   /// `times_s` and `values` have the same size, at least one; the values are unit quaternions.

@@ -21,7 +21,7 @@ Quaternion ReadQuaternion(const Node& node);
 /// Reads the orientation of a key frame, in one of four forms:
 ///
 ///   euler_deg: [x, y, z]          R = Rz(z) Ry(y) Rx(x)
-///   matrix: [[,,], [,,], [,,]]    R, orthonormal to 1e-3, determinant 1; made the nearest rotation
+///   matrix: [[,,], [,,], [,,]]    R, orthonormal to 1e-3, det 1; replaced by the nearest rotation
 ///   axis_angle_deg: [x, y, z, a]  rotation by a about (x, y, z), of any length above 0
 ///   quaternion: {w, x, y, z}      Hamilton, unit
 Quaternion ReadOrientation(const Node& node);

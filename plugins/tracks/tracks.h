@@ -36,8 +36,7 @@ inline constexpr const char* kTracksKeys =
 ///
 /// Keys         kTracksKeys.
 /// Errors       kBadData with file, line and column of the first invalid row; kInputMissing; kIo if
-/// a
-///              file changes while it is read; kBadConfig.
+///              a file changes while it is read; kBadConfig.
 std::unique_ptr<Source> CreateTracks(const SourceArguments& arguments);
 
 }  // namespace alidade

@@ -76,8 +76,8 @@ struct SensorTraits<SensorModel> {
 
 }  // namespace detail
 
-/// Common data of the costs with the same sensor, the same places of its roles in the parameter
-/// blocks, and the same noise, given as W = L^-1 with R = L L'.
+/// Common data of all costs of a kind: the sensor, the places of its roles in the parameter blocks,
+/// and the noise, given as W = L^-1 with R = L L'.
 template <class Sensor>
 struct CostKind {
   using Traits = detail::SensorTraits<Sensor>;

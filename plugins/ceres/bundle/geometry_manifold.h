@@ -78,11 +78,11 @@ class GeometryManifold : public ceres::Manifold {
     std::fill_n(j, ambient_ * tangent_, 0.0);
     int row = 0, column = 0;
     for (const Part& part : parts_) {
-      const int moved = part.constant ? 0 : part.geometry.tangent;
-      for (int i = 0; i < moved; ++i)
+      const int free_size = part.constant ? 0 : part.geometry.tangent;
+      for (int i = 0; i < free_size; ++i)
         j[(row + i) * row_stride + (column + i) * column_stride] = 1.0;
       row += part.geometry.ambient;
-      column += moved;
+      column += free_size;
     }
   }
 

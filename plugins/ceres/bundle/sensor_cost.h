@@ -100,11 +100,11 @@ class SensorCost final : public ceres::CostFunction {
     Whiten(residuals, 1, -1.0);
     for (std::size_t i = 0; jacobians != nullptr && i < kind_.sizes.size(); ++i) {
       for (int c = 0; jacobians[i] != nullptr && c < kind_.sizes[i]; ++c) {
-        double before[m];
-        for (int r = 0; r < m; ++r) before[r] = jacobians[i][r * kind_.sizes[i] + c];
+        double column[m];
+        for (int r = 0; r < m; ++r) column[r] = jacobians[i][r * kind_.sizes[i] + c];
         for (int r = 0; r < m; ++r) {
           double sum = 0.0;
-          for (int k = 0; k < m; ++k) sum += slope[r * m + k] * before[k];
+          for (int k = 0; k < m; ++k) sum += slope[r * m + k] * column[k];
           jacobians[i][r * kind_.sizes[i] + c] = sum;
         }
       }

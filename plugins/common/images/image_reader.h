@@ -13,8 +13,9 @@
 
 namespace alidade {
 
-/// Reader of 8-bit grey images, one at a time: of a folder, in the order of their names (2.png
-/// before 10.png), of a video, or of a camera (a device such as /dev/video0) as it captures them.
+/// Reader of 8-bit grey images, one at a time: of a folder, a video or a camera. The images of a
+/// folder are in the order of their names (2.png before 10.png). A camera is a device such as
+/// /dev/video0; its images are those that it captures.
 ///
 /// Errors       kInputMissing: no such path, no image in the folder. kBadData, with the file: an
 ///              image that cannot be decoded, is cut short, or has another size than the first.

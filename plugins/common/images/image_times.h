@@ -19,10 +19,8 @@ namespace alidade {
 /// from the clock. The constructor reads a whole table.
 ///
 /// Errors       kBadData with file and line, if an image has no time, if times do not increase, or
-/// if
-///              a table by number has a time without an image: with a missing image, the times of
-///              the images after it would be wrong.
-///              those after it the times of others.
+///              if a table by number has a time without an image. With a missing image, the times
+///              of the images after it would be wrong.
 class ImageTimes {
  public:
   /// Times by the clock, counted from the first image, for a live camera.

@@ -42,10 +42,10 @@ struct Disparity {
   double value, variance;
 };
 
-/// Finds the target in `box` of the left image in the same rows of the right image: by correlation
-/// at each disparity, then by alignment, whose shear allows for a slanted target. `middle` is the
-/// point of the disparity. Returns nullopt without texture, without a match, with two matches, or
-/// if a part of the target is not visible.
+/// Finds the target in `box` of the left image in the same rows of the right image. It correlates
+/// at each disparity, then aligns the target; the shear allows for a slanted target. `middle` is
+/// the point of the disparity. Returns nullopt without texture, without a match, with two matches,
+/// or if a part of the target is not visible.
 inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat& right,
                                               const cv::Rect2d& box, cv::Point2d middle,
                                               const DisparityOptions& options) {

@@ -100,11 +100,12 @@ class ImageTarget : public Source {
   }
   bool measures_images() const override { return true; }
   MeasuredImage LastImage() const override {
-    MeasuredImage seen{ToGreyImage(image_[0])};
+    MeasuredImage measured_image{ToGreyImage(image_[0])};
     if (const auto corners = tracker_->outline()) {
-      for (const cv::Point2f& corner : *corners) seen.outline.push_back({corner.x, corner.y});
+      for (const cv::Point2f& corner : *corners)
+        measured_image.outline.push_back({corner.x, corner.y});
     }
-    return seen;
+    return measured_image;
   }
   std::optional<Config> Calibration() const override {
     if (!rectification_) return std::nullopt;

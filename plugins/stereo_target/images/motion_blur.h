@@ -54,8 +54,8 @@ struct MotionBlur {
   }
 
   /// Returns true if this blur fits a motion of the patch by `motion`, px of the patch, since the
-  /// previous image: along it, and 0.4 to 1.4 times as long. The blur is shorter for a short
-  /// exposure, and longer if the motion accelerates.
+  /// previous image. The blur must be along the motion, and 0.4 to 1.4 times as long. It is shorter
+  /// for a short exposure, and longer if the motion accelerates.
   bool Explains(cv::Point2d motion, cv::Size size) const {
     constexpr double kMinAlignment = 0.8, kMinRatio = 0.4, kMaxRatio = 1.4;
     if (length == 0.0) return true;

@@ -71,8 +71,8 @@ class TargetTemplate {
     return cv::getPerspectiveTransform(corners().data(), outline.data());
   }
 
-  /// Returns integral of |gradient|^2 / variance of the grey. It is smaller for a blurred patch,
-  /// and independent of light and size.
+  /// Returns the integral of |gradient|^2 / variance of the grey. It is smaller for a blurred
+  /// patch, and independent of light and size.
   double Sharpness() const {
     cv::Mat right, down;
     cv::Sobel(patch_, right, CV_32F, 1, 0, 3, 0.125);

@@ -238,9 +238,11 @@ class TargetTracker {
   }
 
   /// Returns the size of the target when the template was recorded / its size under `warp`. For a
-  /// plane under a homography it is the depth of its middle x under `warp` / its depth then: H = s
-  /// (R + t n' / d) maps x, with third element 1, to s Z / Z0 times its image. s is the middle
-  /// singular value of H [Ma2004].
+  /// plane under a homography it is the depth Z of its middle x under `warp` / its depth Z0 then:
+  ///
+  ///   H = s (R + t n' / d) maps x, with third element 1, to s Z / Z0 times its image
+  ///
+  /// with the middle singular value s of H [Ma2004].
   double InverseScale(const TargetTemplate& target_template, const cv::Matx33d& warp) const {
     const cv::Point2d middle = Middle(target_template.patch());
     if (options_.warp != Warp::kHomography) {

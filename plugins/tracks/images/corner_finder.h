@@ -80,10 +80,13 @@ class CornerFinder {
   cv::Mat response_, largest_;
 };
 
-/// Returns the point near `start` that stays at the same place of its patch when the patch grows,
-/// turns or is sheared, and not only when it is shifted [Forstner1987]: p = (sum g g')^-1 sum g g'
-/// x, with the gradient g at x. The patch of any other point would drift during tracking. Returns
-/// `start` if no such point near it can be tracked.
+/// Returns the point near `start` that keeps its place in its patch when the patch grows, turns or
+/// is sheared, and not only when it is shifted [Forstner1987]:
+///
+///   p = (sum g g')^-1 sum g g' x,   g the gradient at x
+///
+/// The patch of any other point would drift during tracking. Returns `start` if no such point near
+/// it can be tracked.
 inline cv::Point2f StablePoint(const cv::Mat& image, const TrackerOptions& options,
                                cv::Point2f start) {
   constexpr int kMaxIterations = 5;

@@ -223,8 +223,8 @@ class FeatureTracker {
       if (std::ssize(features_) == options_.features) break;
       if (is_occupied_.at<unsigned char>(corner) != 0 || count[cell_of(corner)] >= share) continue;
       const cv::Point2f stable = StablePoint(image, options_, cv::Point2f(corner));
-      if (is_occupied_.at<unsigned char>(cv::Point(stable)) != 0)
-        continue;  // belongs to another corner
+      // The stable point may belong to another corner.
+      if (is_occupied_.at<unsigned char>(cv::Point(stable)) != 0) continue;
       occupy(cv::Point(stable));
       add(stable);
     }

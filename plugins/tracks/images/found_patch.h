@@ -108,17 +108,17 @@ class FoundPatch {
     if (sampled_.size() == 0) return sum;
     const auto edge = [&](int cell) { return cell * side_ / kCells; };
     for (int row = 0; row < kCells; ++row) {
-      Eigen::Matrix<float, 2, kCells> moved = Eigen::Matrix<float, 2, kCells>::Zero();
+      Eigen::Matrix<float, 2, kCells> shifts = Eigen::Matrix<float, 2, kCells>::Zero();
       for (int y = edge(row); y < edge(row + 1); ++y) {
         for (int column = 0; column < kCells; ++column) {
           for (int i = y * side_ + edge(column); i < y * side_ + edge(column + 1); ++i) {
             const float e = gain_ * (sampled_[i] - mean_) - patch_[i];
-            moved(0, column) += influence_(i, 0) * e;
-            moved(1, column) += influence_(i, 1) * e;
+            shifts(0, column) += influence_(i, 0) * e;
+            shifts(1, column) += influence_(i, 1) * e;
           }
         }
       }
-      sum += moved * moved.transpose();
+      sum += shifts * shifts.transpose();
     }
     return shape_ * sum * shape_.transpose();
   }

@@ -24,7 +24,7 @@ class PyramidFlow {
 
   /// Moves the points `end` from their expected to their approximate positions in the next image.
   /// `start` are the same points in the last image. It uses only the levels above the image itself
-  /// if there are any. `found` is 0 for lost points. they are lost.
+  /// if there are any. `found` is 0 for lost points.
   void TrackForward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
                     std::vector<unsigned char>& found) {
     const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);

@@ -75,13 +75,13 @@ TEST(PairSeries, DriftIsTheGrowthOfScaleTimesDepth) {
 
 TEST(PairSeries, WhiteNoiseIsWhatBendsARamp) {
   PairSeries series;
-  series.seen = 1000;
+  series.seen_count = 1000;
   Random random(3);
   const auto depth = [](const bench::PairRow& row) { return row.depth_m; };
   for (int i = 0; i < 1100; ++i) series.rows.push_back({0.1 * i, 0.0, 1.0, 50.0 - 0.5 * i});
   EXPECT_NEAR(WhiteVariance(series, depth), 0.0, 1e-20);
   for (auto& row : series.rows) row.depth_m += 0.2 * random.Normal();
-  for (std::size_t i = series.seen; i < series.rows.size(); ++i)
+  for (std::size_t i = series.seen_count; i < series.rows.size(); ++i)
     series.rows[i].depth_m = 1e6 * random.Normal();
   // The mean of 998 squares that overlap: a standard deviation of about 6 %.
   EXPECT_NEAR(WhiteVariance(series, depth), 0.04, 0.008);

@@ -10,8 +10,8 @@ namespace alidade::internal {
 
 /// One-point RANSAC [Civera2010]: separates the inliers among the matches of a frame from the
 /// outliers, for sensors with the option outlier_rejection. A hypothesis is the state after an
-/// update by one match alone. Its support are the matches whose residuals are then within their
-/// noise.
+/// update by one match alone. The support of a hypothesis consists of the matches whose residuals
+/// are then within their noise.
 class Consensus {
  public:
   explicit Consensus(const Problem& problem);

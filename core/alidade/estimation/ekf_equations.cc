@@ -11,7 +11,7 @@
 
 namespace alidade::internal {
 
-// Flattened functions here: see FilterEngine::Run.
+// Some functions are flattened, for the reason given at FilterEngine::Run.
 
 [[gnu::flatten]] StepError EkfEquations::Step(FilterState& f, double dt_s) {
   if (StepError error = f.motions.Evaluate(f.state, dt_s)) return error;
@@ -39,9 +39,9 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
   return outcome;
 }
 
-/// Sets jacobian_roles_, the point at which H is evaluated: the values of the roles, but first
-/// estimates if they are in use, and the implied state with jacobian_at: measurement. Returns
-/// whether this differs from the point at which h is evaluated.
+/// Sets jacobian_roles_, the point at which H is evaluated. First estimates replace the values of
+/// the roles if they are in use, and the implied state does with `jacobian_at: measurement`.
+/// Returns whether this differs from the point at which h is evaluated.
 [[gnu::noinline]] bool EkfEquations::FindLinearisation(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   const std::vector<RoleBinding>& bound = pending.binding->roles;

@@ -119,8 +119,8 @@ std::optional<ProblemDefect> FindDefect(const Problem& problem) {
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const SensorBinding& sensor = problem.sensors[s];
     for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
-      const bool inverted = sensor.model->inverse().role == static_cast<int>(r);
-      if (sensor.roles[r].jacobian_at != JacobianAt::kMeasurement || inverted) continue;
+      const bool is_inverted = sensor.model->inverse().role == static_cast<int>(r);
+      if (sensor.roles[r].jacobian_at != JacobianAt::kMeasurement || is_inverted) continue;
       return ProblemDefect{"jacobian_at",
                            "model '" + sensor.model->name() +
                                "' has no inverse measurement model of role '" +

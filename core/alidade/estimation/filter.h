@@ -134,9 +134,9 @@ class Filter : public Estimator {
   int stream(std::string_view name) const;
   /// Returns the id of a block of the problem, `owner.block`. Error kBadConfig for an unknown name.
   BlockId block(std::string_view name) const;
-  /// Converts the readings of one timestamp to a frame. Errors: kBadData for an unknown stream;
-  /// for values, a covariance or known numbers whose size its sensors do not accept; or for a
-  /// quaternion or direction whose length differs from 1 by more than 1e-3.
+  /// Converts the readings of one timestamp to a frame. Throws Error kBadData for an unknown
+  /// stream, or if the size of values, covariance or known numbers is not that of the stream. The
+  /// length of a quaternion or direction may differ from 1 by at most 1e-3.
   Frame MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const;
   /// Calls MakeFrame and Process. The report is valid until the next call. Errors: those of
   /// MakeFrame; the filter is then unchanged.

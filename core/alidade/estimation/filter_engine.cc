@@ -74,11 +74,11 @@ void FilterEngine::Process(const Frame& frame) {
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.health.ended) StepTo(frame.timestamp);
   AddElapsedTo(FramePart::kStep);
-  const Outcome refused = f.report.stale   ? Outcome::kStale
-                          : f.health.ended ? Outcome::kEnded
-                                           : Outcome::kAccepted;
-  rows_.Collect(frame, *f.problem_index, f.report, refused);
-  if (refused != Outcome::kAccepted) return;
+  const Outcome common_outcome = f.report.stale   ? Outcome::kStale
+                                 : f.health.ended ? Outcome::kEnded
+                                                  : Outcome::kAccepted;
+  rows_.Collect(frame, *f.problem_index, f.report, common_outcome);
+  if (common_outcome != Outcome::kAccepted) return;
   const std::span<PendingMeasurement> rows = rows_.all();
   for (const PendingMeasurement& pending : rows) {
     if (pending.report->outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
@@ -164,7 +164,7 @@ void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   consensus_.Split(f, group, static_cast<std::uint64_t>(landmarks->frame()), groups_.inliers,
                    groups_.remaining);
   AddElapsedTo(FramePart::kGate);
-  // Without an update by the inliers there is no state to rescue the remaining ones with.
+  // Without an update by the inliers, the remaining measurements cannot be tested.
   if (!groups_.inliers.empty() && !Correct(groups_.inliers)) {
     for (PendingMeasurement* const pending : groups_.remaining) {
       pending->report->outcome = groups_.inliers.front()->report->outcome;

@@ -14,7 +14,7 @@ struct StreamInfo {
   std::string name;
   int size = 1;
   double sigma = 0.0;  ///< of true values: standard deviation of each element, in the tangent space
-  int known = 0;       ///< known numbers that come with each measurement
+  int known = 0;       ///< number of known numbers of each measurement
 };
 
 /// One value of one stream.
@@ -24,7 +24,8 @@ struct Measurement {
   std::int64_t landmark = -1;
   std::vector<double> values;
   std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: the model's
-  /// Known numbers of the sensor model, such as the position of the satellite. Mostly empty.
+  /// Inputs of the sensor model that are known exactly, such as the position of a satellite. Mostly
+  /// empty.
   std::vector<double> known = {};
 };
 

@@ -115,14 +115,14 @@ std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
   dx.setZero();
   v.setZero();
   linearised.setZero();
-  for (bool defined = true;; defined = Relinearise(f, rows, dx.data())) {
+  for (bool is_defined = true;; is_defined = Relinearise(f, rows, dx.data())) {
     const Workspace::Use use(f.work);
     const StackedMeasurements stacked = Stack(f, rows);
     Workspace::Matrix pht = f.work.Take(n, m);
     f.update.CopyColumns(0, pht);
     s = r = stacked.noise;
     AddProduct(s, stacked.h, pht);
-    if (!defined || !Factorise(s) || !Factorise(r)) {
+    if (!is_defined || !Factorise(s) || !Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
       SetIterate(f, linearised.data());
       Relinearise(f, rows, linearised.data());

@@ -61,9 +61,12 @@ struct LandmarkOptions {
 /// its support. The support of the best hypothesis makes an update. The remaining matches that are
 /// consistent with the updated state make a second update.
 struct OnePointRansac {
-  double inlier_probability = 0.99;  ///< that an inlier is within its own noise
-  double confidence = 0.99;          ///< of having tried at least one inlier
-  double rescue_probability = 0.99;  ///< that an inlier outside the support makes the second update
+  /// Probability that an inlier is within its own noise.
+  double inlier_probability = 0.99;
+  /// Probability that at least one of the tried matches is an inlier.
+  double confidence = 0.99;
+  /// Probability that an inlier outside the support is used by the second update.
+  double rescue_probability = 0.99;
 };
 
 /// Estimate of a landmark in the state, or its last estimate before it was removed.

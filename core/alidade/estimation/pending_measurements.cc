@@ -86,8 +86,8 @@ void PendingMeasurements::PointToReports(UpdateReport& report) {
   ALIDADE_EXPECTS(std::ssize(m.known) == pending.place->known_size);
   ALIDADE_EXPECTS(m.covariance.empty() || std::ssize(m.covariance) == dof * dof);
   if (!AllFinite(m.known) || !AllFinite(m.covariance)) return Outcome::kNotFinite;
-  const bool refused = !m.covariance.empty() && !IsCovariance(m.covariance, dof);
-  return refused ? Outcome::kInvalid : Outcome::kAccepted;
+  const bool is_invalid = !m.covariance.empty() && !IsCovariance(m.covariance, dof);
+  return is_invalid ? Outcome::kInvalid : Outcome::kAccepted;
 }
 
 bool PendingMeasurements::IsCovariance(const std::vector<double>& covariance, int size) {
@@ -97,7 +97,7 @@ bool PendingMeasurements::IsCovariance(const std::vector<double>& covariance, in
 }
 
 [[gnu::noinline]] void PendingMeasurements::Collect(const Frame& frame, const ProblemIndex& index,
-                                                    UpdateReport& report, Outcome refused) {
+                                                    UpdateReport& report, Outcome common_outcome) {
   count_ = 0;
   report.ClearMeasurements();
   for (const SensorPlace& place : index.sensor_places) {
@@ -105,7 +105,8 @@ bool PendingMeasurements::IsCovariance(const std::vector<double>& covariance, in
     for (const Measurement& m : frame.measurements) {
       if (m.stream != stream) continue;
       const PendingMeasurement& pending = Add(m, place);
-      Report(pending, refused != Outcome::kAccepted ? refused : Check(pending), report);
+      Report(pending, common_outcome != Outcome::kAccepted ? common_outcome : Check(pending),
+             report);
     }
   }
   PointToReports(report);

@@ -48,10 +48,10 @@ class PendingMeasurements {
  public:
   /// Collects the measurements of all sensors, in the order of the sensors, and appends their
   /// entries to the report. The outcome is kAccepted, unless the measurement is not finite or
-  /// invalid for its sensor. If `refused` is not kAccepted, it is the outcome of all measurements,
-  /// and no model is called.
+  /// invalid for its sensor. If `common_outcome` is not kAccepted, it is the outcome of all
+  /// measurements, and no model is called.
   void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
-               Outcome refused = Outcome::kAccepted);
+               Outcome common_outcome = Outcome::kAccepted);
   /// Collects one measurement for one sensor with the outcome kAccepted; ignores its stream.
   PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
                                  const ProblemIndex& index, UpdateReport& report);

@@ -189,7 +189,7 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
     added.push_back(PriorOf(values.back(), space, -1, place));
   }
   if (!input.stream.empty() && !model->has_input()) {
-    Fail(place, "model '" + model->name() + "' takes no control input; expected no `input`");
+    Fail(place, "model '" + model->name() + "' has no control input; expected no `input`");
   }
   Problem changed = *this;  // an exception leaves this problem unchanged
   StateHandle handle{name, {}, -1};

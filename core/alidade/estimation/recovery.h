@@ -16,10 +16,10 @@ class Recovery {
   /// `repaired`). After max_covariance_repairs repairs the next one ends the filter. Called after
   /// an update whose S was not positive definite.
   void RepairCovariance(FilterState& f);
-  /// Resets the block that the measurement determines, and the covariance of the blocks of its
-  /// motion model to an upper bound of prior and current covariance (event `rejection_recovery`).
-  /// If a reset is not possible, inflates the covariance of the blocks of the sensor, once until
-  /// its next acceptance. Called when the sensor was rejected too often in a row.
+  /// Resets the block that the measurement determines (event `rejection_recovery`). The covariance
+  /// of the other blocks of its motion model becomes an upper bound of prior and current
+  /// covariance. If a reset is not possible, inflates the covariance of the blocks of the sensor,
+  /// once until its next acceptance. Called when the sensor was rejected too often in a row.
   void Recover(FilterState& f, PendingMeasurement& pending);
 
  private:

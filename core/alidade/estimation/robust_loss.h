@@ -14,7 +14,7 @@ enum class LossKind {
 };
 
 /// Robust loss rho of the Mahalanobis distance d >= 0 of a residual, with the scale k
-/// [Holland1977]. w(d) = rho'(d) / d is the weight of the squared error with the same gradient: a
+/// [Holland1977]. The weight w(d) = rho'(d) / d of a squared error results in the same gradient. A
 /// measurement with covariance R has the effect of a measurement with covariance R / w.
 struct LossFunctions {
   const char* name;  ///< in configs

@@ -157,8 +157,8 @@ void RtsSmoother::Smooth(const Emit& emit) {
     joint.leftCols(n) = frame->p;
     joint.rightCols(noises) = frame->m.leftCols(noises);
     const Eigen::MatrixXd p = frame->p - internal::Congruence(joint, information);
-    const bool positive = (p.diagonal().array() >= 0.0).all();
-    if (!positive) {
+    const bool is_positive = (p.diagonal().array() >= 0.0).all();
+    if (!is_positive) {
       events.push_back({timestamp(), "not_pd",
                         "a smoothed variance in frame " +
                             std::to_string(forward_frames_.rend() - frame - 1) +
@@ -167,7 +167,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     }
     smoothed.values() = frame->x;
     smoothed.Retract((joint * lambda).eval().data(), frame->x);
-    if (positive) frame->p = p;
+    if (is_positive) frame->p = p;
     smoothed.covariance().SetBlock(0, 0, frame->p);
     smoothed.MoveTo(frame->x);
     frame->p = smoothed.covariance().Dense();

@@ -52,8 +52,8 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const
 Workspace::Matrix NoiseOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 /// Calls zero(offset, size, column, count) for each part of the gain that is zero because of a
-/// consider block or role: rows [offset, offset + size) of P, columns [column, column + count) of
-/// the update.
+/// consider block or role. The part has the rows [offset, offset + size) of P and the columns
+/// [column, column + count) of the update.
 template <class Zero>
 void ForEachConsidered(const FilterState& f, std::span<PendingMeasurement* const> rows,
                        const Zero& zero) {

@@ -168,8 +168,8 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// Sets the destinations of the Jacobians of the sensor, of m rows: those of the caller for roles
-  /// that do not move, and temporary memory for roles that move.
+  /// Sets the destinations of the Jacobians of the sensor, of m rows. Roles that do not move use
+  /// the destinations of the caller, and roles that move use temporary memory.
   void SetJacobianDestinations(int m, double* const* jacobians, const int* strides,
                                Memory& memory) const {
     std::size_t size = 0;

@@ -138,7 +138,7 @@ template <class Attempt>
 Outcome UkfEquations::ReduceSpread(int& halvings, const Attempt& attempt) const {
   for (halvings = 0;; ++halvings) {
     const Outcome outcome = attempt(halvings);
-    const bool is_last = !(std::ldexp(options_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha);
+    const bool is_last = !(std::ldexp(options_.alpha, -halvings - 1) >= UkfOptions::kMinAlpha);
     if (outcome != Outcome::kOutOfDomain || is_last) return outcome;
   }
 }
@@ -189,8 +189,8 @@ void UkfEquations::UpdateNoiseCross(FilterState& f, const Workspace::Matrix& dev
 /// sensor, for the motion models. `is_sufficient`: the points with this spread can be used.
 void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
                                bool is_sufficient) {
-  const bool guarded = halvings > 0 || !is_sufficient;
-  if (guarded && !is_guarded_[index]) {
+  const bool is_guarded = halvings > 0 || !is_sufficient;
+  if (is_guarded && !is_guarded_[index]) {
     const std::string subject =
         index < f.problem_index->sensor_places.size()
             ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
@@ -200,7 +200,7 @@ void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
                  (is_sufficient ? "" : ", and their spread can be narrowed no further") +
                  "; their spread is divided by " + std::to_string(1 << halvings));
   }
-  is_guarded_[index] = guarded;
+  is_guarded_[index] = is_guarded;
 }
 
 /// Steps one sigma point by all active models, with their `noise` for w, and writes x' to
@@ -458,8 +458,8 @@ Ukf::Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInf
     : Filter(CheckedProblem(std::move(problem), "Ukf", kCapabilities),
              internal::WithoutRecovery(options.filter), streams,
              std::make_unique<internal::UkfEquations>(options)) {
-  internal::ExpectOption(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0, "alpha",
-                         options.alpha, "UkfOptions::kLeastAlpha to 1");
+  internal::ExpectOption(options.alpha >= UkfOptions::kMinAlpha && options.alpha <= 1.0, "alpha",
+                         options.alpha, "UkfOptions::kMinAlpha to 1");
   internal::ExpectOption(options.beta >= 0.0, "beta", options.beta, "at least 0");
   internal::ExpectOption(options.kappa >= 0.0, "kappa", options.kappa, "at least 0");
 }

@@ -11,7 +11,7 @@ namespace alidade {
 /// Options of Ukf.
 struct UkfOptions {
   /// The rounding error of the mean of values y is eps |y| / (2 alpha^2): 1e-8 |y| with this alpha.
-  static constexpr double kLeastAlpha = 1e-4;
+  static constexpr double kMinAlpha = 1e-4;
 
   EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` counts as kNone
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
@@ -41,7 +41,7 @@ struct UkfOptions {
 ///
 /// Sigma points may leave the domain of a model that is defined at x0, or be too far apart on a
 /// manifold to have a mean. Their spread is then halved until neither is so (event `guarded`), as
-/// long as alpha is above 1e-4 because of rounding (UkfOptions::kLeastAlpha). If that is not
+/// long as alpha is above 1e-4 because of rounding (UkfOptions::kMinAlpha). If that is not
 /// sufficient, a measurement is out of domain, and a step ends the filter. A sensor that is not
 /// defined at x0 is out of domain. If P is not positive semi-definite, negative pivots count
 /// as zero (event `repaired`).

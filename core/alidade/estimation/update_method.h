@@ -28,8 +28,8 @@ class UpdateMethod {
   /// reason for a failure, which it also reports as an event.
   virtual Outcome Predict(FilterState& f, PendingMeasurement& pending) = 0;
   /// Computes S of a measurement that Predict accepted, and writes it to its report. Returns the
-  /// NIS, which is NaN unless S is finite and positive definite. linearised.column is its first
-  /// column in the update; accepted measurements have the columns before it.
+  /// NIS, or NaN unless S is finite and positive definite. The measurement uses the columns of the
+  /// update from linearised.column on, after those of the measurements accepted before it.
   virtual double ComputeNis(FilterState& f, PendingMeasurement& pending) = 0;
   /// Corrects x and P by one stacked update, in the order of ComputeNis. R and S include the robust
   /// weights. Returns kAccepted and writes the gains to the reports (RecordGain). Otherwise x and P

@@ -72,7 +72,7 @@ IekfOptions ReadIekf(Params& p) {
 UkfOptions ReadUkf(Params& p) {
   UkfOptions options;
   options.alpha = p.Number("alpha", "", "spread of the sigma points",
-                           {UkfOptions::kLeastAlpha, 1.0, false, false}, options.alpha);
+                           {UkfOptions::kMinAlpha, 1.0, false, false}, options.alpha);
   options.beta = p.NonNegative(
       "beta", "", "added covariance weight of the centre point; 2 is optimal for a Gaussian",
       options.beta);

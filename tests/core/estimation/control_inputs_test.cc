@@ -186,8 +186,8 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   ASSERT_EQ(report.events.size(), 1u);
   EXPECT_EQ(report.events[0].kind, "input_refused");
   EXPECT_EQ(report.events[0].text,
-            "a control input of 'car' from stream 'odometry' is not finite: the one before it goes "
-            "on acting");
+            "a control input of 'car' from stream 'odometry' is not finite: the previous input "
+            "continues to act");
   EXPECT_TRUE(report.inputs.empty());
   EXPECT_TRUE(ekf.Process(FrameAt(2.0, {{kOdometry, kInfinity}})).events.empty());
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 5.0, 1e-15);

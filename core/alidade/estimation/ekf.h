@@ -31,7 +31,8 @@ namespace alidade {
 /// If S is not positive definite because P is not positive semi-definite, P is repaired: negative
 /// pivots of its L D L' count as zero (event `repaired`). After `max_covariance_repairs` repairs
 /// the next one ends the filter.
-/// internal::EkfEquations (ekf_equations.h) has the equations.
+///
+/// Implementation: internal::EkfEquations (ekf_equations.h).
 class Ekf : public Filter {
  public:
   /// All capabilities.

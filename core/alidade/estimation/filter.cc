@@ -29,8 +29,8 @@ void CheckKnown(const std::string& place, int size, const std::vector<double>& k
                                       std::to_string(size));
 }
 
-/// Returns the index of the sensor. Throws an Error if its model needs another number of known
-/// inputs.
+/// Returns the index of the sensor. Throws an Error if its model needs another amount of known
+/// numbers.
 int FindSensor(const Problem& problem, std::string_view name, const std::vector<double>& known) {
   const int index = problem.FindSensor(name);
   if (index < 0) ThrowUnknownName("sensor", name, internal::NamesOf(problem.sensors));

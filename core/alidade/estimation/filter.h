@@ -106,8 +106,8 @@ struct Prediction {
 /// Control inputs of the frame act from its timestamp on. An update is atomic: if it would leave
 /// the state not finite or not positive definite, it is rolled back and reported.
 ///
-/// Live use: Push appends measurements by the names of their streams. At returns the estimate at a
-/// later time, and Expect the predicted measurement of a sensor. Neither changes the filter.
+/// Live use: Push processes the readings of one timestamp. At returns the estimate at a later time,
+/// and Expect the predicted measurement of a sensor. Neither changes the filter.
 ///
 /// Frames have to be ordered by timestamp; an older one is `stale`. For late frames use Rollback.
 ///

@@ -33,7 +33,7 @@ struct LandmarkOptions {
     /// If a frame measures at least this number of converged landmarks, the median of their inverse
     /// distances replaces `inverse_distance`; 0: never.
     int adapt_after = 0;
-    /// Replaces `min_observations` below for landmarks that need this prior; 0: does not.
+    /// Replaces `min_observations` below for landmarks that need this prior; 0: no replacement.
     int min_observations = 0;
   };
   enum class NegativeDepth { kKeep, kDelete };
@@ -58,8 +58,8 @@ struct LandmarkOptions {
 
 /// Options of one-point RANSAC [Civera2010], the outlier rejection for landmarks. A hypothesis is
 /// the state after an update by one match. The matches that it predicts to within pixel noise are
-/// its support. The support of the best hypothesis makes an update. The remaining matches that are
-/// consistent with the updated state make a second update.
+/// its support. The support of the best hypothesis is used for an update. The remaining matches that
+/// are consistent with the updated state are used for a second update.
 struct OnePointRansac {
   /// Probability that an inlier is within its own noise.
   double inlier_probability = 0.99;

@@ -365,7 +365,7 @@ std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& 
   Arrangement arrangement = Arrange(problem, offset, sensor, *sensor.model);
   for (const Mover& mover : arrangement.movers) {
     if (mover.model->has_input()) {
-      return "motion model '" + mover.model->name() + "' of its roles takes a control input";
+      return "motion model '" + mover.model->name() + "' of its roles has a control input";
     }
   }
   const auto at_measurement = [](const RoleBinding& role) {

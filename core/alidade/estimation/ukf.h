@@ -40,7 +40,7 @@ struct UkfOptions {
 /// measurements; the reported h, S and NIS are those of the gate.
 ///
 /// Sigma points may leave the domain of a model that is defined at x0, or be too far apart on a
-/// manifold to have a mean. Their spread is then halved until neither is so (event `guarded`), as
+/// manifold to have a mean. Their spread is then halved until neither occurs (event `guarded`), as
 /// long as alpha is above 1e-4 because of rounding (UkfOptions::kMinAlpha). If that is not
 /// sufficient, a measurement is out of domain, and a step ends the filter. A sensor that is not
 /// defined at x0 is out of domain. If P is not positive semi-definite, negative pivots count

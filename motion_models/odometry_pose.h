@@ -64,7 +64,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
         sigma_omega(angular),
         mount(position),
         vehicle_from_cam(orientation) {
-    Normalise<UnitQuaternion>(vehicle_from_cam.data());
+    UnitQuaternion::Normalise(vehicle_from_cam.data());
   }
   explicit OdometryPose(Params& p)
       : OdometryPose(p, p.Choice("noise.kind", {"continuous", "discrete"},

@@ -188,17 +188,15 @@ class Models : public Source {
       return;
     }
     const Geometry& geometry = motion.binding->model->input().geometry;
-    const auto size = static_cast<std::size_t>(geometry.ambient);
-    motion.mean.resize(size);
-    motion.amplitude.resize(size);
-    geometry.Identity(motion.mean.data());
+    motion.mean = geometry.Identity();
+    motion.amplitude.resize(motion.mean.size());
     motion.stream = static_cast<int>(streams_.size());
     streams_.push_back({stream, geometry.ambient});
     const auto entry = inputs ? inputs->Find(motion.binding->name) : std::nullopt;
     if (entry) {
       if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
       if (const auto amplitude = entry->Find("amplitude")) {
-        if (geometry.kind != GeometryKind::kVector) {
+        if (!geometry.is_vector()) {
           amplitude->Fail("the input is not a vector", "only `mean`");
         }
         motion.amplitude = amplitude->Numbers(geometry.ambient);

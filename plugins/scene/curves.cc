@@ -73,7 +73,7 @@ Quaternion RotationCurve::At(double t_s) const {
   Quaternion q = Plus(values_[i], (1.0 - u * u * u) * w1);
   q = Plus(q, s * s * (3.0 - 2.0 * s) * w2);
   q = Plus(q, s * s * s * w3);
-  Normalise<UnitQuaternion>(q.data());
+  UnitQuaternion::Normalise(q.data());
   return q;
 }
 

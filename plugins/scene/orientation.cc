@@ -28,7 +28,7 @@ Quaternion ReadQuaternion(const Node& node) {
   if (!(std::abs(std::sqrt(sum) - 1.0) <= 1e-3)) {
     node.Fail("not of unit length", "w^2 + x^2 + y^2 + z^2 = 1 to 1e-3");
   }
-  Normalise<UnitQuaternion>(q.data());
+  UnitQuaternion::Normalise(q.data());
   return q;
 }
 

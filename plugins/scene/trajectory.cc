@@ -146,7 +146,7 @@ std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, dou
     model.Step(current.position.data(), current.orientation.data(), current.velocity.data(),
                current.angular_velocity.data(), w, dt_s, next.position.data(),
                next.orientation.data(), next.velocity.data(), next.angular_velocity.data());
-    Normalise<UnitQuaternion>(next.orientation.data());
+    UnitQuaternion::Normalise(next.orientation.data());
     states.push_back(next);
   }
   return states;

@@ -58,7 +58,7 @@ class Tracks : public Source {
       }
       if (frames_ == 0) {
         first_pose_ = *pose;
-        Normalise<UnitQuaternion>(first_pose_.orientation.data());
+        UnitQuaternion::Normalise(first_pose_.orientation.data());
       }
       if (pose) pose = pose->In(first_pose_);
     }

@@ -314,9 +314,10 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   EXPECT_EQ(Count("invalid:pixels"), 3) << "without an id";
   Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0.1,0\n");
   const Outcome table = Run("map.yaml", columns, 65);
-  EXPECT_TRUE(Contains(table.err,
-                       "turn.csv:3 orientation: the length of a quaternion is off by 0.004988; "
-                       "expected unit length to 1e-3"))
+  EXPECT_TRUE(
+      Contains(table.err,
+               "turn.csv:3 orientation: the length of a unit quaternion is off by 0.004988; "
+               "expected unit length to 1e-3"))
       << table.err;
 }
 

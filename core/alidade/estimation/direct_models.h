@@ -36,8 +36,7 @@ Space SpaceOf(const Quantity& quantity, const Geometry& geometry,
 
 template <class G>
 Geometry GeometryOf(int size) {
-  return {static_cast<GeometryKind>(G::kGeometry), size,
-          G::kTangent == kDynamic ? size : G::kTangent};
+  return Geometry::Of<G>(size);
 }
 
 template <class Model>

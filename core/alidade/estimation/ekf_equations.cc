@@ -87,10 +87,10 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
   for (std::size_t i = 0; i < place.values.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
     if (place.columns[i] < 0 || jacobian_roles_[i] == pending.roles[i] ||
-        geometry.kind != GeometryKind::kUnitVector) {
+        !geometry.has_transport()) {
       continue;
     }
-    std::array<double, 4> j;  // 2 x 2: the tangent of a unit vector has two elements
+    std::array<double, detail::kMaxTangent * detail::kMaxTangent> j;
     geometry.Transport(pending.roles[i], jacobian_roles_[i], j.data());
     ChainJacobian(pending, place.columns[i], geometry.tangent, j.data(), f.work);
   }

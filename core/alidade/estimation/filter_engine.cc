@@ -242,8 +242,7 @@ std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark
   const Geometry& geometry = f.problem_index->problem.sensors[static_cast<std::size_t>(sensor)]
                                  .model->measurement()
                                  .geometry;
-  measurement.values.resize(static_cast<std::size_t>(geometry.ambient));
-  geometry.Identity(measurement.values.data());
+  measurement.values = geometry.Identity();
   PendingMeasurement& pending = rows_.CollectOne(measurement, sensor, *f.problem_index, f.report);
   if (landmarks) landmarks->Attach(f, {&pending, 1});
   if (pending.report->outcome != Outcome::kAccepted || !IsReady(f, pending) ||

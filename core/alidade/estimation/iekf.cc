@@ -214,7 +214,7 @@ bool IekfEquations::Relinearise(FilterState& f, std::span<PendingMeasurement* co
       if (place.columns[i] < 0) continue;
       const int offset = place.parts[part++].offset;
       const Geometry& geometry = model.roles()[i].geometry;
-      if (geometry.kind == GeometryKind::kVector) continue;
+      if (geometry.is_vector()) continue;
       const Workspace::Use use(f.work);
       Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
       PlusJacobian(geometry, prediction[i], dx + offset, j.data());

@@ -20,8 +20,7 @@ bool Writes(const std::vector<Space>& roles) {
     if (!same) return;
     const Space& role = roles[static_cast<std::size_t>(i)];
     same = role.name == Representation::kRoles[static_cast<std::size_t>(i)].name &&
-           role.geometry ==
-               Geometry{static_cast<GeometryKind>(G::kGeometry), G::kAmbient, G::kTangent};
+           role.geometry == Geometry::Of<G>();
   };
   detail::ForEach(compare, typename detail::Blocks<Representation>::Indices{});
   return same;

@@ -23,12 +23,6 @@ std::string ErrorTextOf(const void* model) {
   return found == model_errors.end() ? "" : found->text;
 }
 
-std::vector<double> NeutralElement(const Geometry& geometry) {
-  std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
-  geometry.Identity(value.data());
-  return value;
-}
-
 }  // namespace
 
 std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
@@ -40,7 +34,7 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
       !has_size(owned.sqrt_density, n * n)) {
     return "have another size than the role";
   }
-  if (owned.mean.empty()) owned.mean = NeutralElement(geometry);
+  if (owned.mean.empty()) owned.mean = geometry.Identity();
   if (!AllFinite(owned.mean) || !AllFinite(owned.sqrt_prior) || !AllFinite(owned.sqrt_density) ||
       !std::isfinite(owned.time_constant_s)) {
     return "are not finite";
@@ -80,7 +74,7 @@ OwnedRole SensorModel::owned(std::size_t role) const {
   const auto found = description_.owned.find(role);
   if (found != description_.owned.end()) return found->second;
   OwnedRole neutral;
-  neutral.mean = NeutralElement(roles()[role].geometry);
+  neutral.mean = roles()[role].geometry.Identity();
   return neutral;
 }
 

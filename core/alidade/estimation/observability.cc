@@ -67,12 +67,7 @@ Trajectory StartNearPrior(const Problem& problem) {
     const Block& block = problem.layout[prior.block];
     const Geometry& geometry = block.geometry();
     auto& value = t.values[static_cast<std::size_t>(prior.block)];
-    value.resize(static_cast<std::size_t>(geometry.ambient));
-    if (prior.sensor.empty()) {
-      value = prior.mean;
-    } else {
-      geometry.Identity(value.data());
-    }
+    value = prior.sensor.empty() ? prior.mean : geometry.Identity();
     std::vector<double> offset(static_cast<std::size_t>(geometry.tangent));
     for (std::size_t i = 0; i < offset.size(); ++i) {
       const double size = prior.sensor.empty() ? 0.03 * (1.0 + std::abs(value[i])) : 1.0;
@@ -99,13 +94,12 @@ Trajectory StartNearPrior(const Problem& problem) {
 std::vector<double> GenericInput(const MotionModel& model, Random* random) {
   if (!model.has_input()) return {};
   const Geometry& geometry = model.input().geometry;
-  std::vector<double> input(static_cast<std::size_t>(geometry.ambient));
+  std::vector<double> input = geometry.Identity();
   std::vector<double> offset(static_cast<std::size_t>(geometry.tangent));
   for (std::size_t i = 0; i < offset.size(); ++i) {
     offset[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
     if (random != nullptr) offset[i] *= 0.25 + 1.5 * random->Uniform();
   }
-  geometry.Identity(input.data());
   geometry.Plus(input.data(), offset.data(), input.data());
   return input;
 }

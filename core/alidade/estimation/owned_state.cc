@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-/// What the structs below have in common: a, and the square root of the time that noise adds up in.
+/// Shared part of the two structs below: the decay a, and the square root of Q.
 struct Dynamics {
   explicit Dynamics(const OwnedRole& owned, std::size_t n)
       : mean(owned.mean), l(owned.sqrt_density), tau_s(owned.time_constant_s) {
@@ -20,7 +20,7 @@ struct Dynamics {
 
   bool returns() const { return tau_s > 0.0; }
   bool stationary() const {
-    return !returns() && std::ranges::all_of(l, [](double one) { return one == 0.0; });
+    return !returns() && std::ranges::all_of(l, [](double element) { return element == 0.0; });
   }
   double Decay(double dt_s) const { return returns() ? std::exp(-dt_s / tau_s) : 1.0; }
   void SqrtQ(double dt_s, int n, MatrixRef q) const {
@@ -100,19 +100,12 @@ const char* NameOf(OwnedDynamics dynamics) {
 
 SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
   const char* const name = NameOf(owned.dynamics);
-  switch (geometry.kind) {
-    case GeometryKind::kAngle:
-      return MakeMotion(OwnedOn<Angle>(owned), name);
-    case GeometryKind::kUnitQuaternion:
-      return MakeMotion(OwnedOn<UnitQuaternion>(owned), name);
-    case GeometryKind::kUnitVector:
-      return MakeMotion(OwnedOn<UnitVector>(owned), name);
-    case GeometryKind::kVector:
-    case GeometryKind::kProduct:  // of measurements alone
-      break;
-  }
-  ALIDADE_EXPECTS(geometry.kind == GeometryKind::kVector);
-  return MakeMotion(OwnedVector(owned, geometry.ambient), name);
+  ALIDADE_EXPECTS(!geometry.is_product());
+  if (geometry.is_vector()) return MakeMotion(OwnedVector(owned, geometry.ambient), name);
+  SharedMotion motion;
+  VisitGeometry(geometry.row().number,
+                [&]<class G>(G) { motion = MakeMotion(OwnedOn<G>(owned), name); });
+  return motion;
 }
 
 }  // namespace alidade::internal

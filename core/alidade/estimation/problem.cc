@@ -179,9 +179,7 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
     if (found != initial.end()) {
       values.push_back(*found);
     } else if ((space.flags & ALIDADE_ROLE_OWNED) != 0) {
-      std::vector<double> neutral(static_cast<std::size_t>(space.geometry.ambient));
-      space.geometry.Identity(neutral.data());
-      values.push_back(InitialValue::Constant(space.name, neutral));
+      values.push_back(InitialValue::Constant(space.name, space.geometry.Identity()));
     } else {
       Fail(place, "no initial value of '" + space.name + "'; expected one");
     }

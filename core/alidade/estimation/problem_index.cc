@@ -40,7 +40,7 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
 
 /// Appends the range of a block with this geometry and this offset in x. Merges adjacent vectors.
 void AddRange(std::vector<MotionPlace::ValueRange>& ranges, const Geometry& geometry, int offset) {
-  const bool is_curved = geometry.kind != GeometryKind::kVector;
+  const bool is_curved = !geometry.is_vector();
   const bool is_adjacent = !ranges.empty() && !is_curved && ranges.back().geometry == nullptr &&
                            ranges.back().offset + ranges.back().size == offset;
   if (is_adjacent) {

@@ -48,8 +48,7 @@ Timeline::Timeline(const Problem& problem, const std::vector<StreamInfo>& stream
     input.binding = motion.input;
     input.geometry = motion.model->input().geometry;
     input.timeout = TimeoutOf(motion.input.timeout_s);
-    input.neutral.resize(static_cast<std::size_t>(input.geometry.ambient));
-    input.geometry.Identity(input.neutral.data());
+    input.neutral = input.geometry.Identity();
     input.value = input.neutral;
     const auto stream = std::ranges::find(streams, motion.input.stream, &StreamInfo::name);
     if (stream != streams.end()) {

@@ -41,7 +41,7 @@ bool MeanOf(const Geometry& geometry, const double* centre,
       f.col(i) -= from_mean;
     }
     m = w * f.rowwise().sum();
-    if (geometry.kind == GeometryKind::kVector) {
+    if (geometry.is_vector()) {
       geometry.Plus(centre, m.data(), mean);
       return true;
     }

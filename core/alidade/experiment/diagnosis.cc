@@ -16,7 +16,7 @@ void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResu
   for (const int index : metrics.far_off()) {
     const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(index)];
     const Space& measured = sensor.model->measurement();
-    const bool is_angle = measured.geometry.kind == GeometryKind::kAngle;
+    const bool is_angle = measured.geometry.is_angle();
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
         {kNoTimestamp, "unit",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/experiment/frame_check.h"
 
+#include <algorithm>
 #include <iterator>
 
 #include "alidade/base/number_text.h"
@@ -11,6 +12,13 @@ namespace alidade::internal {
 namespace {
 
 constexpr double kCountedDefect = 1e-9;
+
+/// `unit quaternion`, as in a sentence.
+std::string SpacedName(const Geometry& geometry) {
+  std::string name = geometry.name();
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
 
 [[noreturn]] void Reject(const Frame& frame, const std::string& defect) {
   throw ContractViolation("the source returned " + defect +
@@ -96,27 +104,27 @@ void FrameCheck::Check(const SourceFrame& frame) const {
 
 void FrameCheck::Normalise(Channel& channel, std::vector<double>& value) {
   channel.geometry.ForEachPart([&](const Geometry& part, int a, int) {
-    const bool is_rotation = part.kind == GeometryKind::kUnitQuaternion;
-    if (!is_rotation && part.kind != GeometryKind::kUnitVector) return;
+    if (part.row().distance == nullptr) return;
     double* const x = value.data() + a;
     const double defect = DistanceFrom(part, x);
     if (!(defect <= kUnitTolerance)) {
-      const std::string value_kind = is_rotation ? "quaternion" : "direction";
       throw Error(ExitCode::kBadData, ErrorLine(source_.place(), channel.info.name,
-                                                "the length of a " + value_kind + " is off by " +
-                                                    RoundedText(defect, 4),
+                                                "the length of a " + SpacedName(part) +
+                                                    " is off by " + RoundedText(defect, 4),
                                                 "unit length to 1e-3"));
     }
     if (defect > kCountedDefect) ++normalised_[channel.info.name];
     part.Normalise(x);
-    if (is_rotation) ChooseSign({}, {x, 4});
+    if (part.row().double_cover) {
+      ChooseSign({}, {x, static_cast<std::size_t>(part.ambient)});
+    }
   });
 }
 
 void FrameCheck::ChooseTruthSigns(SourceFrame& frame) {
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
     Channel& channel = truths_[t];
-    if (frame.truth[t].empty() || channel.geometry.kind != GeometryKind::kUnitQuaternion) continue;
+    if (frame.truth[t].empty() || !channel.geometry.row().double_cover) continue;
     ChooseSign(channel.previous, frame.truth[t]);
     channel.previous = frame.truth[t];
   }

@@ -23,9 +23,7 @@ bool IsInvertible(const Problem& problem, const SensorBinding& binding) {
 
 /// Returns whether the measurement and all roles are scalars.
 bool IsScalar(const SensorBinding& binding) {
-  const auto is_scalar = [](const Space& space) {
-    return space.geometry.kind == GeometryKind::kVector && space.geometry.ambient == 1;
-  };
+  const auto is_scalar = [](const Space& space) { return space.geometry == Geometry::Vector(1); };
   return is_scalar(binding.model->measurement()) &&
          std::ranges::all_of(binding.model->roles(), is_scalar);
 }

@@ -189,13 +189,12 @@ struct Metrics::Impl {
 
 namespace {
 
-/// That of the block; the error of an orientation or a direction is an angle.
+/// Unit of the error of a block: rad for an orientation or a direction, else the unit of the block.
 std::string UnitOfError(const Problem& problem, BlockId id) {
-  bool is_angle = true;
-  problem.layout[id].geometry().ForEachPart([&](const Geometry& part, int, int) {
-    is_angle = is_angle && part.kind != GeometryKind::kVector;
-  });
-  return is_angle ? "rad" : internal::UnitOf(problem, id);
+  const Geometry& geometry = problem.layout[id].geometry();
+  bool all_angular = true;
+  for (int i = 0; i < geometry.tangent; ++i) all_angular = all_angular && geometry.IsAngular(i);
+  return all_angular ? "rad" : internal::UnitOf(problem, id);
 }
 
 }  // namespace
@@ -277,7 +276,7 @@ void Metrics::Impl::AddErrors(Timestamp timestamp, const Truth& truth,
     for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
     double value = is[0];
-    if (block.geometry.kind == GeometryKind::kAngle && !block.series.truth.empty()) {
+    if (block.geometry.is_angle() && !block.series.truth.empty()) {
       const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
       value = before + Angle::Wrap(is[0] - before);
     }
@@ -451,7 +450,7 @@ Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truth
   const bool filters = spec.estimator == nullptr || !spec.estimator->offline();
   for (const SensorBinding& sensor : spec.problem.sensors) {
     const Geometry& measured = sensor.model->measurement().geometry;
-    impl_->angle.push_back(measured.kind == GeometryKind::kAngle);
+    impl_->angle.push_back(measured.is_angle());
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
   }
   const auto add_sums = [&](std::string suffix) {

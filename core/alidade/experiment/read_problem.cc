@@ -14,6 +14,7 @@
 #include "alidade/estimation/time_offset.h"
 #include "alidade/experiment/defect_node.h"
 #include "alidade/experiment/read_landmarks.h"
+#include "alidade/state/element_names.h"
 #include "alidade/state/quaternion_sign.h"
 
 namespace alidade {
@@ -31,11 +32,15 @@ void AddAt(const Node& entry, const Add& add) {
   }
 }
 
-/// Reads the value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
+/// Reads the value of a block: a number, a list, or {w: , x: , y: , z: } for a unit
+/// quaternion, whose elements have no order that all programs share.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   std::vector<double> mean;
-  if (geometry.kind == GeometryKind::kUnitQuaternion) {
-    for (const char* part : {"w", "x", "y", "z"}) mean.push_back(node.At(part).Number());
+  const bool double_cover = geometry.row().double_cover;
+  if (double_cover) {
+    for (const std::string& element : internal::SplitNames(geometry.row().elements)) {
+      mean.push_back(node.At(element).Number());
+    }
     node.RejectUnread();
   } else {
     mean = node.Numbers(geometry.ambient);
@@ -43,7 +48,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   if (DistanceFrom(geometry, mean.data()) > kUnitTolerance) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
-  if (geometry.kind == GeometryKind::kUnitQuaternion) internal::ChooseSign({}, mean);
+  if (double_cover) internal::ChooseSign({}, mean);
   return mean;
 }
 
@@ -168,9 +173,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
     const Space& space = model->blocks()[i];
     const bool is_owned = (space.flags & ALIDADE_ROLE_OWNED) != 0;
     if (is_owned && !initial.Find(names[i]) && !Contains(considered, names[i])) {
-      std::vector<double> identity(static_cast<std::size_t>(space.geometry.ambient));
-      space.geometry.Identity(identity.data());
-      values.push_back(InitialValue::Constant(space.name, identity));
+      values.push_back(InitialValue::Constant(space.name, space.geometry.Identity()));
       values.back().name = names[i];
       continue;
     }

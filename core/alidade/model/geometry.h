@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 #include "alidade/model/plugin_abi.h"
 
@@ -14,9 +16,24 @@
 ///   (3)  x (+) (y (-) x) = y
 ///
 /// Scalars are templates: double, or a dual number in x, d or both.
+///
+/// A geometry of fixed size is a struct with
+///
+///   kGeometry                its number in the C table (plugin_abi.h)
+///   kAmbient, kTangent       sizes of a value and of d
+///   kIdentity                the neutral element
+///   Plus, Minus              as above
+///   Normalise(x)             brings x, which left the manifold by rounding, back to it
+///   Distance(x)              optional: the distance of x from the manifold, else 0
+///   Transport(from, to, j)   optional: carries a tangent vector at `from` to the tangent space of
+///                            `to`, j kTangent x kTangent and row-major; else the identity
+///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d; else by
+///                            automatic differentiation of Plus and Minus
+///
+/// and a row in alidade/state/geometry_table.h.
 namespace alidade {
 
-/// Size known only when the model exists.
+/// A size that is known only when the model exists.
 inline constexpr int kDynamic = -1;
 
 /// R^N: y = x + d.
@@ -24,6 +41,7 @@ template <int N>
 struct Vec {
   static constexpr std::uint32_t kGeometry = ALIDADE_VECTOR;
   static constexpr int kAmbient = N, kTangent = N;
+  static void Normalise(double*) {}
   template <class X, class D, class Y>
   static void Plus(const X* x, const D* d, Y* y, int size = N) {
     for (int i = 0; i < size; ++i) y[i] = x[i] + d[i];
@@ -38,6 +56,7 @@ struct Vec {
 struct Angle {
   static constexpr std::uint32_t kGeometry = ALIDADE_ANGLE;
   static constexpr int kAmbient = 1, kTangent = 1;
+  static constexpr std::array<double, 1> kIdentity{0.0};
 
   /// a - 2 pi k, the one in (-pi, pi].
   template <class T>
@@ -58,13 +77,41 @@ struct Angle {
   static void Minus(const Y* y, const X* x, D* d, int = 1) {
     d[0] = Wrap(D(y[0] - x[0]));
   }
+  static void Normalise(double* x) { x[0] = Wrap(x[0]); }
 };
+
+namespace detail {
+
+/// Shared part of the geometries of unit length; G is the geometry.
+template <class G, int N>
+struct UnitLength {
+  /// x / |x|, or x itself if |x| is 1 to rounding; the neutral element for x = 0. A value that is
+  /// not finite stays.
+  static void Normalise(double* x) {
+    constexpr double kRounding = 4e-16;
+    const double norm = Norm(x);
+    if (!(std::abs(norm - 1.0) > kRounding)) return;
+    for (int i = 0; i < N; ++i) x[i] = norm == 0.0 ? G::kIdentity[i] : x[i] * (1.0 / norm);
+  }
+  /// | |x| - 1 |
+  static double Distance(const double* x) { return std::abs(Norm(x) - 1.0); }
+
+ private:
+  static double Norm(const double* x) {
+    double sum = 0.0;
+    for (int i = 0; i < N; ++i) sum += x[i] * x[i];
+    return std::sqrt(sum);
+  }
+};
+
+}  // namespace detail
 
 /// S^3, Hamilton, stored w x y z: q (+) d = q Exp(d), Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|).
 /// q and -q are one rotation: (-) takes the shorter way, |d| <= pi.  [Sola2017] ch. 4.
-struct UnitQuaternion {
+struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_QUATERNION;
   static constexpr int kAmbient = 4, kTangent = 3;
+  static constexpr std::array<double, 4> kIdentity{1.0, 0.0, 0.0, 0.0};
 
   /// c = a b
   template <class A, class B, class C>
@@ -137,13 +184,31 @@ struct UnitQuaternion {
     Multiply(conjugate, y, q);
     Log(q, d);
   }
+  /// The right Jacobian of SO(3), with t = |d| and [d]x^2 = d d' - t^2 I:
+  ///
+  ///   J = I - (1 - cos t) / t^2 [d]x + (t - sin t) / t^3 [d]x^2     [Sola2017] eq. 183
+  static void PlusJacobian(const double*, const double* d, double* j) {
+    const double t2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], t = std::sqrt(t2);
+    constexpr double kSeries = 1e-4;
+    const double a = t < kSeries ? 0.5 - t2 / 24.0 : (1.0 - std::cos(t)) / t2;
+    const double b = t < kSeries ? 1.0 / 6.0 - t2 / 120.0 : (t - std::sin(t)) / (t2 * t);
+    const double cross[9] = {0.0, -d[2], d[1], d[2], 0.0, -d[0], -d[1], d[0], 0.0};
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        const double unit = row == column ? 1.0 : 0.0;
+        j[3 * row + column] =
+            unit - a * cross[3 * row + column] + b * (d[row] * d[column] - t2 * unit);
+      }
+    }
+  }
 };
 
 /// S^2: y = cos|d| x + sin|d|/|d| B(x) d, with B(x) (3x2) an orthonormal basis of the plane normal
-/// to x. To the antipode of x every way is as short: (-) gives (pi, 0).  Basis: [Duff2017].
-struct UnitVector {
+/// to x. All ways to the antipode of x are equally short: (-) returns (pi, 0).  Basis: [Duff2017].
+struct UnitVector : detail::UnitLength<UnitVector, 3> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_VECTOR;
   static constexpr int kAmbient = 3, kTangent = 2;
+  static constexpr std::array<double, 3> kIdentity{0.0, 0.0, 1.0};
 
   /// b = B(x), row-major 3x2.
   template <class T>
@@ -202,8 +267,8 @@ struct UnitVector {
     d[1] = k * p[1];
   }
   /// j (2x2, row-major): parallel transport, J = B(to)' R B(from), where R turns `from` into `to`
-  /// the short way, R v = v - (from + to) (to . v) / (1 + from . to). From a point to its antipode
-  /// every way is as short; the one along the first basis vector is taken.
+  /// the short way, R v = v - (from + to) (to . v) / (1 + from . to). All ways to the antipode are
+  /// equally short; this is the one along the first basis vector.
   static void Transport(const double* from, const double* to, double* j) {
     double b_from[6], b_to[6];
     Basis(from, b_from);
@@ -224,10 +289,28 @@ struct UnitVector {
       }
     }
   }
+  /// The derivative of the exponential map of S^2, then the parallel transport to x (+) d: lengths
+  /// along d stay, lengths across d are multiplied by sin |d| / |d|.
+  static void PlusJacobian(const double* x, const double* d, double* j) {
+    const double t2 = d[0] * d[0] + d[1] * d[1], t = std::sqrt(t2);
+    constexpr double kSeries = 1e-4;
+    const double s = t < kSeries ? 1.0 - t2 / 6.0 : std::sin(t) / t;
+    const double k = t < kSeries ? 1.0 / 6.0 : (1.0 - s) / t2;  // of d d'
+    double y[3], transport[4];
+    Plus(x, d, y);
+    Normalise(y);
+    Transport(x, y, transport);
+    for (int row = 0; row < 2; ++row) {
+      const double along = transport[2 * row] * d[0] + transport[2 * row + 1] * d[1];
+      for (int column = 0; column < 2; ++column) {
+        j[2 * row + column] = s * transport[2 * row + column] + k * along * d[column];
+      }
+    }
+  }
 };
 
-/// Parts one after the other, each as it is by itself: the geometry of a composite measurement, a
-/// pose or a range with a bearing, whose noise is correlated.
+/// Parts side by side, each with its own geometry: a composite measurement with correlated noise,
+/// such as a pose or a range with a bearing.
 template <class... Parts>
 struct Product {
   static_assert(sizeof...(Parts) > 0 && ((Parts::kTangent > 0) && ... && true) &&
@@ -253,20 +336,17 @@ struct Product {
   }
 };
 
-/// Brings x, off the manifold of G by rounding, back to it: else rounding would add up over many
-/// steps. An angle is wrapped.
+namespace detail {
+
+template <class G, class = void>
+struct HasTransport : std::false_type {};
 template <class G>
-void Normalise(double* x) {
-  static_assert(G::kGeometry != ALIDADE_PRODUCT, "part by part");
-  if constexpr (G::kGeometry == ALIDADE_ANGLE) x[0] = G::Wrap(x[0]);
-  if constexpr (G::kAmbient > G::kTangent) {  // of unit length
-    double sum = 0.0;
-    for (int i = 0; i < G::kAmbient; ++i) sum += x[i] * x[i];
-    const double norm = std::sqrt(sum);
-    constexpr double kRounding = 4e-16;
-    if (!(std::abs(norm - 1.0) > kRounding)) return;
-    for (int i = 0; i < G::kAmbient; ++i) x[i] *= 1.0 / norm;
-  }
-}
+struct HasTransport<G, std::void_t<decltype(&G::Transport)>> : std::true_type {};
+
+}  // namespace detail
+
+/// True if the tangent basis of G turns with the point, so that a covariance turns with it.
+template <class G>
+inline constexpr bool kHasTransport = detail::HasTransport<G>::value;
 
 }  // namespace alidade

@@ -157,7 +157,7 @@ class StaticEkf {
       std::copy_n(next, kAmbient, x_);
       const auto normalise = [&](auto index) {
         constexpr int b = decltype(index)::value;
-        Normalise<Space<b>>(x_ + AmbientOffset(b));
+        Space<b>::Normalise(x_ + AmbientOffset(b));
       };
       detail::ForEach(normalise, Indices{});
       (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
@@ -228,8 +228,8 @@ class StaticEkf {
       constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
       double corrected[Space<b>::kAmbient];
       Space<b>::Plus(value<b>(), dx + TangentOffset(b), corrected);
-      Normalise<Space<b>>(corrected);
-      if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
+      Space<b>::Normalise(corrected);
+      if constexpr (kHasTransport<Space<b>>) {
         double j[n * n];
         Space<b>::Transport(value<b>(), corrected, j);
         const Transition<n> transport{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};

@@ -33,9 +33,7 @@ AlidadeSpace PartOf(const AlidadeSpace& space, std::size_t i) {
 }
 
 Geometry GeometryOf(const AlidadeSpace& space) {
-  if (space.geometry != ALIDADE_PRODUCT) {
-    return {static_cast<GeometryKind>(space.geometry), space.ambient, space.tangent};
-  }
+  if (space.geometry != ALIDADE_PRODUCT) return Geometry(space.geometry, space.ambient);
   std::vector<Geometry> parts;
   for (std::size_t i = 0; i < space.part_count; ++i) parts.push_back(GeometryOf(PartOf(space, i)));
   return Geometry::Product(std::move(parts));
@@ -43,23 +41,10 @@ Geometry GeometryOf(const AlidadeSpace& space) {
 
 /// Returns true if geometry and sizes are known to this version.
 bool IsKnownGeometry(const AlidadeSpace& space) {
-  const auto has_sizes_of = [&](const Geometry& g) {
-    return space.ambient == g.ambient && space.tangent == g.tangent;
-  };
-  switch (space.geometry) {
-    case ALIDADE_VECTOR:
-      return space.ambient >= 1 && space.ambient <= kMaxSize && space.tangent == space.ambient;
-    case ALIDADE_ANGLE:
-      return has_sizes_of(Geometry::Angle());
-    case ALIDADE_UNIT_QUATERNION:
-      return has_sizes_of(Geometry::UnitQuaternion());
-    case ALIDADE_UNIT_VECTOR:
-      return has_sizes_of(Geometry::UnitVector());
-    case ALIDADE_PRODUCT:
-      return space.ambient <= kMaxSize && has_sizes_of(GeometryOf(space));
-    default:
-      return false;
-  }
+  if (FindGeometry(space.geometry) == nullptr) return false;
+  const Geometry geometry = GeometryOf(space);
+  return space.ambient >= 1 && space.ambient <= kMaxSize && space.ambient == geometry.ambient &&
+         space.tangent == geometry.tangent;
 }
 
 /// Returns the rule that `space` breaks, or "".
@@ -206,13 +191,13 @@ void ModelInstance::ReadDescription() {
     space_ = ReadSpace(ReadPrefix(description_.output), "the measurement");
     if (description_.known != nullptr) {
       known_ = ReadSpace(ReadPrefix(description_.known), "the known quantity");
-      if (known_.geometry.kind != GeometryKind::kVector) {
+      if (!known_.geometry.is_vector()) {
         Refuse(": the known quantity is not a vector");
       }
     }
   } else if (has_input()) {
     space_ = ReadSpace(ReadPrefix(description_.inputs), "the control input");
-    if (space_.geometry.kind == GeometryKind::kProduct) Refuse(": the control input is a product");
+    if (space_.geometry.is_product()) Refuse(": the control input is a product");
   }
   const int y = description_.initialise_role;
   if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&

@@ -18,8 +18,7 @@ std::vector<std::string> SplitNames(const std::string& names) {
 std::vector<std::string> ElementsOf(const std::string& names, const Geometry& geometry) {
   if (!names.empty()) return SplitNames(names);
   if (geometry.ambient == 1) return {""};
-  if (geometry.kind == GeometryKind::kUnitQuaternion) return {"w", "x", "y", "z"};
-  if (geometry.kind == GeometryKind::kUnitVector) return {"x", "y", "z"};
+  if (*geometry.row().elements != '\0') return SplitNames(geometry.row().elements);
   std::vector<std::string> numbers;
   for (int i = 0; i < geometry.ambient; ++i) numbers.push_back(std::to_string(i));
   return numbers;
@@ -39,18 +38,16 @@ std::vector<std::string> NumberedNames(const std::string& name, std::size_t size
 }
 
 std::vector<std::string> TangentNames(const std::string& name, const Space& space) {
-  switch (space.geometry.kind) {
-    case GeometryKind::kUnitQuaternion:
-      return {name + ".rx", name + ".ry", name + ".rz"};
-    case GeometryKind::kUnitVector:
-      return {name + ".d0", name + ".d1"};
-    case GeometryKind::kProduct:
-      return NumberedNames(name, static_cast<std::size_t>(space.geometry.tangent));
-    case GeometryKind::kVector:
-    case GeometryKind::kAngle:
-      break;
+  const Geometry& geometry = space.geometry;
+  if (geometry.is_product()) {
+    return NumberedNames(name, static_cast<std::size_t>(geometry.tangent));
   }
-  return AmbientNames(name, space);
+  if (*geometry.row().tangent_elements == '\0') return AmbientNames(name, space);
+  std::vector<std::string> names;
+  for (const std::string& element : SplitNames(geometry.row().tangent_elements)) {
+    names.push_back(name + '.' + element);
+  }
+  return names;
 }
 
 }  // namespace alidade::internal

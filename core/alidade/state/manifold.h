@@ -6,41 +6,53 @@
 #include <vector>
 
 #include "alidade/model/plugin_abi.h"
+#include "alidade/state/geometry_table.h"
 
 namespace alidade {
 
-enum class GeometryKind : std::uint32_t {
-  kVector = ALIDADE_VECTOR,
-  kAngle = ALIDADE_ANGLE,
-  kUnitQuaternion = ALIDADE_UNIT_QUATERNION,
-  kUnitVector = ALIDADE_UNIT_VECTOR,
-  kProduct = ALIDADE_PRODUCT,
-};
-/// `vector`, `angle`, `unit_quaternion`, `unit_vector`, `product`.
-const char* ToString(GeometryKind kind);
-
-/// How far the length of a unit vector or quaternion that comes from outside may be off 1.
+/// The largest accepted difference from 1 of the length of a unit vector or quaternion that the
+/// library did not compute itself.
 inline constexpr double kUnitTolerance = 1e-3;
 
-/// A geometry of geometry.h with its size, chosen at run time.
-struct Geometry {
-  GeometryKind kind = GeometryKind::kVector;
+/// A geometry of alidade/model/geometry.h that is chosen at run time, with its size.
+class Geometry {
+ public:
   int ambient = 1;
   int tangent = 1;
   std::vector<Geometry> parts = {};  ///< of a product
 
-  /// The geometries of geometry.h by name.
-  static Geometry Vector(int size) { return {GeometryKind::kVector, size, size}; }
-  static Geometry UnitQuaternion() { return {GeometryKind::kUnitQuaternion, 4, 3}; }
-  static Geometry UnitVector() { return {GeometryKind::kUnitVector, 3, 2}; }
-  static Geometry Angle() { return {GeometryKind::kAngle, 1, 1}; }
+  /// R^1
+  Geometry() : Geometry(ALIDADE_VECTOR) {}
+  /// The geometry with this number in the C table, which is not a product; `size`: of a vector.
+  explicit Geometry(std::uint32_t number, int size = 1);
+  /// The geometry of a struct of geometry.h; `size`: of a vector whose size is kDynamic.
+  template <class G>
+  static Geometry Of(int size = G::kAmbient) {
+    return Geometry(G::kGeometry, size);
+  }
+  static Geometry Vector(int size) { return Geometry(ALIDADE_VECTOR, size); }
+  static Geometry UnitQuaternion() { return Of<alidade::UnitQuaternion>(); }
+  static Geometry UnitVector() { return Of<alidade::UnitVector>(); }
+  static Geometry Angle() { return Of<alidade::Angle>(); }
   static Geometry Product(std::vector<Geometry> parts);
 
-  /// f(part, ambient offset, tangent offset) for each part of a product; of another geometry for
-  /// itself.
+  /// The entry of the table of geometries.
+  const GeometryRow& row() const { return *row_; }
+  const char* name() const { return row_->name; }
+  bool is_vector() const { return row_->number == ALIDADE_VECTOR; }
+  bool is_product() const { return row_->number == ALIDADE_PRODUCT; }
+  bool is_angle() const { return row_->number == ALIDADE_ANGLE; }
+  /// True if the tangent basis turns with the point, so that a covariance turns with it; of a
+  /// product: that of a part.
+  bool has_transport() const;
+  /// True if element `i` of a difference is an angle in rad.
+  bool IsAngular(int i) const;
+
+  /// Calls f(part, ambient offset, tangent offset) for each part of a product; for any other
+  /// geometry once, for itself.
   template <class F>
   void ForEachPart(const F& f) const {
-    if (kind != GeometryKind::kProduct) return f(*this, 0, 0);
+    if (!is_product()) return f(*this, 0, 0);
     int a = 0, t = 0;
     for (const Geometry& part : parts) {
       f(part, a, t);
@@ -53,36 +65,35 @@ struct Geometry {
   void Plus(const double* x, const double* d, double* y) const;
   /// d = y (-) x
   void Minus(const double* y, const double* x, double* d) const {
-    if (kind != GeometryKind::kVector) return MinusCurved(y, x, d);
+    if (!is_vector()) return MinusCurved(y, x, d);
     for (int i = 0; i < ambient; ++i) d[i] = y[i] - x[i];
   }
-  /// j (tangent x tangent, row-major): carries a tangent vector at `from` to the tangent space of
-  /// `to` along the geodesic. The identity but for unit vectors, whose basis turns with the point.
+  /// Carries a tangent vector at `from` to the tangent space of `to` along the geodesic: writes j
+  /// (tangent x tangent, row-major). It is the identity unless has_transport().
   void Transport(const double* from, const double* to, double* j) const;
-  /// The nearest point of the manifold; an angle is wrapped.
+  /// Moves x to the nearest point of the manifold; wraps an angle.
   void Normalise(double* x) const;
   /// The neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
-  void Identity(double* x) const;
+  std::vector<double> Identity() const;
 
-  friend bool operator==(const Geometry&, const Geometry&) = default;
+  friend bool operator==(const Geometry& a, const Geometry& b) {
+    return a.row_->number == b.row_->number && a.ambient == b.ambient && a.parts == b.parts;
+  }
 
  private:
   void MinusCurved(const double* y, const double* x, double* d) const;
+
+  const GeometryRow* row_;  ///< in the table of the library, which outlives every plugin
 };
 
 /// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
-/// identity for vectors and angles, and where d = 0.
+/// identity for vectors, for angles, and at d = 0.
 void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
 /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
 /// that of the farthest part for products.
 double DistanceFrom(const Geometry& geometry, const double* x);
-namespace internal {
-void WrapAnglesOf(const Geometry& geometry, double* x);
-}
-/// Wraps what is an angle, and leaves the rest.
-inline void WrapAngles(const Geometry& geometry, double* x) {
-  if (geometry.kind != GeometryKind::kVector) internal::WrapAnglesOf(geometry, x);
-}
+/// Wraps each part of x that is an angle.
+void WrapAngles(const Geometry& geometry, double* x);
 
 /// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`, `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);
@@ -95,14 +106,14 @@ struct Space {
   std::vector<std::string> elements;  ///< names of the ambient elements; {""} for a single one
   Geometry geometry;
   unsigned flags = 0;                   ///< ALIDADE_ROLE_*
-  std::vector<std::string> parts = {};  ///< names of those of a product
+  std::vector<std::string> parts = {};  ///< names of the parts of a product
 
   bool optional() const { return (flags & ALIDADE_ROLE_OPTIONAL) != 0; }
   bool landmark() const { return (flags & ALIDADE_ROLE_LANDMARK) != 0; }
   bool shared() const { return (flags & ALIDADE_ROLE_SHARED) != 0; }
 };
 
-/// `name` or `name.element`, for each ambient element: the columns a value is written in.
+/// `name` or `name.element` for each ambient element: the columns of a value.
 std::vector<std::string> ColumnNames(const std::string& name, const Space& space);
 
 }  // namespace alidade

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
@@ -90,8 +92,7 @@ void State::Reserve(BlockId id) {
     return;
   }
   block.tangent_offset = covariance_.Add(block.geometry().tangent);
-  is_flat_ = is_flat_ && block.geometry().kind == GeometryKind::kVector &&
-             block.value_offset == block.tangent_offset;
+  is_flat_ = is_flat_ && block.geometry().is_vector() && block.value_offset == block.tangent_offset;
   covariance_blocks_.insert(std::ranges::lower_bound(covariance_blocks_, id), id);
 }
 
@@ -219,12 +220,15 @@ void State::MoveTo(const std::vector<double>& values) {
 void State::TransportCovariance(const std::vector<double>& values) {
   for (const BlockId id : covariance_blocks_) {
     const Block& block = layout_[id];
-    if (!block.present || block.geometry().kind != GeometryKind::kUnitVector) continue;
-    std::array<double, 4> j;  // a unit vector's tangent has two elements
+    if (!block.present || !block.geometry().has_transport()) continue;
+    constexpr auto kMost = static_cast<std::size_t>(detail::kMaxTangent);
+    std::array<double, kMost * kMost> j;
+    std::array<int, kMost> rows;
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    const std::array rows{block.tangent_offset, block.tangent_offset + 1};
-    covariance_.Propagate(rows, j.data());
+    std::iota(rows.begin(), rows.end(), block.tangent_offset);
+    covariance_.Propagate(std::span(rows).first(static_cast<std::size_t>(block.geometry().tangent)),
+                          j.data());
   }
 }
 
@@ -234,11 +238,14 @@ Workspace::Matrix TransportTo(const State& state, const std::vector<double>& val
   Workspace::Matrix transport = work.Take(n, n);
   transport.setIdentity();
   for (const Block& block : state.layout().blocks()) {
-    if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
-    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> j;
+    if (!block.has_covariance() || !block.geometry().has_transport()) continue;
+    const int size = block.geometry().tangent;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, detail::kMaxTangent,
+                  detail::kMaxTangent>
+        j(size, size);
     block.geometry().Transport(state.values().data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    transport.block<2, 2>(block.tangent_offset, block.tangent_offset) = j;
+    transport.block(block.tangent_offset, block.tangent_offset, size, size) = j;
   }
   return transport;
 }

@@ -31,9 +31,7 @@ State CondensedRun::Filled(State state) {
     const Block block = state.layout().blocks()[i];
     if (block.present || block.value_offset < 0) continue;
     const Geometry& geometry = block.geometry();
-    std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
-    geometry.Identity(value.data());
-    state.Add(static_cast<BlockId>(i), value.data(),
+    state.Add(static_cast<BlockId>(i), geometry.Identity().data(),
               Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
   }
   return state;
@@ -55,7 +53,7 @@ CondensedRun::CondensedRun(Problem problem, const std::vector<StreamInfo>& strea
   l0_ = l0_.leftCols(inputs_).eval();  // the others are zero
   d0_ = Eigen::VectorXd::Zero(l0_.rows());
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
-    return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
+    return block.has_covariance() && block.geometry().has_transport();
   });
   robust_ = std::ranges::any_of(binding_.problem.sensors, [](const SensorBinding& sensor) {
     return sensor.loss.kind != LossKind::kNone;

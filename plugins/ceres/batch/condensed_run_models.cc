@@ -22,16 +22,12 @@ void Difference(const Geometry& geometry, const double* z, const double* h, doub
   Eigen::Map<RowMajor> whole(j, size, size);
   whole = -RowMajor::Identity(size, size);
   geometry.ForEachPart([&](const Geometry& part, int a, int t) {
-    double unused[3], own[9];
-    if (part.kind == GeometryKind::kUnitQuaternion) {
-      ceres_batch::Difference<UnitQuaternion>(z + a, h + a, unused, own);
-    } else if (part.kind == GeometryKind::kUnitVector) {
-      ceres_batch::Difference<UnitVector>(z + a, h + a, unused, own);
-    } else {
-      return;
-    }
-    whole.block(t, t, part.tangent, part.tangent) =
-        Eigen::Map<const RowMajor>(own, part.tangent, part.tangent);
+    VisitGeometry(part.row().number, [&]<class G>(G) {
+      double unused[G::kTangent], block[G::kTangent * G::kTangent];
+      ceres_batch::Difference<G>(z + a, h + a, unused, block);
+      whole.block(t, t, part.tangent, part.tangent) =
+          Eigen::Map<const RowMajor>(block, part.tangent, part.tangent);
+    });
   });
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <type_traits>
 #include <vector>
 
@@ -25,7 +26,7 @@ namespace detail {
 
 /// Geometry of a measurement, which is never a product of geometries.
 struct Measured {
-  GeometryKind kind;
+  std::uint32_t geometry;  ///< its number in the C table
   int ambient, tangent;
 };
 
@@ -36,13 +37,13 @@ struct SensorTraits {
   using Roles = alidade::detail::Blocks<Sensor>;
   static constexpr int kMaxRoles = Roles::kCount;
   static constexpr detail::Measured Measured(const Sensor&) {
-    return {GeometryKind{Z::kGeometry}, Z::kAmbient, Z::kTangent};
+    return {Z::kGeometry, Z::kAmbient, Z::kTangent};
   }
   static std::vector<Geometry> Geometries(const Sensor&) {
     std::vector<Geometry> geometries;
     const auto add = [&](auto index) {
       using G = alidade::detail::SpaceAt<decltype(index)::value, Sensor>;
-      geometries.push_back({GeometryKind{G::kGeometry}, G::kAmbient, G::kTangent});
+      geometries.push_back(Geometry::Of<G>());
     };
     alidade::detail::ForEach(add, typename Roles::Indices{});
     return geometries;
@@ -61,7 +62,7 @@ struct SensorTraits<SensorModel> {
   static constexpr int kMaxRoles = 64;  // the maximum number of roles of a model
   static detail::Measured Measured(const SensorModel& sensor) {
     const Geometry& z = sensor.measurement().geometry;
-    return {z.kind, z.ambient, z.tangent};
+    return {z.row().number, z.ambient, z.tangent};
   }
   static std::vector<Geometry> Geometries(const SensorModel& sensor) {
     std::vector<Geometry> geometries;

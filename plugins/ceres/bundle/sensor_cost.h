@@ -43,7 +43,7 @@ class SensorCost final : public ceres::CostFunction {
     double* j[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j);
     double** const requested = jacobians == nullptr ? nullptr : j;
-    if (kind_.measured().kind != GeometryKind::kVector || !kind_.isotropic)
+    if (kind_.measured().geometry != ALIDADE_VECTOR || !kind_.isotropic)
       return EvaluateGeneral(z, roles, requested, residuals, jacobians);
     if (Traits::Linearise(kind_.sensor, roles, residuals, requested, kind_.strides) != Status::kOk)
       return false;
@@ -75,21 +75,20 @@ class SensorCost final : public ceres::CostFunction {
   [[gnu::noinline]] bool EvaluateGeneral(const double* z, const double* const* roles,
                                          double* const* j, double* residuals,
                                          double** jacobians) const {
-    const GeometryKind geometry = kind_.measured().kind;
-    if (geometry == GeometryKind::kUnitQuaternion)
-      return EvaluateOnManifold<UnitQuaternion>(z, roles, j, residuals, jacobians);
-    if (geometry == GeometryKind::kUnitVector)
-      return EvaluateOnManifold<UnitVector>(z, roles, j, residuals, jacobians);
+    bool is_evaluated = false;
+    const bool is_curved = VisitGeometry(kind_.measured().geometry, [&]<class G>(G) {
+      is_evaluated = EvaluateOnManifold<G>(z, roles, j, residuals, jacobians);
+    });
+    if (is_curved) return is_evaluated;
     if (Traits::Linearise(kind_.sensor, roles, residuals, j, kind_.strides) != Status::kOk)
       return false;
     for (int i = 0; i < kind_.measured().tangent; ++i) residuals[i] -= z[i];
-    if (geometry == GeometryKind::kAngle) residuals[0] = -Angle::Wrap(-residuals[0]);
     Whiten(residuals, 1, 1.0);
     WhitenAll(jacobians, 1.0);
     return true;
   }
 
-  /// Evaluates the cost if z is on a manifold G of 2 or 3 dimensions.
+  /// Evaluates the cost if z is on a manifold G.
   template <class G>
   bool EvaluateOnManifold(const double* z, const double* const* roles, double* const* j,
                           double* residuals, double** jacobians) const {

@@ -94,9 +94,7 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     }
     Blocks roles;
     for (const Space& role : sensor.model->roles()) {
-      std::vector<double> value(static_cast<std::size_t>(role.geometry.ambient));
-      role.geometry.Identity(value.data());
-      roles.push_back(value);
+      roles.push_back(role.geometry.Identity());
     }
     const auto set = [&](const std::string& name, std::vector<double> value) {
       for (std::size_t i = 0; i < names.size(); ++i) {

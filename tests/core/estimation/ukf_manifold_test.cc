@@ -43,8 +43,7 @@ Problem Wanderers(int n) {
     problem.motions.push_back({name, model, {id}});
     Prior prior;
     prior.block = id;
-    prior.mean.resize(G::kAmbient);
-    model->blocks()[0].geometry.Identity(prior.mean.data());
+    prior.mean = model->blocks()[0].geometry.Identity();
     prior.covariance =
         kPriorSigma * kPriorSigma * Eigen::MatrixXd::Identity(G::kTangent, G::kTangent);
     problem.priors.push_back(prior);
@@ -54,19 +53,11 @@ Problem Wanderers(int n) {
   return problem;
 }
 
-Problem WanderersOf(GeometryKind kind, int n) {
-  switch (kind) {
-    case GeometryKind::kVector:
-      return Wanderers<Vec<3>>(n);
-    case GeometryKind::kAngle:
-      return Wanderers<Angle>(n);
-    case GeometryKind::kUnitQuaternion:
-      return Wanderers<UnitQuaternion>(n);
-    case GeometryKind::kUnitVector:
-    case GeometryKind::kProduct:  // of measurements alone
-      break;
-  }
-  return Wanderers<UnitVector>(n);
+Problem WanderersOf(std::uint32_t geometry, int n) {
+  if (geometry == ALIDADE_VECTOR) return Wanderers<Vec<3>>(n);
+  Problem problem;
+  EXPECT_TRUE(VisitGeometry(geometry, [&]<class G>(G) { problem = Wanderers<G>(n); }));
+  return problem;
 }
 
 /// x (+) n with n ~ N(0, sigma^2 I).
@@ -78,15 +69,15 @@ std::vector<double> Disturbed(const Geometry& geometry, const std::vector<double
   return moved;
 }
 
-using GeometryAlphaSize = std::tuple<GeometryKind, double, int>;
+using GeometryAlphaSize = std::tuple<std::uint32_t, double, int>;
 class UkfOf : public ::testing::TestWithParam<GeometryAlphaSize> {};
 
 // Isotropic covariances: every step adds Q, and the one block that is measured has 1/P+ = 1/P +
 // 1/R. The points lie c sigma from the estimate, c^2 <= 60, and bend moments by c^2 sigma^2 / 12 <=
 // 2e-3 of themselves; the estimates, by that part of an innovation of 0.04 at each correction.
 TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
-  const auto [kind, alpha, n] = GetParam();
-  const Problem problem = WanderersOf(kind, n);
+  const auto [number, alpha, n] = GetParam();
+  const Problem problem = WanderersOf(number, n);
   const Geometry& geometry = problem.layout[0].geometry();
   const std::size_t count = problem.layout.blocks().size();
   UkfOptions options;
@@ -128,19 +119,25 @@ TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
 }
 
 std::string NameOf(const ::testing::TestParamInfo<GeometryAlphaSize>& one) {
-  return std::string(ToString(std::get<0>(one.param))) + "_alpha1e" +
+  return std::string(FindGeometry(std::get<0>(one.param))->name) + "_alpha1e" +
          std::to_string(std::lround(-std::log10(std::get<1>(one.param)))) + "_n" +
          std::to_string(std::get<2>(one.param));
 }
-constexpr auto kGeometries = {GeometryKind::kVector, GeometryKind::kAngle,
-                              GeometryKind::kUnitQuaternion, GeometryKind::kUnitVector};
+/// The numbers of all geometries of a state.
+std::vector<std::uint32_t> GeometriesOfStates() {
+  std::vector<std::uint32_t> numbers;
+  for (const GeometryRow* row : detail::kGeometryRows) {
+    if (row->number != ALIDADE_PRODUCT) numbers.push_back(row->number);
+  }
+  return numbers;
+}
 INSTANTIATE_TEST_SUITE_P(Few, UkfOf,
-                         ::testing::Combine(::testing::ValuesIn(kGeometries),
+                         ::testing::Combine(::testing::ValuesIn(GeometriesOfStates()),
                                             ::testing::Values(1e-4, 1e-3, 0.01, 0.1, 1.0),
                                             ::testing::Values(6)),
                          NameOf);
 INSTANTIATE_TEST_SUITE_P(Many, UkfOf,
-                         ::testing::Combine(::testing::ValuesIn(kGeometries),
+                         ::testing::Combine(::testing::ValuesIn(GeometriesOfStates()),
                                             ::testing::Values(1e-4, 0.01, 1.0),
                                             ::testing::Values(30)),
                          NameOf);

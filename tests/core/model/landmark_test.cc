@@ -110,7 +110,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
     const auto add = [&](auto index) {
       using G = detail::SpaceAt<decltype(index)::value, Representation>;
       spaces.emplace_back();
-      spaces.back().geometry = {static_cast<GeometryKind>(G::kGeometry), G::kAmbient, G::kTangent};
+      spaces.back().geometry = Geometry::Of<G>();
     };
     detail::ForEach(add, typename detail::Blocks<Representation>::Indices{});
     const auto convert = [](const Blocks& x) {

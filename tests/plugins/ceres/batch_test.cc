@@ -309,8 +309,8 @@ struct Still : Motion<0, G> {
 /// At the estimate x the derivative of |x (-) m|^2 / 0.25 + sum |z (-) x|^2 / 0.16 vanishes.
 template <class G>
 void ExpectStationary(const Geometry& geometry) {
-  std::vector<double> mean(G::kAmbient), x(G::kAmbient);
-  geometry.Identity(mean.data());
+  const std::vector<double> mean = geometry.Identity();
+  std::vector<double> x(G::kAmbient);
   Problem problem;
   const SharedMotion still = MakeMotion(Still<G>(), "still");
   const BlockId id = problem.layout.Declare("p.x", "p", still->blocks()[0]);

@@ -221,8 +221,7 @@ Problem OnManifold(const Geometry& geometry) {
   const BlockId id = problem.layout.Declare("p.x", "p", model->blocks()[0]);
   problem.motions.push_back({"p", model, {id}});
   const int t = geometry.tangent;
-  std::vector<double> mean(G::kAmbient);
-  geometry.Identity(mean.data());
+  const std::vector<double> mean = geometry.Identity();
   problem.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
   AddSensor(problem, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   return problem;
@@ -231,8 +230,7 @@ Problem OnManifold(const Geometry& geometry) {
 /// Measurements far from the mean and from one another.
 std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
   std::vector<Frame> frames;
-  std::vector<double> mean(static_cast<std::size_t>(geometry.ambient));
-  geometry.Identity(mean.data());
+  const std::vector<double> mean = geometry.Identity();
   for (int k = 0; k < count; ++k) {
     const double d[3] = {0.9 + 0.4 * std::sin(2.0 * k), -0.5 * std::cos(3.0 * k), 0.3};
     Measurement m{TimestampFromSeconds(0.1 * k), 0, -1, mean, {}};

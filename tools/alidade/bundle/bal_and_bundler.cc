@@ -115,7 +115,7 @@ BundleCamera CameraFromTransform(const double* q, const double* t, bool looks_ba
   } else {
     std::copy_n(inverse, 4, camera.orientation.data());
   }
-  Normalise<UnitQuaternion>(camera.orientation.data());
+  UnitQuaternion::Normalise(camera.orientation.data());
   for (double& x : camera.orientation) x += 0.0;
   return camera;
 }

@@ -153,8 +153,7 @@ BundleRoles RolesOf(const SensorModel& sensor) {
   if (std::max({roles.position, roles.orientation, roles.point}) == kNone)
     FailRoles(sensor, "it lacks one of position, orientation and a point");
   const Geometry& z = sensor.measurement().geometry;
-  if (z.kind != GeometryKind::kVector || z.ambient > 4)
-    FailRoles(sensor, "it measures " + ToString(z));
+  if (!z.is_vector() || z.ambient > 4) FailRoles(sensor, "it measures " + ToString(z));
   if (sensor.known_size() > 0) FailRoles(sensor, "it needs known numbers with each measurement");
   return roles;
 }

@@ -75,7 +75,7 @@ Start ReadStart(const std::filesystem::path& path) {
     start.timestamps.push_back(rows.Time(0, "t"));
     const auto [x, y, z, qx, qy, qz, qw] = PoseNumbers(rows, kTumPose);
     BundleCamera& camera = start.cameras.emplace_back(BundleCamera{{x, y, z}, {qw, qx, qy, qz}});
-    Normalise<UnitQuaternion>(camera.orientation.data());
+    UnitQuaternion::Normalise(camera.orientation.data());
   }
   return start;
 }

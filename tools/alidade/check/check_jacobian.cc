@@ -54,7 +54,7 @@ class JacobianTest {
   std::vector<Entry> Column(std::size_t i, int k, Eigen::Index column) const {
     double h = 0.1;
     Input(i).geometry.ForEachPart([&](const Geometry& part, int a, int t) {
-      if (part.kind != GeometryKind::kVector || k < t || k >= t + part.tangent) return;
+      if (!part.is_vector() || k < t || k >= t + part.tangent) return;
       h *= std::max(std::abs(inputs_[i][static_cast<std::size_t>(a + k - t)]), 0.01);
     });
     const Curve curve = [&](double t) { return Moved(i, k, t); };

@@ -107,7 +107,7 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
       if (!defect.empty()) return names[static_cast<std::size_t>(c)] + ' ' + defect;
     }
     if (DistanceFrom(space.geometry, dense.data()) > 1e-9) {
-      return space.name + " is not a " + ToString(space.geometry.kind);
+      return space.name + " is not a " + space.geometry.name();
     }
   }
   return {};

@@ -81,7 +81,7 @@ std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& tr
       size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
     }
     const int truth_index = block_truths[static_cast<std::size_t>(prior.block)];
-    rows.push_back({block.name, ToString(geometry.kind), size, block.space.unit, block.owner,
+    rows.push_back({block.name, geometry.name(), size, block.space.unit, block.owner,
                     StatusText(block.status),
                     truth_index >= 0 ? truths[static_cast<std::size_t>(truth_index)].name
                     : truths.empty() ? ""

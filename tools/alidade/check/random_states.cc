@@ -12,11 +12,10 @@ constexpr double kPi = 3.14159265358979323846;
 
 /// Draws x = identity (+) d. Vectors have elements of magnitude 0.03 to 30; `positive`: all > 0.
 std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random& random) {
-  std::vector<double> x(static_cast<std::size_t>(geometry.ambient));
-  std::vector<double> d;
+  std::vector<double> x = geometry.Identity(), d;
   geometry.ForEachPart([&](const Geometry& part, int, int) {
     for (int i = 0; i < part.tangent; ++i) {
-      if (part.kind == GeometryKind::kVector) {
+      if (part.is_vector()) {
         const double sign = positive || random.Uniform() < 0.5 ? 1.0 : -1.0;
         d.push_back(sign * std::pow(10.0, 3.0 * random.Uniform() - 1.5));
       } else {
@@ -24,37 +23,44 @@ std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random&
       }
     }
   });
-  if (x.empty()) return x;
-  geometry.Identity(x.data());
   geometry.Plus(x.data(), d.data(), x.data());
   return x;
 }
 
+/// Special points. Of a vector: all elements 0, 1e-6 and 1e6, of either sign. Of a product: the
+/// special points of one part, the other parts at the neutral element. Else the neutral element, and
+/// the points at pi, just short of -pi, and pi / 2 from it along each tangent direction; of a double
+/// cover also the negative of the neutral element.
 std::vector<std::vector<double>> Edges(const Geometry& geometry) {
-  switch (geometry.kind) {
-    case GeometryKind::kAngle:
-      return {{0.0}, {kPi}, {-kPi + 1e-9}, {kPi - 1e-9}};
-    case GeometryKind::kUnitQuaternion:
-      return {{1, 0, 0, 0}, {-1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0.6, -0.8}};
-    case GeometryKind::kUnitVector:
-      return {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}};
-    case GeometryKind::kVector:
-    case GeometryKind::kProduct:
-      break;
-  }
   std::vector<std::vector<double>> edges;
-  if (geometry.kind == GeometryKind::kProduct) {  // edges of one part, identity of the others
+  if (geometry.is_vector()) {
+    for (const double value : {0.0, 1e-6, -1e-6, 1e6, -1e6}) {
+      edges.emplace_back(static_cast<std::size_t>(geometry.ambient), value);
+    }
+    return edges;
+  }
+  const std::vector<double> identity = geometry.Identity();
+  if (geometry.is_product()) {
     geometry.ForEachPart([&](const Geometry& part, int a, int) {
       for (const std::vector<double>& edge : Edges(part)) {
-        edges.emplace_back(static_cast<std::size_t>(geometry.ambient));
-        geometry.Identity(edges.back().data());
+        edges.push_back(identity);
         std::ranges::copy(edge, edges.back().begin() + a);
       }
     });
     return edges;
   }
-  for (const double value : {0.0, 1e-6, -1e-6, 1e6, -1e6}) {
-    edges.emplace_back(static_cast<std::size_t>(geometry.ambient), value);
+  edges.push_back(identity);
+  for (int i = 0; i < geometry.tangent; ++i) {
+    for (const double length : {kPi, -kPi + 1e-9, 0.5 * kPi}) {
+      std::vector<double> d(static_cast<std::size_t>(geometry.tangent));
+      d[static_cast<std::size_t>(i)] = length;
+      edges.push_back(identity);
+      geometry.Plus(edges.back().data(), d.data(), edges.back().data());
+    }
+  }
+  if (geometry.row().double_cover) {
+    edges.push_back(identity);
+    for (double& element : edges.back()) element = -element;
   }
   return edges;
 }

@@ -139,12 +139,14 @@ void ReadCovariances(const fs::path& file, Series& series) {
 
 Geometry GeometryOf(const JsonNode& block) {
   const int size = static_cast<int>(block.At("size").Count(1'000'000));
-  const Geometry choices[] = {Geometry::Vector(size), Geometry::Angle(), Geometry::UnitQuaternion(),
-                              Geometry::UnitVector()};
-  const auto kind = block.At("geometry")
-                        .Choice({ToString(choices[0].kind), ToString(choices[1].kind),
-                                 ToString(choices[2].kind), ToString(choices[3].kind)});
-  return choices[kind];
+  std::vector<Geometry> geometries;
+  std::vector<std::string> names;
+  for (const GeometryRow* row : detail::kGeometryRows) {
+    if (row->number == ALIDADE_PRODUCT) continue;  // of measurements alone
+    geometries.emplace_back(row->number, size);
+    names.emplace_back(row->name);
+  }
+  return geometries[static_cast<std::size_t>(block.At("geometry").Choice(names))];
 }
 
 std::vector<SeriesBlock> ReadBlocks(const JsonNode& entry) {

@@ -8,13 +8,8 @@
 namespace alidade::internal {
 
 std::vector<bool> AreAngles(const Geometry& geometry) {
-  std::vector<bool> angles(static_cast<std::size_t>(geometry.tangent), false);
-  geometry.ForEachPart([&](const Geometry& part, int, int first) {
-    for (int i = 0; i < part.tangent; ++i) {
-      angles[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)] =
-          part.kind != GeometryKind::kVector;
-    }
-  });
+  std::vector<bool> angles;
+  for (int i = 0; i < geometry.tangent; ++i) angles.push_back(geometry.IsAngular(i));
   return angles;
 }
 

@@ -25,7 +25,7 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
     for (const SeriesBlock& block : recorded->blocks) {
       blocks.push_back({{"name", block.name},
                         {"unit", block.unit},
-                        {"geometry", ToString(block.geometry.kind)},
+                        {"geometry", block.geometry.name()},
                         {"size", block.geometry.ambient}});
     }
     json["rows"] = recorded->estimate_rows;

@@ -45,7 +45,7 @@ struct RunArguments {
 
 /// Events of one estimator with the same kind.
 struct EventGroup {
-  std::string kind;
+  EventKind kind;
   std::vector<const Event*> events;
 };
 
@@ -75,7 +75,7 @@ std::string EventSummary(const RunResult& result) {
   for (const EstimatorResult& estimator : result.estimators) {
     for (const EventGroup& group : Group(estimator.events)) {
       const std::size_t count = group.events.size();
-      text += estimator.name + ": " + group.kind;
+      text += estimator.name + ": " + ToString(group.kind);
       if (count > 1) text += ", " + std::to_string(count) + " times";
       text += '\n';
       for (std::size_t i = 0; i < std::min(count, kShown); ++i) {

@@ -73,7 +73,7 @@ std::map<std::string, Means> Sweep(const std::string& name, const Settings& sett
   return means;
 }
 
-bool HasEvent(const EstimatorResult& result, const std::string& kind) {
+bool HasEvent(const EstimatorResult& result, EventKind kind) {
   return std::any_of(result.events.begin(), result.events.end(),
                      [&](const Event& event) { return event.kind == kind; });
 }
@@ -106,7 +106,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
     if (!ekf.diverged) continue;
     ++diverged;
     for (const Event& event : ekf.events) {
-      if (event.kind != "diverged") continue;
+      if (event.kind != EventKind::kDiverged) continue;
       EXPECT_GT(Seconds(event.timestamp), 1.0) << "seed " << seed;
     }
   }
@@ -122,7 +122,7 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   EXPECT_TRUE(ekf.inconsistent);
   ASSERT_EQ(ekf.unobservable.size(), 1u);
   EXPECT_EQ(ekf.unobservable[0].back(), "template.inverse_distance");
-  EXPECT_TRUE(HasEvent(ekf, "unobservable"));
+  EXPECT_TRUE(HasEvent(ekf, EventKind::kUnobservable));
 }
 
 // Experiment 4.3: lag against noise.
@@ -369,7 +369,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
     const RunResult run = RunExample("08_depth_all_estimators", wide);
     const auto result = std::ranges::find(run.estimators, "ukf", &EstimatorResult::name);
     ASSERT_NE(result, run.estimators.end());
-    EXPECT_TRUE(HasEvent(*result, "guarded")) << seed;
+    EXPECT_TRUE(HasEvent(*result, EventKind::kGuarded)) << seed;
     EXPECT_FALSE(result->diverged || result->inconsistent) << seed;
     for (const auto& [key, value] : result->metrics) {
       EXPECT_TRUE(std::isfinite(value)) << seed << ' ' << key;

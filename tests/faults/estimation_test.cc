@@ -60,7 +60,7 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
     if (iterated) filter = std::make_unique<Iekf>(problem, IekfOptions{}, StreamsOf(problem));
     const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
-    EXPECT_TRUE(HasEvent(report, "repaired"));
+    EXPECT_TRUE(HasEvent(report, EventKind::kRepaired));
     EXPECT_EQ(filter->state().values(), (std::vector<double>{1.0, 2.0}));
     // The nearest that its factors give: l = 1.1, pivots 1 and -0.21, which counts as zero.
     const Eigen::MatrixXd p = filter->state().covariance().Dense();
@@ -70,7 +70,7 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
     EXPECT_GE(eigen.eigenvalues().minCoeff(), -1e-12);
     const UpdateReport& next = filter->Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(next.measurements()[0].outcome, Outcome::kAccepted);
-    EXPECT_FALSE(HasEvent(next, "repaired"));
+    EXPECT_FALSE(HasEvent(next, EventKind::kRepaired));
     EXPECT_FALSE(filter->failed());
   }
 }
@@ -89,7 +89,7 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   Open ekf(problem, options, StreamsOf(problem));
   for (int k = 0; k <= options.max_covariance_repairs; ++k) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
-    EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
+    EXPECT_EQ(HasEvent(report, EventKind::kRepaired), k < options.max_covariance_repairs) << k;
     EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
     // Spoilt again, from where it is.
     ekf.engine().f.state.covariance().SetBlock(0, 0, Indefinite());
@@ -104,7 +104,7 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   Ekf ekf(problem, options, StreamsOf(problem));
   const Ekf before = ekf;
   for (int k = 0; k < 3; ++k) {
-    EXPECT_TRUE(HasEvent(ekf.Process(FrameAt(0.0, {{0, -1.0}})), "repaired")) << k;
+    EXPECT_TRUE(HasEvent(ekf.Process(FrameAt(0.0, {{0, -1.0}})), EventKind::kRepaired)) << k;
     EXPECT_FALSE(ekf.failed());
     ekf = before;
   }
@@ -141,10 +141,10 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
   Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -0.5}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
-  ASSERT_TRUE(HasEvent(report, "not_pd"));
-  const auto event = std::ranges::find(report.events, "not_pd", &Event::kind);
+  ASSERT_TRUE(HasEvent(report, EventKind::kNotPd));
+  const auto event = std::ranges::find(report.events, EventKind::kNotPd, &Event::kind);
   EXPECT_EQ(event->text, "sensor 'difference': S is not positive definite");
-  EXPECT_FALSE(HasEvent(report, "repaired")) << "P is not to blame";
+  EXPECT_FALSE(HasEvent(report, EventKind::kRepaired)) << "P is not to blame";
   EXPECT_EQ(ekf.state().values(), (std::vector<double>{1.0, 2.0}));
   EXPECT_EQ(ekf.state().covariance().Dense(), Eigen::MatrixXd(ones));
   EXPECT_FALSE(ekf.failed());
@@ -162,7 +162,7 @@ TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
   for (const MeasurementReport& entry : report.measurements()) {
     EXPECT_EQ(entry.outcome, Outcome::kNotPd);
   }
-  EXPECT_TRUE(HasEvent(report, "not_pd"));
+  EXPECT_TRUE(HasEvent(report, EventKind::kNotPd));
   EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 1.0);
   EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0);
   EXPECT_FALSE(ekf.failed());

@@ -114,8 +114,9 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   Experiment experiment = MakeExperiment(frames);
   Recorder recorder(options, MakeConfig());
   RunResult result = RunInto(recorder, experiment);
-  result.estimators[0].events.push_back({33'000'000, "note", "a \"word\", and\nanother"});
-  result.estimators[0].events.push_back({kNoTimestamp, "note", "timeless"});
+  result.estimators[0].events.push_back(
+      {33'000'000, EventKind::kEstimatorSpecific, "a \"word\", and\nanother"});
+  result.estimators[0].events.push_back({kNoTimestamp, EventKind::kEstimatorSpecific, "timeless"});
   recorder.Finish(result);
 }
 

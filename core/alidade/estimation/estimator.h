@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/estimation/event.h"
 #include "alidade/estimation/frame.h"
 #include "alidade/estimation/landmarks.h"
 #include "alidade/model/status.h"
@@ -134,14 +135,6 @@ class MeasurementReports {
  private:
   std::vector<MeasurementReport> entries_;
   std::vector<std::vector<double>> numbers_;
-};
-
-/// Event of an estimator that is reported to the user.
-struct Event {
-  Timestamp timestamp = kNoTimestamp;
-  std::string kind;  ///< one word: diverged, rejection_recovery, conditioning, not_finite, ...
-  std::string text;
-  bool divergence = false;  ///< the estimator diverged or failed
 };
 
 /// Parts of the processing of a frame, in their order; see Filter.

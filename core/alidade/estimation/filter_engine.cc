@@ -12,7 +12,7 @@ namespace alidade::internal {
 namespace {
 
 Event StaleEvent(const Frame& frame, Timestamp state) {
-  return {frame.timestamp, "stale",
+  return {frame.timestamp, EventKind::kStale,
           "the frame at " + SecondsText(frame.timestamp) + " is older than the state at " +
               SecondsText(state) +
               ": its measurements are not used; if it came late, set `out_of_sequence: {policy: "
@@ -213,9 +213,10 @@ bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   const Outcome outcome = method->Correct(f, rows);
   AddElapsedTo(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
-    AddEvent(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
+    AddEvent(f, EventKind::kNotPd,
+             "the update would leave S or P not positive definite; rolled back");
   } else if (outcome == Outcome::kNotFinite) {
-    AddEvent(f, "not_finite", "the update is not finite; rolled back");
+    AddEvent(f, EventKind::kNotFinite, "the update is not finite; rolled back");
   }
   if (outcome != Outcome::kAccepted) {
     for (const PendingMeasurement* const pending : rows) {

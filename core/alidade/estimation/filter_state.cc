@@ -48,7 +48,7 @@ void FilterState::StoreFirstEstimates() {
   }
 }
 
-[[gnu::noinline]] Event& AddEvent(FilterState& f, const char* kind, std::string text) {
+[[gnu::noinline]] Event& AddEvent(FilterState& f, EventKind kind, std::string text) {
   f.report.events.push_back({f.timestamp, kind, std::move(text)});
   return f.report.events.back();
 }
@@ -66,12 +66,12 @@ std::string Describe(const State& state, std::span<const BlockId> blocks) {
   return text;
 }
 
-void AddDivergenceEvent(FilterState& f, const char* kind, std::string text) {
+void AddDivergenceEvent(FilterState& f, EventKind kind, std::string text) {
   f.health.diverged = true;
   AddEvent(f, kind, std::move(text)).divergence = true;
 }
 
-[[gnu::noinline]] void End(FilterState& f, const char* kind, const std::string& reason) {
+[[gnu::noinline]] void End(FilterState& f, EventKind kind, const std::string& reason) {
   f.health.ended = true;
   std::vector<BlockId> blocks(f.problem_index->problem.layout.blocks().size());
   std::iota(blocks.begin(), blocks.end(), 0);

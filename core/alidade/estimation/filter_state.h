@@ -66,12 +66,12 @@ struct FilterState {
 };
 
 /// Appends an event to the report. Its timestamp is set at the end of the frame.
-Event& AddEvent(FilterState& f, const char* kind, std::string text);
+Event& AddEvent(FilterState& f, EventKind kind, std::string text);
 /// Appends an event after which the filter counts as diverged.
-void AddDivergenceEvent(FilterState& f, const char* kind, std::string text);
+void AddDivergenceEvent(FilterState& f, EventKind kind, std::string text);
 /// Returns `block = value, ...` for those of the blocks that have a value.
 std::string Describe(const State& state, std::span<const BlockId> blocks);
 /// Ends the filter with an event: the reason, the last good state, the last used measurement.
-void End(FilterState& f, const char* kind, const std::string& reason);
+void End(FilterState& f, EventKind kind, const std::string& reason);
 
 }  // namespace alidade::internal

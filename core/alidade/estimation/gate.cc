@@ -46,7 +46,8 @@ Gate::Gate(const Problem& problem, const EkfOptions& options)
   CheckConditioning(f, pending);
   pending.report->nis = std::isnan(nis) ? 0.0 : nis;
   if (!std::isnan(nis)) return Outcome::kGated;
-  AddEvent(f, "not_pd", "sensor '" + pending.binding->name + "': S is not positive definite");
+  AddEvent(f, EventKind::kNotPd,
+           "sensor '" + pending.binding->name + "': S is not positive definite");
   return Outcome::kNotPd;
 }
 
@@ -68,7 +69,7 @@ Outcome Gate::CheckFinite(FilterState& f, PendingMeasurement& pending) {
                                                               : nullptr;
   if (quantity == nullptr) return Outcome::kAccepted;
   entry.s = {};
-  AddEvent(f, "not_finite",
+  AddEvent(f, EventKind::kNotFinite,
            "sensor '" + pending.binding->name + "': " + quantity + " is not finite");
   return Outcome::kNotFinite;
 }
@@ -100,7 +101,7 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   const auto sensor = static_cast<std::size_t>(pending.sensor);
   if (is_warned_[sensor]) return;
   is_warned_[sensor] = true;
-  AddEvent(f, "conditioning",
+  AddEvent(f, EventKind::kConditioning,
            "sensor '" + pending.binding->name + "': noise variance " +
                RoundedText(pending.R[i], 3) + " is negligible compared with H P H' = " +
                RoundedText(pending.s[i] - pending.R[i], 3) + "; S is badly conditioned");

@@ -88,7 +88,7 @@ Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* con
     source += count;
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    AddEvent(f, "not_converged",
+    AddEvent(f, EventKind::kNotConverged,
              "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
                  (minimum->step ? ", a step of " + RoundedText(*minimum->step, 3) +
                                       " sigma before its optimum"

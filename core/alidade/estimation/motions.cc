@@ -65,10 +65,10 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
   if (outcome == Outcome::kAccepted) return {};
   const std::string model = "motion model of '" + motion.name + "' ";
   if (outcome == Outcome::kNotFinite) {
-    return {"not_finite", model + "steps to a state that is not finite"};
+    return {EventKind::kNotFinite, model + "steps to a state that is not finite"};
   }
   const bool failed = outcome == Outcome::kFailed;
-  return {failed ? "plugin_failed" : "diverged",
+  return {failed ? EventKind::kPluginFailed : EventKind::kDiverged,
           model + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
 }
 
@@ -183,7 +183,7 @@ StepError Motions::Apply(State& state) {
     if (AllFinite(step.f) && AllFinite(step.g) && AllFinite(step.l)) continue;
     return StepErrorOf(index_->problem.motions[i], Outcome::kNotFinite);
   }
-  return {"not_finite", "the covariance after the step is not finite"};
+  return {EventKind::kNotFinite, "the covariance after the step is not finite"};
 }
 
 /// Returns whether P after this step cannot overflow, because |F P F'|_ij <= (n max|F|)^2 max|P|

@@ -20,15 +20,15 @@ namespace alidade::internal {
 class StepError {
  public:
   StepError() = default;
-  StepError(const char* kind, std::string text)
+  StepError(EventKind kind, std::string text)
       : detail_(std::make_unique<const Detail>(Detail{kind, std::move(text)})) {}
   explicit operator bool() const { return detail_ != nullptr; }
-  const char* kind() const { return detail_->kind; }  ///< of the event
+  EventKind kind() const { return detail_->kind; }  ///< of the event
   const std::string& text() const { return detail_->text; }
 
  private:
   struct Detail {
-    const char* kind;
+    EventKind kind;
     std::string text;
   };
   std::unique_ptr<const Detail> detail_;

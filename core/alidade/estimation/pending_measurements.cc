@@ -168,7 +168,7 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
 }
 
 [[gnu::noinline]] void ReportPluginFailure(FilterState& f, const PendingMeasurement& pending) {
-  AddEvent(f, "plugin_failed",
+  AddEvent(f, EventKind::kPluginFailed,
            "sensor '" + pending.binding->name + "': " + pending.model->error_text());
 }
 
@@ -182,7 +182,7 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
   is_reported = 1;
   std::vector<BlockId> blocks;
   for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
-  AddDivergenceEvent(f, "diverged",
+  AddDivergenceEvent(f, EventKind::kDiverged,
                      "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
 }
 

@@ -76,12 +76,12 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
                            RoundedText(defect, 3) + " of its largest variance";
   if (repairs_ == options_.max_covariance_repairs) {
-    return End(f, "not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
+    return End(f, EventKind::kNotPd, text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
   f.motions.EndInterval();
   p.SetBlock(0, 0, ProductTransposed(root, root));
-  AddEvent(f, "repaired",
+  AddEvent(f, EventKind::kRepaired,
            text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
                std::to_string(options_.max_covariance_repairs) + ")");
 }
@@ -100,14 +100,14 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
       Invert(f, pending, nullptr, inverse) == Outcome::kAccepted) {
     ResetMotionBlocks(f, target->block);
     Initialise(f, pending, inverse);
-    AddEvent(f, "rejection_recovery",
+    AddEvent(f, EventKind::kRejectionRecovery,
              reason + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
   char& inflated = f.health.inflated[static_cast<std::size_t>(pending.sensor)];
   if (inflated != 0) return;
   inflated = 1;
-  AddEvent(f, "rejection_recovery",
+  AddEvent(f, EventKind::kRejectionRecovery,
            reason + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
                                         : "it has no estimated block to inflate"));
 }

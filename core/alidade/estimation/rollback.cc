@@ -78,7 +78,7 @@ Rollback::Processed Rollback::Reject(Frame frame) {
   rejected.report = rejected.snapshot->Process(rejected.frame);
   rejected.report.inputs.clear();
   rejected.report.events = {
-      {rejected.frame.timestamp, "stale",
+      {rejected.frame.timestamp, EventKind::kStale,
        "the frame at " + internal::SecondsText(rejected.frame.timestamp) + " is " +
            internal::SecondsText(internal::Lag(newest, rejected.frame.timestamp)) +
            " older than the newest, beyond the window of " + internal::SecondsText(window_) +

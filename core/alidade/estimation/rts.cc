@@ -159,7 +159,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     const Eigen::MatrixXd p = frame->p - internal::Congruence(joint, information);
     const bool is_positive = (p.diagonal().array() >= 0.0).all();
     if (!is_positive) {
-      events.push_back({timestamp(), "not_pd",
+      events.push_back({timestamp(), EventKind::kNotPd,
                         "a smoothed variance in frame " +
                             std::to_string(forward_frames_.rend() - frame - 1) +
                             " is negative because of rounding; the covariance of the filter "

@@ -70,15 +70,15 @@ StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Even
   const bool overflow = __builtin_sub_overflow(sub_step.end, start, &elapsed);
   sub_step.steps = overflow ? 0 : (elapsed <= max_dt_ ? 1 : (elapsed - 1) / max_dt_ + 1);
   if (overflow || sub_step.steps > kMaxSteps) {
-    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(start)) +
-                                     " s would need more than " +
-                                     RoundedText(static_cast<double>(kMaxSteps)) + " steps of " +
-                                     RoundedText(max_dt_s_) + " s"};
+    return {EventKind::kTooManySubsteps,
+            "a gap of " + RoundedText(Seconds(sub_step.end) - Seconds(start)) +
+                " s would need more than " + RoundedText(static_cast<double>(kMaxSteps)) +
+                " steps of " + RoundedText(max_dt_s_) + " s"};
   }
   sub_step.dt_s = Seconds(elapsed);
   if (sub_step.steps > 1) sub_step.dt_s /= static_cast<double>(sub_step.steps);
   if (sub_step.steps >= 2 * max_reported_steps_) {
-    events.push_back({start, "substeps",
+    events.push_back({start, EventKind::kSubsteps,
                       "a gap of " + RoundedText(Seconds(elapsed)) +
                           " s, longer than max_dt_s = " + RoundedText(max_dt_s_) +
                           ", is divided into " + std::to_string(sub_step.steps) + " equal steps"});
@@ -105,7 +105,8 @@ std::span<const double> Timeline::Input(std::size_t motion, Timestamp start,
     found->stale_reported = false;
     return found->value;
   }
-  if (!found->stale_reported) events.push_back({start, "input_stale", DescribeMissing(*found)});
+  if (!found->stale_reported)
+    events.push_back({start, EventKind::kInputStale, DescribeMissing(*found)});
   found->stale_reported = true;
   return found->neutral;
 }
@@ -127,7 +128,7 @@ void Timeline::UseInputs(Timestamp start, Motions& motions, std::vector<Event>& 
       ALIDADE_EXPECTS(m.values.size() == input.value.size());
       const std::string defect = Defect(input.geometry, m.values);
       if (!defect.empty() && !input.refusal_reported) {
-        report.events.push_back({frame.timestamp, "input_refused",
+        report.events.push_back({frame.timestamp, EventKind::kInputRefused,
                                  "a control input of '" + input.name + "' from stream '" +
                                      input.binding.stream + "' is " + defect +
                                      ": the previous input continues to act"});

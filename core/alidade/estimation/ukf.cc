@@ -153,7 +153,7 @@ const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   if (defect < -kRounding) {
     f.motions.EndInterval();
     p.SetBlock(0, 0, root_ * root_.transpose());
-    AddEvent(f, "repaired",
+    AddEvent(f, EventKind::kRepaired,
              "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
                  " of its largest variance; negative pivots count as zero");
   }
@@ -195,7 +195,7 @@ void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
         index < f.problem_index->sensor_places.size()
             ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
             : "motion";
-    AddEvent(f, "guarded",
+    AddEvent(f, EventKind::kGuarded,
              subject + ": sigma points leave its domain or have no mean" +
                  (is_sufficient ? "" : ", and their spread can be narrowed no further") +
                  "; their spread is divided by " + std::to_string(1 << halvings));
@@ -297,12 +297,12 @@ StepError UkfEquations::Step(FilterState& f, double dt_s) {
     return {};
   }
   if (outcome == Outcome::kFailed) {
-    return {"plugin_failed",
+    return {EventKind::kPluginFailed,
             "motion model of '" + failed_motion_->name +
                 "' cannot step a sigma point: " + failed_motion_->model->error_text()};
   }
-  return {"diverged", "the sigma points cannot step, even with their spread divided by " +
-                          std::to_string(1 << halvings)};
+  return {EventKind::kDiverged, "the sigma points cannot step, even with their spread divided by " +
+                                    std::to_string(1 << halvings)};
 }
 
 /// Computes h of one measurement at the sigma points. Requires that h is defined at the estimate.

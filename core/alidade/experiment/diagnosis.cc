@@ -19,7 +19,7 @@ void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResu
     const bool is_angle = measured.geometry.is_angle();
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
-        {kNoTimestamp, "unit",
+        {kNoTimestamp, EventKind::kUnit,
          "sensor '" + sensor.name + "': the median of |z - h| is more than " +
              (is_angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
              "; is stream '" + sensor.stream + "' in " + (is_angle ? "rad" : unit) + '?'});
@@ -29,7 +29,7 @@ void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResu
 /// Adds an event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS outside its 95 %
 /// bounds.
 void AddConsistencyEvents(EstimatorResult& result) {
-  const auto add_events = [&](const std::string& kind, const std::string& name,
+  const auto add_events = [&](EventKind event, const std::string& kind, const std::string& name,
                               const std::string& subject_kind) {
     const std::string prefix = kind + ".mean:";
     for (const auto& [key, mean] : result.metrics) {
@@ -39,7 +39,7 @@ void AddConsistencyEvents(EstimatorResult& result) {
       const auto high = result.metrics.find(kind + ".high:" + subject);
       if (low == result.metrics.end() || high == result.metrics.end()) continue;
       if (mean >= low->second && mean <= high->second) continue;
-      result.events.push_back({kNoTimestamp, kind + "_bounds",
+      result.events.push_back({kNoTimestamp, event,
                                name + " mean " + RoundedText(mean, 3) + " of " + subject_kind +
                                    subject + " is outside its 95 % bounds [" +
                                    RoundedText(low->second, 3) + ", " +
@@ -47,15 +47,15 @@ void AddConsistencyEvents(EstimatorResult& result) {
                                    (mean > high->second ? "overconfident" : "underconfident")});
     }
   };
-  add_events("nees", "NEES", "");
-  add_events("nis", "NIS", "sensor ");
+  add_events(EventKind::kNeesBounds, "nees", "NEES", "");
+  add_events(EventKind::kNisBounds, "nis", "NIS", "sensor ");
 }
 
 /// Adds an event `truth` if no frame had the truth that the source declares.
 void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
   const std::vector<std::string> names = metrics.without_truth();
   if (names.empty()) return;
-  result.events.push_back({kNoTimestamp, "truth",
+  result.events.push_back({kNoTimestamp, EventKind::kTruth,
                            "no frame has the truth of " + Join(names) +
                                "; do its times match those of the measurements?"});
 }
@@ -83,7 +83,8 @@ void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
                   " measurements: " + Join(unused_counts, ", ")
             : ": stream '" + sensor.stream + "' had no measurement" +
                   (result.accepted_by.empty() ? "" : " that " + result.accepted_by + " accepted");
-    result.events.push_back({kNoTimestamp, "unused", "sensor '" + sensor.name + "'" + finding});
+    result.events.push_back(
+        {kNoTimestamp, EventKind::kUnused, "sensor '" + sensor.name + "'" + finding});
   }
 }
 

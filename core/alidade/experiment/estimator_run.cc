@@ -60,7 +60,7 @@ std::string EstimatorRun::HandleFailures(const UpdateReport& report) {
     failed_sensors.resize(spec.problem.sensors.size(), 0);
     char& has_failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
     if (has_failed == 0) {
-      AddEvents({{spec.estimator->timestamp(), "sensor_disabled",
+      AddEvents({{spec.estimator->timestamp(), EventKind::kSensorDisabled,
                   "sensor '" + sensor.name + "' has failed; its stream '" + sensor.stream +
                       "' is ignored from now on, unless another sensor reads it"}});
     }
@@ -92,7 +92,7 @@ void EstimatorRun::AddEvents(const std::vector<Event>& events) {
     const auto is_equal = [&](const Event& earlier) {
       return earlier.kind == event.kind && earlier.text == event.text;
     };
-    const bool is_stale = event.kind == "input_stale";
+    const bool is_stale = event.kind == EventKind::kInputStale;
     if (is_stale) ++stale_inputs;
     if (is_stale && std::ranges::any_of(result.events, is_equal)) continue;
     result.events.push_back(event);
@@ -119,12 +119,12 @@ EstimatorResult InitialResult(const EstimatorSpec& spec, const Experiment& exper
   if (position >= 0) result.position_block = spec.problem.layout[position].name;
   result.unobservable = UnobservableDirections(spec.problem);
   if (!IsObservabilityComputed(spec.problem)) {
-    result.events.push_back({kNoTimestamp, "observability",
+    result.events.push_back({kNoTimestamp, EventKind::kObservability,
                              "not analysed: the state has more than " +
                                  std::to_string(kMaxObservabilityElements) + " elements"});
   }
   for (const auto& direction : result.unobservable) {
-    result.events.push_back({kNoTimestamp, "unobservable",
+    result.events.push_back({kNoTimestamp, EventKind::kUnobservable,
                              "no sensor of this estimator determines " + Join(direction, " and ") +
                                  (direction.size() > 1 ? " separately" : "")});
   }

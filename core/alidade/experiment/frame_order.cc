@@ -88,7 +88,7 @@ bool FrameOrder::Accept(const Frame& frame) {
   arrivals_.longest_lag = std::max(arrivals_.longest_lag, lag);
   if (!IsTooLate(frame.timestamp)) return true;
   ++arrivals_.dropped;
-  events_.push_back({frame.timestamp, "out_of_sequence",
+  events_.push_back({frame.timestamp, EventKind::kOutOfSequence,
                      "a frame " + StreamNames(frame) + "was dropped: it is " + SecondsText(lag) +
                          " older than the newest, beyond the window of " +
                          SecondsText(*experiment_.out_of_sequence.window)});

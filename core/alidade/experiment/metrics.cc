@@ -294,7 +294,7 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, Tracked& block, int elemen
   if (outside < kInconsistentTimestamps) return;
   outside = -1;
   const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
-  events.push_back({timestamp, "inconsistent",
+  events.push_back({timestamp, EventKind::kInconsistent,
                     block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
                         unit + ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
                         " sigma for " + std::to_string(kInconsistentTimestamps) +

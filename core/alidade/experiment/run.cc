@@ -183,7 +183,7 @@ void ComputeMetrics(EstimatorRun& run, RunResult& result) {
 
 /// Records that the smoothing of an estimator was stopped. The results of the others remain.
 void RecordStop(EstimatorRun& run, const char* reason, RunResult& result) {
-  run.AddEvents({{run.spec.estimator->timestamp(), "stopped", reason}});
+  run.AddEvents({{run.spec.estimator->timestamp(), EventKind::kStopped, reason}});
   if (result.status != RunStatus::kOk) return;
   result.status = RunStatus::kStopped;
   result.code = ExitCode::kStopped;
@@ -214,7 +214,7 @@ void SmoothAll(std::vector<EstimatorRun>& runs, const std::vector<FrameWithSegme
         continue;
       }
       if (!estimator.failed()) throw;  // another part failed, such as a record
-      events.push_back({estimator.timestamp(), "failed", e.what()});
+      events.push_back({estimator.timestamp(), EventKind::kFailed, e.what()});
     }
     run.finished = estimator.failed();
     run.AddEvents(events);

@@ -30,7 +30,7 @@ void LogEvents(const std::string& estimator, std::span<const Event> events, bool
     if (!IsLogged(level)) continue;
     const std::string time =
         event.timestamp == kNoTimestamp ? "" : " at t = " + SecondsText(event.timestamp);
-    Log(level, estimator + ": " + event.kind + time + ": " + event.text);
+    Log(level, estimator + ": " + ToString(event.kind) + time + ": " + event.text);
   }
 }
 

@@ -36,7 +36,7 @@ inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& valu
 }
 
 /// Returns whether the report has an event of this kind.
-inline bool HasEvent(const UpdateReport& report, std::string_view kind) {
+inline bool HasEvent(const UpdateReport& report, EventKind kind) {
   return std::ranges::count(report.events, kind, &Event::kind) > 0;
 }
 

@@ -79,9 +79,9 @@ class CeresBatch : public Estimator {
     const bool were_few = run_.shape().inputs <= kManyInputs;
     refused_ = !run_.Add(frame, filter, initialiser_.filter(), filtered_);
     if (!refused_ && !offline()) SolveSoFar();
-    if (failed()) report_.events.push_back({frame.timestamp, "no_solution", WhyFailed()});
+    if (failed()) report_.events.push_back({frame.timestamp, EventKind::kNoSolution, WhyFailed()});
     if (!refused_ && !MayBeSparse() && were_few && run_.shape().inputs > kManyInputs) {
-      report_.events.push_back({frame.timestamp, "slow",
+      report_.events.push_back({frame.timestamp, EventKind::kSlow,
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
     }
@@ -103,7 +103,7 @@ class CeresBatch : public Estimator {
       run_.Put(k, x, covariance(), state_, report_);
       if (k + 1 == frames) {
         Note(report_.events);
-        report_.events.push_back({run_.timestamp(), "solution", WhyFailed()});
+        report_.events.push_back({run_.timestamp(), EventKind::kSolution, WhyFailed()});
         if (sparse_) sparse_->NoteInexact(run_.timestamp(), report_.events);
       }
       emit(k, state_, report_);
@@ -171,7 +171,7 @@ class CeresBatch : public Estimator {
     if (!incremental_->ended()) incremental_->Restart(e_);
     if (!told_why_ && mode_ == Mode::kIncremental) {
       report_.events.push_back(
-          {run_.timestamp(), "solved_as_a_whole",
+          {run_.timestamp(), EventKind::kSolvedAsAWhole,
            why + (incremental_->ended() ? "; so are all frames from here on" : "")});
     }
     told_why_ = true;

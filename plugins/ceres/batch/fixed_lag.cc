@@ -65,7 +65,7 @@ class FixedLag : public Estimator {
     refused_ =
         !MoveWindow(frame.timestamp) || !run_.Add(frame, filter, initialiser_.filter(), about_);
     if (!refused_) SolveWindow(frame.timestamp);
-    if (failed()) report_.events.push_back({frame.timestamp, "no_solution", WhyFailed()});
+    if (failed()) report_.events.push_back({frame.timestamp, EventKind::kNoSolution, WhyFailed()});
     initialiser_.AddReport(frame.timestamp, filter, report_.events);
     return report_;
   }

@@ -31,7 +31,7 @@ class InitialisingFilter {
     std::ranges::copy_if(report.events, std::back_inserter(events), TellsOfTheData);
     if (!filter_.failed() || had_failed_) return;
     const auto cause = std::ranges::find(report.events, true, &Event::divergence);
-    events.push_back({timestamp, "initial_estimate",
+    events.push_back({timestamp, EventKind::kInitialEstimate,
                       "the filter that the batch starts from, and that gives blocks their first "
                       "values, ended" +
                           (cause == report.events.end() ? "" : ": " + cause->text)});
@@ -39,7 +39,8 @@ class InitialisingFilter {
 
  private:
   static bool TellsOfTheData(const Event& event) {
-    return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
+    return event.kind == EventKind::kInputStale || event.kind == EventKind::kInputRefused ||
+           event.kind == EventKind::kSubsteps;
   }
 
   Ekf filter_;

@@ -231,7 +231,7 @@ void MapSolve::HeedStop() const {
 }
 
 void MapSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
-  if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
+  if (!note_.empty()) events.push_back({timestamp, EventKind::kNotConverged, note_});
 }
 
 bool MapSolve::SolveAll(CondensedRun& run, const Trajectory& about, Eigen::VectorXd& e) {

@@ -20,14 +20,14 @@ void SparseSolve::HeedStop() const {
 }
 
 void SparseSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
-  if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
+  if (!note_.empty()) events.push_back({timestamp, EventKind::kNotConverged, note_});
 }
 
 void SparseSolve::NoteNew(Timestamp timestamp, std::string& told,
                           std::vector<Event>& events) const {
   Note(timestamp, events);
   if (at_edge_ != told && !at_edge_.empty()) {
-    events.push_back({timestamp, "edge_of_domain", at_edge_});
+    events.push_back({timestamp, EventKind::kEdgeOfDomain, at_edge_});
   }
   told = at_edge_;
 }
@@ -35,7 +35,7 @@ void SparseSolve::NoteNew(Timestamp timestamp, std::string& told,
 void SparseSolve::NoteInexact(Timestamp timestamp, std::vector<Event>& events) const {
   constexpr double kMost = 0.01;
   if (!(inexactness_ > kMost)) return;
-  events.push_back({timestamp, "inexact",
+  events.push_back({timestamp, EventKind::kInexact,
                     "variances may be wrong by " +
                         internal::RoundedText(std::min(100.0, 100.0 * inexactness_), 1) +
                         " % and more, by rounding: a prior is very vague of what nothing else "

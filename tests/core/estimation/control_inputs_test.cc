@@ -89,7 +89,7 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   const std::vector<Gaussian> expected = WrittenOut(drive, timeout_s);
   for (std::size_t k = 0; k < drive.size(); ++k) {
     const UpdateReport& report = filter.Process(FrameOf(drive[k]));
-    for (const Event& event : report.events) kinds.push_back(event.kind);
+    for (const Event& event : report.events) kinds.emplace_back(ToString(event.kind));
     EXPECT_EQ(report.inputs.size(), std::isnan(drive[k].speed) ? 0u : 1u);
     EXPECT_EQ(report.measurements().size(), std::isnan(drive[k].fix) ? 0u : 1u);
     EXPECT_NEAR(ValueOf(filter.state(), "car.position"), expected[k].x, tolerance) << k;
@@ -184,7 +184,7 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   ekf.Process(FrameOf({0.0, kNone, 2.0}));
   const UpdateReport& report = ekf.Process(FrameAt(1.0, {{kOdometry, kNone}}));
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "input_refused");
+  EXPECT_EQ(report.events[0].kind, EventKind::kInputRefused);
   EXPECT_EQ(report.events[0].text,
             "a control input of 'car' from stream 'odometry' is not finite: the previous input "
             "continues to act");

@@ -78,7 +78,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   Ekf ekf(problem, options, StreamsOf(problem));
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
-  ASSERT_EQ(report.events.back().kind, "rejection_recovery");
+  ASSERT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   const double lambda = ValueOf(ekf.state(), "template.inverse_distance");
   ASSERT_NEAR(lambda, 2.0 / 0.35, 1e-12);
   const Eigen::Matrix3d p = ekf.state().covariance().Dense();

@@ -22,7 +22,7 @@ TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotFinite);
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
   EXPECT_NE(report.events[0].text.find("broken"), std::string::npos);
   EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 7.0);
   EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0);
@@ -50,7 +50,7 @@ TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   EXPECT_TRUE(ekf.failed());
   EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 4.0);
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
   EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
             std::string::npos);
   EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
@@ -105,7 +105,7 @@ TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
   const UpdateReport& report = ekf.Process(FrameAt(10.0, {}));
   EXPECT_TRUE(ekf.failed());
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "too_many_substeps");
+  EXPECT_EQ(report.events[0].kind, EventKind::kTooManySubsteps);
 }
 
 TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
@@ -177,7 +177,7 @@ TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   for (int k = 0; k < 20; ++k) {
     const UpdateReport& report = ekf.Process(frame);
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
-    recovered += HasEvent(report, "rejection_recovery");
+    recovered += HasEvent(report, EventKind::kRejectionRecovery);
   }
   EXPECT_EQ(recovered, 1);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-9);
@@ -215,7 +215,7 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
   ASSERT_FALSE(report.events.empty());
-  EXPECT_EQ(report.events.back().kind, "rejection_recovery");
+  EXPECT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
   // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
   EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
@@ -233,7 +233,7 @@ TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   ekf.Start(0);
   bool reset = false;
   for (int k = 0; k < 20; ++k) {
-    reset = HasEvent(ekf.Process(FrameAt(1.0, {{0, 1e5}})), "rejection_recovery");
+    reset = HasEvent(ekf.Process(FrameAt(1.0, {{0, 1e5}})), EventKind::kRejectionRecovery);
   }
   ASSERT_TRUE(reset);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25, 1e-12);
@@ -426,7 +426,7 @@ TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
   ekf.Start(0);
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
-  ASSERT_EQ(report.events.back().kind, "rejection_recovery");
+  ASSERT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
   // 0.25 of the prior and 1 of the acceleration over the second.
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
@@ -482,7 +482,7 @@ TEST(Ekf, ThatASensorLeftItsDomainIsNotedAlsoAfterAGatedMeasurement) {
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
   EXPECT_TRUE(ekf.diverged());
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "diverged");
+  EXPECT_EQ(report.events[0].kind, EventKind::kDiverged);
   EXPECT_TRUE(ekf.Process(FrameAt(1.0, {{0, 80.0}})).events.empty());
 }
 

@@ -65,7 +65,7 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
   const UpdateReport& report = ekf.Process(FrameAt(1.0, {}));
   EXPECT_TRUE(ekf.failed());
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
   EXPECT_EQ(ekf.state().values(), x);
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
@@ -206,7 +206,7 @@ TEST(Ekf, AGapInPartsIsNotedWhereItTakesTwiceAsManyAsBefore) {
   double t_s = 0.0;
   const auto noted = [&](double gap_s) {
     t_s += gap_s;
-    return HasEvent(ekf.Process(FrameAt(t_s, {})), "substeps");
+    return HasEvent(ekf.Process(FrameAt(t_s, {})), EventKind::kSubsteps);
   };
   EXPECT_FALSE(noted(0.1));
   EXPECT_TRUE(noted(0.2));

@@ -323,7 +323,7 @@ TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   Ekf ekf(problem, {}, StreamsOf(problem));
   const UpdateReport first = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   ASSERT_EQ(first.events.size(), 1u);
-  EXPECT_EQ(first.events[0].kind, "conditioning");
+  EXPECT_EQ(first.events[0].kind, EventKind::kConditioning);
   EXPECT_EQ(first.measurements()[0].outcome, Outcome::kAccepted);
   EXPECT_GE(CovarianceOf(ekf.state(), "p.x", "p.x"), 0.0);
   EXPECT_TRUE(ekf.Process(FrameAt(0.1, {{0, 1.0}})).events.empty());
@@ -344,7 +344,7 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
   const auto stale = [&](double t_s) {
     std::vector<std::string> texts;
     for (const Event& event : ekf.Process(FrameAt(t_s, {{0, 80.0}})).events) {
-      if (event.kind == "stale") texts.push_back(event.text);
+      if (event.kind == EventKind::kStale) texts.push_back(event.text);
     }
     return texts;
   };

@@ -154,7 +154,7 @@ TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   Iekf iekf(problem, options, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_converged");
+  EXPECT_EQ(report.events[0].kind, EventKind::kNotConverged);
   EXPECT_NE(report.events[0].text.find("stopped after 2 iterations"), std::string::npos);
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
   EXPECT_LT(std::abs(ValueOf(iekf.state(), "p.x")), 3.0);
@@ -213,7 +213,7 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
     EXPECT_EQ(entry.outcome, Outcome::kAccepted);
   }
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_converged");
+  EXPECT_EQ(report.events[0].kind, EventKind::kNotConverged);
   EXPECT_EQ(report.events[0].text,
             "an update stopped after 1 iterations because h has no Jacobian; the last iterate is "
             "used");

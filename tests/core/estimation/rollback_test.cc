@@ -62,7 +62,8 @@ std::string Text(const UpdateReport& report) {
     }
     text += '\n';
   }
-  for (const Event& event : report.events) text += event.kind + ": " + event.text + '\n';
+  for (const Event& event : report.events)
+    text += std::string(ToString(event.kind)) + ": " + event.text + '\n';
   return text;
 }
 
@@ -151,7 +152,7 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
   ASSERT_EQ(report.measurements().size(), 1u);
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kStale);
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "stale");
+  EXPECT_EQ(report.events[0].kind, EventKind::kStale);
   EXPECT_EQ(report.events[0].text,
             "the frame at 1.250000 s is 0.750000 s older than the newest, beyond the window of "
             "0.500000 s: its measurements are not used");

@@ -25,15 +25,15 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
     EXPECT_EQ(entry.outcome, Outcome::kAccepted);
     EXPECT_TRUE(std::isfinite(entry.nis));
   }
-  EXPECT_TRUE(HasEvent(first, "guarded"));
+  EXPECT_TRUE(HasEvent(first, EventKind::kGuarded));
   EXPECT_FALSE(ukf.diverged());
   EXPECT_GT(ValueOf(ukf.state(), "target.depth"), 0.0);
   // Narrow enough now: nothing to say.
   for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
-  EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), "guarded"));
+  EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), EventKind::kGuarded));
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
   // Three seconds later it may be metres away: said anew.
-  EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), "guarded"));
+  EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), EventKind::kGuarded));
 }
 
 /// Stays at 1, and throws elsewhere.
@@ -54,7 +54,7 @@ TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
   ukf.Start(0);
   const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
   EXPECT_TRUE(ukf.failed());
-  ASSERT_TRUE(HasEvent(report, "plugin_failed"));
+  ASSERT_TRUE(HasEvent(report, EventKind::kPluginFailed));
   EXPECT_NE(report.events.back().text.find("only from 1"), std::string::npos)
       << report.events.back().text;
 }
@@ -91,7 +91,7 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
     Ukf ukf(problem, {}, StreamsOf(problem));
     const Frame frame = FrameAt(0.0, {{0, 5.02}});
     const UpdateReport &expected = ekf.Process(frame), &found = ukf.Process(frame);
-    EXPECT_EQ(HasEvent(found, "guarded"), x < 1e-3) << x;
+    EXPECT_EQ(HasEvent(found, EventKind::kGuarded), x < 1e-3) << x;
     ASSERT_EQ(found.measurements()[0].outcome, Outcome::kAccepted) << x;
     EXPECT_NEAR(found.measurements()[0].h[0], expected.measurements()[0].h[0], 1e-7) << x;
     EXPECT_NEAR(found.measurements()[0].s[0], expected.measurements()[0].s[0], 1e-7) << x;
@@ -111,7 +111,7 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
     EXPECT_TRUE(report.measurements()[0].h.empty());
     ASSERT_EQ(report.events.size(), 1u);
-    EXPECT_EQ(report.events[0].kind, "guarded");
+    EXPECT_EQ(report.events[0].kind, EventKind::kGuarded);
     EXPECT_EQ(report.events[0].text,
               "sensor 'near': sigma points leave its domain or have no mean, and their spread can "
               "be narrowed no further; their spread is divided by 64");
@@ -136,7 +136,7 @@ TEST(Ukf, ASensorNotDefinedAtTheEstimateIsOutOfDomain) {
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 80.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
   EXPECT_TRUE(report.measurements()[0].h.empty());
-  EXPECT_TRUE(HasEvent(report, "diverged"));
+  EXPECT_TRUE(HasEvent(report, EventKind::kDiverged));
   EXPECT_TRUE(ukf.diverged());
   EXPECT_EQ(ukf.state().values(), before);
 }

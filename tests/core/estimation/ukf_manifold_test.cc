@@ -203,7 +203,7 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
       const UpdateReport& report = filter->Process(FrameAt(2.0, {}));
       EXPECT_TRUE(filter->failed());
       ASSERT_EQ(report.events.size(), 1u);
-      EXPECT_EQ(report.events[0].kind, "not_finite");
+      EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
       EXPECT_EQ(report.events[0].text,
                 "motion model of 'p' steps to a state that is not finite; last good state at "
                 "0.000000 s: p.v = 1");

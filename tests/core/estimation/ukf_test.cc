@@ -183,7 +183,7 @@ TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   options.alpha = 1.0;
   Ukf joint(problem, options, StreamsOf(problem));
   const UpdateReport& report = joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 0.1}}));
-  EXPECT_TRUE(HasEvent(report, "guarded"));
+  EXPECT_TRUE(HasEvent(report, EventKind::kGuarded));
   ASSERT_EQ(report.measurements().size(), 2u);
   const MeasurementReport& square = report.measurements()[1];
   ASSERT_EQ(square.outcome, Outcome::kAccepted);
@@ -224,12 +224,12 @@ TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   AddSensor(problem, "first", MakeSensor(First{}, "first"), {"p.x"});
   Ukf ukf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = ukf.Process(FrameAt(0.0, {{0, 1.5}}));
-  EXPECT_TRUE(HasEvent(report, "repaired"));
+  EXPECT_TRUE(HasEvent(report, EventKind::kRepaired));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
   const Eigen::Matrix2d p = ukf.state().covariance().Dense();
   EXPECT_GE(p(0, 0), 0.0);
   EXPECT_GE(p.determinant(), -1e-12);
-  EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 1.5}})), "repaired"));
+  EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 1.5}})), EventKind::kRepaired));
 }
 
 TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {

@@ -137,7 +137,8 @@ TEST_P(Unwritten, OutputOfAMotionModelEndsTheFilterAtItsFirstStep) {
     Ekf ekf(problem, {}, StreamsOf(problem));
     ekf.Start(0);
     const UpdateReport& report = ekf.Process(FrameAt(0.1, {}));
-    EXPECT_EQ(HasEvent(report, "not_finite"), left != Left::kNothing) << static_cast<int>(left);
+    EXPECT_EQ(HasEvent(report, EventKind::kNotFinite), left != Left::kNothing)
+        << static_cast<int>(left);
     EXPECT_EQ(ekf.failed(), left != Left::kNothing) << static_cast<int>(left);
   }
 }

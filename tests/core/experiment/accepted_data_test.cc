@@ -211,7 +211,7 @@ TEST(AcceptedBy, ASensorOfWhichTheFilterTookNothingIsNamed) {
   options.rejection_recovery = RejectionRecovery::kNone;
   filter.estimator = std::make_unique<Ekf>(filter.problem, options, StreamsOf(filter.problem));
   const RunResult run = alidade::Run(experiment, {});
-  const auto event = std::ranges::find(run.estimators[1].events, "unused", &Event::kind);
+  const auto event = std::ranges::find(run.estimators[1].events, EventKind::kUnused, &Event::kind);
   ASSERT_NE(event, run.estimators[1].events.end());
   EXPECT_EQ(event->text,
             "sensor 'disparity': stream 'disparity' had no measurement that gated accepted");

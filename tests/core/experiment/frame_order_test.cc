@@ -67,7 +67,7 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   EXPECT_EQ(result.arrivals.dropped, 1);
   EXPECT_EQ(result.arrivals.longest_lag, 100'000'001);
   for (const EstimatorResult& one : result.estimators) {
-    const auto event = std::ranges::find(one.events, "out_of_sequence", &Event::kind);
+    const auto event = std::ranges::find(one.events, EventKind::kOutOfSequence, &Event::kind);
     ASSERT_NE(event, one.events.end());
     EXPECT_EQ(event->timestamp, beyond.timestamp);
     EXPECT_EQ(event->text,

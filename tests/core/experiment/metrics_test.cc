@@ -345,7 +345,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   for (int i = 0; i < 40; ++i) one.Add({{20.1}});
   ASSERT_EQ(one.metrics().events().size(), 1u);
   const Event& event = one.metrics().events()[0];
-  EXPECT_EQ(event.kind, "inconsistent");
+  EXPECT_EQ(event.kind, EventKind::kInconsistent);
   EXPECT_EQ(event.timestamp, 39 * Timestamp{100'000'000});
   EXPECT_EQ(event.text,
             "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
@@ -373,7 +373,7 @@ TEST(Metrics, AMeasuredTruthTellsOfAFilterThatIsTooSure) {
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 1e-12));
   for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});  // drifts away, 1 m at the 20th timestamp
   ASSERT_EQ(one.metrics().events().size(), 1u);
-  EXPECT_EQ(one.metrics().events()[0].kind, "inconsistent");
+  EXPECT_EQ(one.metrics().events()[0].kind, EventKind::kInconsistent);
 }
 
 TEST(Metrics, AKnownValueIsNotInconsistent) {

@@ -145,7 +145,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     EXPECT_EQ(in_order.arrivals.out_of_sequence, 0);
     if (config == kEventful) {
       for (const EstimatorResult& one : in_order.estimators) {
-        EXPECT_GT(std::ranges::count(one.events, "rejection_recovery", &Event::kind), 3)
+        EXPECT_GT(std::ranges::count(one.events, EventKind::kRejectionRecovery, &Event::kind), 3)
             << one.name;
         EXPECT_EQ(one.counts.at("initialised:stereo"), 1) << one.name;
         EXPECT_EQ(one.counts.at("initialised:scale"), 1) << one.name;

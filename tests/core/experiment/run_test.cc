@@ -77,7 +77,7 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
   const RunResult result = alidade::Run(experiment, {});
   ASSERT_EQ(result.code, ExitCode::kDiverged);
   const std::vector<Event>& events = result.estimators[1].events;
-  EXPECT_EQ(std::ranges::count(events, "rejection_recovery", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, EventKind::kRejectionRecovery, &Event::kind), 1);
   EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos)
       << result.reason;
 }
@@ -94,7 +94,8 @@ struct Hindsight : Estimator {
   void Smooth(const Emit& emit) override {
     for (std::size_t k = 0; k < frames_; ++k) {
       state_.values()[0] = 1.0 + 1e-3 * static_cast<double>(k);
-      if (k + 1 == frames_) report_.events.push_back({kNoTimestamp, "hindsight", "all is known"});
+      if (k + 1 == frames_)
+        report_.events.push_back({kNoTimestamp, EventKind::kEstimatorSpecific, "all is known"});
       emit(k, state_, report_);
     }
   }
@@ -149,8 +150,8 @@ TEST(Run, AnEstimatorThatFailsSaysNothingOfItsSensors) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kDiverged);
   const std::vector<Event>& events = result.estimators[1].events;
-  EXPECT_EQ(std::ranges::count(events, "failed", &Event::kind), 1);
-  EXPECT_EQ(std::ranges::count(events, "unused", &Event::kind), 0);
+  EXPECT_EQ(std::ranges::count(events, EventKind::kFailed, &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, EventKind::kUnused, &Event::kind), 0);
 }
 
 TEST(Run, AStopIsTakenAfterTheFrame) {
@@ -225,7 +226,7 @@ TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   EXPECT_EQ(failed.status, RunStatus::kFailed);
   EXPECT_EQ(failed.code, ExitCode::kDiverged);
   const std::vector<Event>& events = failed.estimators[1].events;
-  EXPECT_EQ(std::ranges::count(events, "stopped", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, EventKind::kStopped, &Event::kind), 1);
 }
 
 /// A value that walks by N(0, 0.1^2) each second, and is measured with noise of sigma 1.
@@ -261,7 +262,7 @@ EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   return alidade::Run(experiment, {}).estimators[0];
 }
 
-std::vector<std::string> TextsOf(const EstimatorResult& result, const std::string& kind) {
+std::vector<std::string> TextsOf(const EstimatorResult& result, EventKind kind) {
   std::vector<std::string> texts;
   for (const Event& event : result.events) {
     if (event.kind == kind) texts.push_back(event.text);
@@ -272,20 +273,20 @@ std::vector<std::string> TextsOf(const EstimatorResult& result, const std::strin
 TEST(Run, AnOverconfidentFilterIsAnEvent) {
   const EstimatorResult result = WalkWith(0.13);
   EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
-  ASSERT_EQ(TextsOf(result, "nees_bounds").size(), 1u);
-  const std::string nees = TextsOf(result, "nees_bounds")[0];
+  ASSERT_EQ(TextsOf(result, EventKind::kNeesBounds).size(), 1u);
+  const std::string nees = TextsOf(result, EventKind::kNeesBounds)[0];
   EXPECT_TRUE(nees.starts_with("NEES mean ")) << nees;
   EXPECT_NE(nees.find(" of p is outside its 95 % bounds ["), std::string::npos) << nees;
   EXPECT_TRUE(nees.ends_with("]: the filter is overconfident")) << nees;
-  ASSERT_EQ(TextsOf(result, "nis_bounds").size(), 1u);
-  const std::string nis = TextsOf(result, "nis_bounds")[0];
+  ASSERT_EQ(TextsOf(result, EventKind::kNisBounds).size(), 1u);
+  const std::string nis = TextsOf(result, EventKind::kNisBounds)[0];
   EXPECT_TRUE(nis.starts_with("NIS mean ")) << nis;
   EXPECT_NE(nis.find(" of sensor disparity is outside its 95 % bounds ["), std::string::npos)
       << nis;
 }
 
 TEST(Run, AnUnderconfidentFilterIsAnEvent) {
-  const std::vector<std::string> texts = TextsOf(WalkWith(4.0), "nis_bounds");
+  const std::vector<std::string> texts = TextsOf(WalkWith(4.0), EventKind::kNisBounds);
   ASSERT_EQ(texts.size(), 1u);
   EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
 }
@@ -295,8 +296,8 @@ TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
   std::size_t nees = 0, nis = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     const EstimatorResult result = WalkWith(1.0, seed);
-    nees += TextsOf(result, "nees_bounds").size();
-    nis += TextsOf(result, "nis_bounds").size();
+    nees += TextsOf(result, EventKind::kNeesBounds).size();
+    nis += TextsOf(result, EventKind::kNisBounds).size();
   }
   EXPECT_LE(nees, 20u);
   EXPECT_LE(nis, 20u);
@@ -361,7 +362,7 @@ std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
   EkfOptions options;
   options.gate = gate;
   named.estimator = std::make_unique<Ekf>(named.problem, options, experiment.source->streams());
-  return TextsOf(alidade::Run(experiment, {}).estimators[0], "unit");
+  return TextsOf(alidade::Run(experiment, {}).estimators[0], EventKind::kUnit);
 }
 
 constexpr double kDegree = 180.0 / std::numbers::pi;
@@ -408,7 +409,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   const auto unused = [](const EstimatorResult& result) {
     std::vector<std::string> texts;
     for (const Event& event : result.events) {
-      if (event.kind == "unused") texts.push_back(event.text);
+      if (event.kind == EventKind::kUnused) texts.push_back(event.text);
     }
     return texts;
   };
@@ -476,7 +477,7 @@ TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
       std::make_unique<Ekf>(named.problem, EkfOptions{}, experiment.source->streams());
   const RunResult run = alidade::Run(experiment, {});
   const EstimatorResult& ekf = run.estimators[0];
-  EXPECT_EQ(std::ranges::count(ekf.events, "input_stale", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(ekf.events, EventKind::kInputStale, &Event::kind), 1);
   EXPECT_EQ(ekf.counts.at("input_stale"), 99);
   EXPECT_EQ(ekf.counts.at("inputs:car"), 100);
 }

@@ -132,7 +132,7 @@ TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
     std::vector<std::string> said;
     for (const Frame& frame : FramesOf(seen)) {
       for (const Event& event : estimator->Process(frame).events) {
-        if (event.kind != "edge_of_domain") continue;
+        if (event.kind != EventKind::kEdgeOfDomain) continue;
         said.push_back(std::to_string(event.timestamp / 100'000'000) + ": " + event.text);
       }
     }

@@ -294,7 +294,8 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
     std::pair<double, std::string> last;
     batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
       last.first = testing::ValueOf(state, "p.x");
-      for (const Event& event : report.events) last.second += event.kind + ": " + event.text + '\n';
+      for (const Event& event : report.events)
+        last.second += std::string(ToString(event.kind)) + ": " + event.text + '\n';
     });
     EXPECT_TRUE(batch->failed());
     return last;
@@ -405,8 +406,9 @@ TEST(CeresBatchEnds, AStopWhileItSolvesKeepsTheOthers) {
     ASSERT_EQ(run.estimators.size(), 3u);
     EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
     EXPECT_FALSE(run.estimators[1].diverged);
-    EXPECT_TRUE(std::ranges::any_of(run.estimators[1].events,
-                                    [](const Event& event) { return event.kind == "stopped"; }));
+    EXPECT_TRUE(std::ranges::any_of(run.estimators[1].events, [](const Event& event) {
+      return event.kind == EventKind::kStopped;
+    }));
     EXPECT_EQ(run.estimators[0].metrics.count("rmse:target.depth"), 1u);
     EXPECT_EQ(run.estimators[2].metrics.count("rmse:target.depth"), 1u);
   }

@@ -48,7 +48,7 @@ TEST(CeresBatch, TheFilterIsNearlyAsGoodAsFullInformation) {
   EXPECT_GE(filter / full, 0.95);
 }
 
-bool HasEvent(const EstimatorResult& result, const std::string& kind, const std::string& words) {
+bool HasEvent(const EstimatorResult& result, EventKind kind, const std::string& words) {
   return std::ranges::any_of(result.events, [&](const Event& event) {
     return event.kind == kind && event.text.find(words) != std::string::npos;
   });
@@ -60,7 +60,7 @@ TEST(CeresBatch, ASolveThatDoesNotConvergeIsAFailureAndAnEvent) {
   EXPECT_EQ(run.status, RunStatus::kFailed);
   EXPECT_EQ(run.code, ExitCode::kDiverged);
   EXPECT_NE(run.reason.find("estimator 'batch': cost"), std::string::npos) << run.reason;
-  EXPECT_TRUE(HasEvent(run.estimators[1], "solution", "not converged"));
+  EXPECT_TRUE(HasEvent(run.estimators[1], EventKind::kSolution, "not converged"));
   EXPECT_EQ(run.estimators[0].counts.at("accepted:scale"), 152);
 }
 
@@ -71,8 +71,8 @@ TEST(CeresBatch, WhereNothingIsDefinedItSaysSoAndTheOthersGoOn) {
                    {"estimators.batch.overrides.state.target.initial.depth.sigma", "0"},
                    {"estimators.batch.overrides.state.target.noise.acceleration", "0"}});
   EXPECT_EQ(run.code, ExitCode::kDiverged);
-  EXPECT_TRUE(
-      HasEvent(run.estimators[1], "failed", "sensor 'scale' at 0.000000 s: out of its domain"));
+  EXPECT_TRUE(HasEvent(run.estimators[1], EventKind::kFailed,
+                       "sensor 'scale' at 0.000000 s: out of its domain"));
   EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
   EXPECT_FALSE(run.estimators[0].diverged);
 }

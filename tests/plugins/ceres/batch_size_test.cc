@@ -14,7 +14,7 @@ TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
     events.insert(events.end(), report.events.begin(), report.events.end());
   }
   ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, "slow");
+  EXPECT_EQ(events[0].kind, EventKind::kSlow);
   EXPECT_EQ(events[0].timestamp, TimestampFromSeconds(49.95));
   EXPECT_EQ(events[0].text,
             "more than 1000 noise inputs: the time of a solve grows with their cube");

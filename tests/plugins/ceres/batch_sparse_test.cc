@@ -317,7 +317,7 @@ TEST(SparseBatch, ConvergesFarFromTheOrigin) {
   for (const Frame& frame : frames) {
     for (std::size_t i = 2; i < 4; ++i) {
       const UpdateReport& report = estimators[i].estimator->Process(frame);
-      EXPECT_EQ(std::ranges::count(report.events, "solved_as_a_whole", &Event::kind), 0);
+      EXPECT_EQ(std::ranges::count(report.events, EventKind::kSolvedAsAWhole, &Event::kind), 0);
       ASSERT_FALSE(estimators[i].estimator->failed());
     }
   }

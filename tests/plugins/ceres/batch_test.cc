@@ -121,7 +121,7 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
              1e-9);
   EXPECT_FALSE(batch->failed());
   ASSERT_EQ(found.events.size(), 1u);
-  EXPECT_EQ(found.events[0].kind, "solution");
+  EXPECT_EQ(found.events[0].kind, EventKind::kSolution);
   EXPECT_NE(found.events[0].text.find("in 1 solve: converged"), std::string::npos)
       << found.events[0].text;
 }

@@ -31,7 +31,7 @@ Apart LargestOf(const Problem& problem, const std::vector<Frame>& frames,
   Apart largest;
   for (const Frame& frame : frames) {
     const UpdateReport& report = incremental->Process(frame);
-    largest.whole += std::ranges::count(report.events, "solved_as_a_whole", &Event::kind);
+    largest.whole += std::ranges::count(report.events, EventKind::kSolvedAsAWhole, &Event::kind);
     whole->Process(frame);
     const Apart apart = Compare(*incremental, *whole);
     largest.state = std::max(largest.state, apart.state);
@@ -133,7 +133,8 @@ TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
     for (int k = 0; k < 300; ++k) {
       const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
       const UpdateReport& report = batch->Process(frame);
-      EXPECT_EQ(std::ranges::count(report.events, "solved_as_a_whole", &Event::kind), 0) << k;
+      EXPECT_EQ(std::ranges::count(report.events, EventKind::kSolvedAsAWhole, &Event::kind), 0)
+          << k;
       filter.Process(frame);
       ASSERT_FALSE(batch->failed());
       const MatrixXd p = filter.state().covariance().Dense();
@@ -193,7 +194,8 @@ TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
   std::string said;
   for (int k = 0; k < 20; ++k) {
     const Frame frame = testing::FrameAt(0.1 * k, {{0, std::sin(0.1 * k)}});
-    for (const Event& event : batch->Process(frame).events) said += event.kind + ": " + event.text;
+    for (const Event& event : batch->Process(frame).events)
+      said += std::string(ToString(event.kind)) + ": " + event.text;
     dense->Process(frame);
     ASSERT_FALSE(batch->failed() || dense->failed());
     const MatrixXd p = dense->state().covariance().Dense();

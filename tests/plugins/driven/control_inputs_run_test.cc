@@ -177,7 +177,7 @@ TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
               folder_ / "run");
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   const std::vector<Event>& events = run.estimators[0].events;
-  const auto unused = std::ranges::find(events, "unused", &Event::kind);
+  const auto unused = std::ranges::find(events, EventKind::kUnused, &Event::kind);
   ASSERT_NE(unused, events.end());
   EXPECT_EQ(unused->text, "sensor 'car': stream 'none' had no measurement");
 }

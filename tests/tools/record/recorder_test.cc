@@ -221,7 +221,8 @@ TEST(Recorder, QuotesTextsInEvents) {
   const std::string events = Read(folder / "out/ekf/events.csv");
   EXPECT_TRUE(events.starts_with("t_s,kind,text\n,nis_bounds,\"NIS mean 0.")) << events;
   EXPECT_TRUE(
-      events.ends_with("\n0.033000000,note,\"a \"\"word\"\", and\nanother\"\n,note,timeless\n"))
+      events.ends_with("\n0.033000000,estimator_specific,\"a \"\"word\"\", "
+                       "and\nanother\"\n,estimator_specific,timeless\n"))
       << events;
 }
 

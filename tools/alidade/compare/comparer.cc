@@ -61,7 +61,8 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
     run.estimators[e].cpu = *impl_->clocks[e];
     if (!impl_->errors.empty()) run.estimators[e].errors = impl_->errors[e].Finish();
     run.estimators[e].had_rejection_recovery =
-        std::ranges::count(result.estimators[e].events, "rejection_recovery", &Event::kind) > 0;
+        std::ranges::count(result.estimators[e].events, EventKind::kRejectionRecovery,
+                           &Event::kind) > 0;
     run.estimators[e].result.events.clear();
   }
   run.estimators.resize(result.estimators.size());

@@ -113,7 +113,7 @@ internal::RecordedRun Recorder::Impl::CloseFiles() {
 void Recorder::Impl::WriteEvents(const EstimatorResult& result) const {
   CsvFile events(folder, result.name + "/events.csv", {"t_s", "kind", "text"});
   for (const Event& event : result.events) {
-    events.Time(event.timestamp).Text(event.kind).Text(event.text).EndRow();
+    events.Time(event.timestamp).Text(ToString(event.kind)).Text(event.text).EndRow();
   }
   events.Close();
 }

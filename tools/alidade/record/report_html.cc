@@ -94,7 +94,7 @@ std::string Events(const EstimatorResult& result) {
     const Event& event = result.events[i];
     std::string time;
     if (event.timestamp != kNoTimestamp) AppendSeconds(time, event.timestamp);
-    html += "<tr><td>" + time + "</td><td>" + HtmlEscaped(event.kind) + "</td><td class=\"text\">" +
+    html += "<tr><td>" + time + "</td><td>" + ToString(event.kind) + "</td><td class=\"text\">" +
             HtmlEscaped(event.text) + "</td></tr>\n";
   }
   html += "</table></div>\n";

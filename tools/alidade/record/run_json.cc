@@ -45,7 +45,7 @@ Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
 
 std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
   std::map<std::string, std::int64_t> counts;
-  for (const Event& event : result.events) ++counts[event.kind];
+  for (const Event& event : result.events) ++counts[ToString(event.kind)];
   return counts;
 }
 

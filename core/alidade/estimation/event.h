@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+#include "alidade/base/timestamp.h"
+
+namespace alidade {
+
+/// The kinds of events, in the order of kEventKinds.
+enum class EventKind {
+  kDiverged,
+  kFailed,
+  kStopped,
+  kPluginFailed,
+  kSensorDisabled,
+  kInconsistent,
+  kNeesBounds,
+  kNisBounds,
+  kUnit,
+  kUnused,
+  kTruth,
+  kUnobservable,
+  kObservability,
+  kRejectionRecovery,
+  kRepaired,
+  kNotPd,
+  kNotFinite,
+  kConditioning,
+  kGuarded,
+  kNotConverged,
+  kStale,
+  kOutOfSequence,
+  kInputStale,
+  kInputRefused,
+  kSubsteps,
+  kTooManySubsteps,
+  kSolution,
+  kNoSolution,
+  kInitialEstimate,
+  kEdgeOfDomain,
+  kSolvedAsAWhole,
+  kInexact,
+  kSlow,
+  kEstimatorSpecific,
+};
+
+enum class EventSeverity {
+  kInfo,     ///< for the record
+  kWarning,  ///< the estimates may be worse than the filter believes
+  kError,    ///< the estimator, or one of its sensors, ended
+};
+
+/// A kind of event.
+struct EventKindInfo {
+  EventKind kind;
+  const char* name;  ///< in files
+  EventSeverity severity;
+  const char* meaning;  ///< a sentence for the documentation
+};
+
+/// All kinds of events. A new kind is a value of EventKind and a row here.
+inline constexpr std::array kEventKinds = {
+    EventKindInfo{EventKind::kDiverged, "diverged", EventSeverity::kError,
+                  "an estimate left the domain of its models; the estimator ended"},
+    EventKindInfo{EventKind::kFailed, "failed", EventSeverity::kError,
+                  "the estimator failed with an error and ended"},
+    EventKindInfo{EventKind::kStopped, "stopped", EventSeverity::kError,
+                  "the run ended before the source did"},
+    EventKindInfo{EventKind::kPluginFailed, "plugin_failed", EventSeverity::kError,
+                  "a model of a plugin failed for this measurement"},
+    EventKindInfo{EventKind::kSensorDisabled, "sensor_disabled", EventSeverity::kWarning,
+                  "the sensor's model failed; `on_plugin_failure: disable` drops the sensor"},
+    EventKindInfo{
+        EventKind::kInconsistent, "inconsistent", EventSeverity::kWarning,
+        "the error of a block element exceeded 10 sigma for 20 timestamps in a row; needs truth"},
+    EventKindInfo{EventKind::kNeesBounds, "nees_bounds", EventSeverity::kWarning,
+                  "a mean NEES is outside its 95 % bounds"},
+    EventKindInfo{EventKind::kNisBounds, "nis_bounds", EventSeverity::kWarning,
+                  "a mean NIS is outside its 95 % bounds"},
+    EventKindInfo{EventKind::kUnit, "unit", EventSeverity::kWarning,
+                  "the measurements of a sensor are so far from their predictions that their unit "
+                  "may differ from the model's"},
+    EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
+                  "the estimator used no measurement of this sensor; the text states the reason"},
+    EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
+                  "the source names a truth that no frame had"},
+    EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
+                  "no sensor of this estimator determines this direction of the state"},
+    EventKindInfo{
+        EventKind::kObservability, "observability", EventSeverity::kInfo,
+        "unobservable directions were not searched for: the state has more than 500 elements"},
+    EventKindInfo{EventKind::kRejectionRecovery, "rejection_recovery", EventSeverity::kWarning,
+                  "a sensor was rejected so often in a row that the filter recovers"},
+    EventKindInfo{
+        EventKind::kRepaired, "repaired", EventSeverity::kWarning,
+        "a covariance lost positive semi-definiteness and was repaired (`max_covariance_repairs`)"},
+    EventKindInfo{
+        EventKind::kNotPd, "not_pd", EventSeverity::kWarning,
+        "S, or P after the update, would not be positive definite; the update was rolled back"},
+    EventKindInfo{EventKind::kNotFinite, "not_finite", EventSeverity::kWarning,
+                  "a measurement, h, H, R or the update is not finite; it was not used"},
+    EventKindInfo{EventKind::kConditioning, "conditioning", EventSeverity::kWarning,
+                  "S is so ill-conditioned that the update loses digits"},
+    EventKindInfo{EventKind::kGuarded, "guarded", EventSeverity::kWarning,
+                  "sigma points left the domain of a model and were drawn closer to the estimate"},
+    EventKindInfo{EventKind::kNotConverged, "not_converged", EventSeverity::kWarning,
+                  "an iteration ended before it converged"},
+    EventKindInfo{EventKind::kStale, "stale", EventSeverity::kWarning,
+                  "the frame is older than the state, so its measurements are not used; once for "
+                  "each such run of frames"},
+    EventKindInfo{EventKind::kOutOfSequence, "out_of_sequence", EventSeverity::kWarning,
+                  "the frame was dropped: it is older than `out_of_sequence.window_s` allows"},
+    EventKindInfo{EventKind::kInputStale, "input_stale", EventSeverity::kWarning,
+                  "a motion model steps with u = 0: no control input has arrived, or the last is "
+                  "older than `timeout_s`"},
+    EventKindInfo{EventKind::kInputRefused, "input_refused", EventSeverity::kWarning,
+                  "a control input is not finite; once until one is accepted"},
+    EventKindInfo{EventKind::kSubsteps, "substeps", EventSeverity::kInfo,
+                  "a gap is longer than `max_dt_s` and was stepped in parts, at least twice as "
+                  "many as reported before"},
+    EventKindInfo{EventKind::kTooManySubsteps, "too_many_substeps", EventSeverity::kError,
+                  "a gap needs more parts than allowed; the estimator ended"},
+    EventKindInfo{EventKind::kSolution, "solution", EventSeverity::kInfo,
+                  "how the batch ended: iterations, cost, and why it stopped"},
+    EventKindInfo{EventKind::kNoSolution, "no_solution", EventSeverity::kError,
+                  "the batch has no solution"},
+    EventKindInfo{
+        EventKind::kInitialEstimate, "initial_estimate", EventSeverity::kWarning,
+        "the filter that provides the initial estimate of the batch did not reach the last frame"},
+    EventKindInfo{EventKind::kEdgeOfDomain, "edge_of_domain", EventSeverity::kWarning,
+                  "the solution lies at the edge of the domain of a model"},
+    EventKindInfo{EventKind::kSolvedAsAWhole, "solved_as_a_whole", EventSeverity::kInfo,
+                  "an incremental solve was repeated over all data"},
+    EventKindInfo{EventKind::kInexact, "inexact", EventSeverity::kWarning,
+                  "the solution is exact to fewer digits than usual"},
+    EventKindInfo{EventKind::kSlow, "slow", EventSeverity::kInfo,
+                  "the batch solves a large problem and will take long"},
+    EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
+                  "an event of an estimator plugin that has no kind of its own here"},
+};
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < kEventKinds.size(); ++i) {
+        if (kEventKinds[i].kind != static_cast<EventKind>(i)) return false;
+      }
+      return kEventKinds.back().kind == EventKind::kEstimatorSpecific;
+    }(),
+    "one row for each kind, in the order of EventKind");
+
+/// The row of a kind.
+inline const EventKindInfo& InfoOf(EventKind kind) {
+  return kEventKinds[static_cast<std::size_t>(kind)];
+}
+/// The name of a kind, as in files: `diverged`.
+inline const char* ToString(EventKind kind) { return InfoOf(kind).name; }
+/// The name of a severity: `info`, `warning`, `error`.
+inline const char* ToString(EventSeverity severity) {
+  constexpr std::array kNames = {"info", "warning", "error"};
+  return kNames[static_cast<std::size_t>(severity)];
+}
+
+/// An occurrence that the user of an estimator should know of.
+struct Event {
+  Timestamp timestamp = kNoTimestamp;  ///< of the frame; kNoTimestamp: of the whole run
+  EventKind kind = EventKind::kEstimatorSpecific;
+  std::string text;
+  bool divergence = false;  ///< true if the estimator diverged or failed by this
+};
+
+}  // namespace alidade

@@ -2,9 +2,8 @@
 #include "alidade/experiment/metric_rows.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -14,37 +13,33 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/experiment/experiment.h"
+#include "alidade/experiment/metric_key.h"
+#include "alidade/experiment/metric_table.h"
 #include "alidade/io/text_table.h"
 
 namespace alidade {
 namespace internal {
 namespace {
 
-constexpr std::array<std::string_view, 12> kOrder = {
-    "rmse",          "implied.rmse",   "lag_ms",       "coverage95",
-    "nees.mean",     "nees.within95",  "nis.mean",     "map.rmse",
-    "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
+/// The row of kMetrics that a key belongs to; null for a key that is not in the table.
+const MetricInfo* InfoOf(const MetricKey& key) { return FindMetric(key.name); }
 
-std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
-
-/// `target.depth` of `rmse:target.depth@blind`.
-std::string_view SubjectOf(std::string_view key) {
-  const std::string_view rest = key.substr(std::min(key.find(':'), key.size() - 1) + 1);
-  return rest.substr(0, rest.find('@'));
-}
-
-/// Sorts by kind, whole before segments, then by name.
-auto Rank(const std::string& key) {
-  const auto kind = std::find(kOrder.begin(), kOrder.end(), KindOf(key)) - kOrder.begin();
-  const std::size_t segment = key.find('@');
-  return std::tuple(kind, segment == key.npos ? "" : key.substr(segment), key);
+/// Sort key: metrics that are shown, in the order of the table, then the others; the whole run
+/// before segments; then by name.
+auto Rank(const std::string& text) {
+  const MetricKey key = MetricKey::Parse(text);
+  const MetricInfo* const metric = InfoOf(key);
+  const std::size_t index = metric != nullptr && metric->is_shown
+                                ? static_cast<std::size_t>(metric - kMetrics.data())
+                                : kMetrics.size();
+  return std::tuple(index, key.segment, text);
 }
 
 template <class Map>
 std::vector<std::string> Keys(const RunResult& result, const Map EstimatorResult::*values) {
   std::vector<std::string> keys;
-  for (const EstimatorResult& one : result.estimators) {
-    for (const auto& [key, value] : one.*values) keys.push_back(key);
+  for (const EstimatorResult& estimator : result.estimators) {
+    for (const auto& [key, value] : estimator.*values) keys.push_back(key);
   }
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
@@ -90,106 +85,115 @@ std::vector<std::string> Format(const Values& values) {
   return cells;
 }
 
-std::string UnitOfKey(const RunResult& result, const std::string& key) {
-  for (const EstimatorResult& one : result.estimators) {
-    const auto unit = one.units.find(std::string(SubjectOf(key)));
-    if (unit != one.units.end()) return unit->second;
+std::string UnitOfKey(const RunResult& result, const MetricKey& key) {
+  for (const EstimatorResult& estimator : result.estimators) {
+    const auto unit = estimator.units.find(key.subject);
+    if (unit != estimator.units.end()) return unit->second;
   }
   return {};
 }
 
 Values ValuesOf(const RunResult& result, const std::string& key) {
   Values values;
-  for (const EstimatorResult& one : result.estimators) {
-    const auto found = one.metrics.find(key);
-    values.push_back(found == one.metrics.end() ? std::nullopt : std::optional(found->second));
+  for (const EstimatorResult& estimator : result.estimators) {
+    const auto found = estimator.metrics.find(key);
+    values.push_back(found == estimator.metrics.end() ? std::nullopt
+                                                      : std::optional(found->second));
   }
   return values;
 }
 
-/// Errors and differences, in the unit of their block.
-bool IsError(std::string_view kind) {
-  return kind == "rmse" || kind == "implied.rmse" || kind == "final_error" || kind == "rmsd" ||
-         kind == "final_difference";
-}
-
-/// Errors and differences of paths and maps, in m.
-bool IsLength(std::string_view kind) {
-  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "map.rmsd" ||
-         kind == "map.sim3.rmsd" || kind == "trajectory.sim3.rmsd" ||
-         kind == "trajectory.sim3.rmse";
-}
-
-/// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table. Without
-/// a truth it is the largest difference.
+/// Returns the largest finite RMSE of all blocks with that unit, or without truth the largest
+/// difference: one prefix serves the whole table.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
-  for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
-    const bool along = KindOf(key) == "rmse" || KindOf(key) == "rmsd";
-    if (!along || UnitOfKey(result, key) != unit) continue;
-    for (const auto& value : ValuesOf(result, key)) {
+  for (const std::string& text : Keys(result, &EstimatorResult::metrics)) {
+    const MetricKey key = MetricKey::Parse(text);
+    if ((key.name != "rmse" && key.name != "rmsd") || UnitOfKey(result, key) != unit) continue;
+    for (const auto& value : ValuesOf(result, text)) {
       if (value && std::isfinite(*value)) largest = std::max(largest, *value);
     }
   }
   return largest;
 }
 
-TableRow RowOf(const RunResult& result, const std::string& key) {
-  const std::string_view kind = KindOf(key);
-  Values values = ValuesOf(result, key);
-  Scaled scaled;
-  if (IsError(kind)) {
-    const std::string unit = UnitOfKey(result, key);
-    scaled = ScaleUnit(unit, LargestRmse(result, unit));
+/// The unit of a metric in a table, with the factor of its values.
+Scaled ScaledUnitOf(const RunResult& result, const MetricKey& key) {
+  const MetricInfo* const metric = InfoOf(key);
+  if (metric == nullptr) return {};
+  switch (metric->unit) {
+    case MetricUnit::kSubject: {
+      const std::string unit = UnitOfKey(result, key);
+      return ScaleUnit(unit, LargestRmse(result, unit));
+    }
+    case MetricUnit::kMetre:
+      return ScaleUnit("m", LargestRmse(result, "m"));
+    case MetricUnit::kMillisecond:
+      return {1.0, "ms"};
+    case MetricUnit::kShare:
+      return {100.0, "%"};
+    case MetricUnit::kMicrosecond:  // in its label
+    case MetricUnit::kFrames:
+    case MetricUnit::kNone:
+      break;
   }
-  if (kind == "lag_ms") scaled.unit = "ms";
-  if (IsLength(kind)) scaled = ScaleUnit("m", LargestRmse(result, "m"));
-  if (kind == "coverage95" || kind == "nees.within95") scaled = {100.0, "%"};
+  return {};
+}
+
+/// The row of a metric, which is labelled `name` and by its subject and segment.
+TableRow RowOf(const RunResult& result, const std::string& text, const std::string& name) {
+  const MetricKey key = MetricKey::Parse(text);
+  const Scaled scaled = ScaledUnitOf(result, key);
+  Values values = ValuesOf(result, text);
   for (auto& value : values) {
     if (value) *value *= scaled.factor;
   }
-  std::string label(kind == "lag_ms" ? "lag" : kind);
-  if (key.size() > kind.size()) label.append(" ").append(key.substr(kind.size() + 1));
-  if (const std::size_t at = label.find('@'); at != label.npos) label.insert(at, " ");
+  std::string label = name;
+  if (!key.subject.empty()) label.append(" ").append(key.subject);
+  if (!key.segment.empty()) label.append(" @").append(key.segment);
   if (!scaled.unit.empty()) label.append(" [").append(scaled.unit).append("]");
   return {label, Format(values)};
 }
 
-/// Whether every estimator has the subject without any error, as a block that is held at truth.
-bool IsExact(const RunResult& result, std::string_view subject) {
-  for (const char* kind : {"rmse:", "nees.mean:"}) {
-    const Values values = ValuesOf(result, std::string(kind).append(subject));
-    const auto wrong = [](const auto& value) { return value && *value != 0.0; };
-    const auto known = [](const auto& value) { return value.has_value(); };
-    if (std::any_of(values.begin(), values.end(), wrong)) return false;
-    if (std::any_of(values.begin(), values.end(), known)) return true;
+/// The name of a metric in a table, which has the unit beside it.
+std::string ShownName(const std::string& name) { return name == "lag_ms" ? "lag" : name; }
+
+/// Returns true if every estimator has the subject without any error, as a block that is held at
+/// truth.
+bool IsExact(const RunResult& result, const std::string& subject) {
+  for (const char* name : {"rmse", "nees.mean"}) {
+    const Values values = ValuesOf(result, MetricKey{name, subject, ""}.text());
+    const auto is_wrong = [](const auto& value) { return value && *value != 0.0; };
+    const auto is_known = [](const auto& value) { return value.has_value(); };
+    if (std::any_of(values.begin(), values.end(), is_wrong)) return false;
+    if (std::any_of(values.begin(), values.end(), is_known)) return true;
   }
   return false;
 }
 
-/// Over segments a person wants errors and coverage; the rest is in comparison.csv.
-bool IsMain(const RunResult& result, const std::string& key) {
-  const std::string_view kind = KindOf(key);
-  if (IsExact(result, SubjectOf(key))) return false;
-  if (key.find('@') != key.npos) {
-    return kind == "rmse" || kind == "coverage95" || kind == "nees.within95";
-  }
-  return std::find(kOrder.begin(), kOrder.end(), kind) != kOrder.end();
+/// Returns true if tables show the metric. comparison.csv has all of them.
+bool IsShown(const RunResult& result, const MetricKey& key) {
+  const MetricInfo* const metric = InfoOf(key);
+  if (metric == nullptr || IsExact(result, key.subject)) return false;
+  return key.segment.empty() ? metric->is_shown : metric->is_shown_by_segment;
 }
 
-/// The main metrics and the counts whose keys are `wanted`.
-template <class Wanted>
-std::vector<TableRow> RowsWhere(const RunResult& result, const Wanted& wanted) {
+/// The rows of the metrics that tables show and of the counts, of those keys that are `included`.
+template <class Included>
+std::vector<TableRow> SelectRows(const RunResult& result, const Included& included) {
   std::vector<TableRow> rows;
-  for (const std::string& key : OrderedMetrics(result)) {
-    if (IsMain(result, key) && wanted(key)) rows.push_back(RowOf(result, key));
+  for (const std::string& text : OrderedMetrics(result)) {
+    const MetricKey key = MetricKey::Parse(text);
+    if (!IsShown(result, key) || !included(text)) continue;
+    rows.push_back(RowOf(result, text, ShownName(key.name)));
   }
-  for (const std::string& key : OrderedCounts(result)) {
-    if (!wanted(key)) continue;
-    TableRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
-    for (const EstimatorResult& one : result.estimators) {
-      const auto count = one.counts.find(key);
-      row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
+  for (const std::string& text : OrderedCounts(result)) {
+    if (!included(text)) continue;
+    const MetricKey key = MetricKey::Parse(text);
+    TableRow row{key.name + ' ' + (key.subject.empty() ? key.name : key.subject), {}};
+    for (const EstimatorResult& estimator : result.estimators) {
+      const auto count = estimator.counts.find(text);
+      row.cells.push_back(count == estimator.counts.end() ? "-" : std::to_string(count->second));
     }
     rows.push_back(std::move(row));
   }
@@ -198,9 +202,9 @@ std::vector<TableRow> RowsWhere(const RunResult& result, const Wanted& wanted) {
 
 void AddHealthRows(const RunResult& result, std::vector<TableRow>& rows) {
   TableRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
-  for (const EstimatorResult& one : result.estimators) {
-    diverged.cells.emplace_back(one.diverged ? "yes" : "no");
-    inconsistent.cells.emplace_back(one.inconsistent ? "yes" : "no");
+  for (const EstimatorResult& estimator : result.estimators) {
+    diverged.cells.emplace_back(estimator.diverged ? "yes" : "no");
+    inconsistent.cells.emplace_back(estimator.inconsistent ? "yes" : "no");
   }
   rows.push_back(std::move(diverged));
   rows.push_back(std::move(inconsistent));
@@ -208,34 +212,40 @@ void AddHealthRows(const RunResult& result, std::vector<TableRow>& rows) {
 
 constexpr std::size_t kMainRows = 10;
 
-/// The keys of MainRows but for the two of health.
+/// The priority of a metric or count among the rows of MainRows; 0: it is not among them.
+int PriorityOf(const MetricKey& key) {
+  constexpr int kAcceptedPriority = 4;
+  if (!key.segment.empty()) return 0;
+  if (key.name == ToString(Outcome::kAccepted)) return kAcceptedPriority;
+  const MetricInfo* const metric = InfoOf(key);
+  return metric == nullptr ? 0 : metric->priority;
+}
+
+/// The keys of MainRows but for the two of health: in turns one subject of each metric.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
-  constexpr std::array<std::string_view, 8> kDealt = {"rmse",          "nees.mean",   "nis.mean",
-                                                      "accepted",      "coverage95",  "map.rmse",
-                                                      "map.sim3.rmse", "reprojection"};
-  // Turn, kind, key.
-  std::vector<std::tuple<std::size_t, std::size_t, std::string>> dealt;
-  for (std::size_t kind = 0; kind < kDealt.size(); ++kind) {
-    std::vector<std::pair<std::size_t, std::string>> keys;
-    const auto take = [&](const std::vector<std::string>& candidates, bool is_count) {
-      for (const std::string& key : candidates) {
-        if (KindOf(key) != kDealt[kind] || key.find('@') != key.npos) continue;
-        if (!is_count && !IsMain(result, key)) continue;
-        const auto place = std::find(subjects.begin(), subjects.end(), SubjectOf(key));
-        keys.emplace_back(static_cast<std::size_t>(place - subjects.begin()), key);
-      }
-    };
-    take(Keys(result, &EstimatorResult::metrics), false);
-    take(Keys(result, &EstimatorResult::counts), true);
+  std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;  // subject, key
+  const auto add = [&](const std::vector<std::string>& candidates, bool is_count) {
+    for (const std::string& text : candidates) {
+      const MetricKey key = MetricKey::Parse(text);
+      const int priority = PriorityOf(key);
+      if (priority == 0 || (!is_count && !IsShown(result, key))) continue;
+      const auto place = std::find(subjects.begin(), subjects.end(), key.subject);
+      by_priority[priority].emplace_back(place - subjects.begin(), text);
+    }
+  };
+  add(Keys(result, &EstimatorResult::metrics), false);
+  add(Keys(result, &EstimatorResult::counts), true);
+  std::vector<std::tuple<std::size_t, int, std::string>> ranked;  // turn, priority, key
+  for (auto& [priority, keys] : by_priority) {
     std::sort(keys.begin(), keys.end());
     for (std::size_t turn = 0; turn < keys.size(); ++turn) {
-      dealt.emplace_back(turn, kind, keys[turn].second);
+      ranked.emplace_back(turn, priority, keys[turn].second);
     }
   }
-  std::sort(dealt.begin(), dealt.end());
+  std::sort(ranked.begin(), ranked.end());
   std::set<std::string> chosen;
-  for (std::size_t i = 0; i < std::min(dealt.size(), kMainRows - 2); ++i) {
-    chosen.insert(std::get<2>(dealt[i]));
+  for (std::size_t i = 0; i < std::min(ranked.size(), kMainRows - 2); ++i) {
+    chosen.insert(std::get<2>(ranked[i]));
   }
   return chosen;
 }
@@ -257,25 +267,23 @@ std::vector<std::string> OrderedMetrics(const RunResult& result) {
 
 std::vector<std::string> OrderedCounts(const RunResult& result) {
   std::vector<std::string> keys = Keys(result, &EstimatorResult::counts);
-  std::stable_partition(keys.begin(), keys.end(),
-                        [](const auto& key) { return KindOf(key) == "accepted"; });
+  std::stable_partition(keys.begin(), keys.end(), [](const auto& key) {
+    return MetricKey::Parse(key).name == ToString(Outcome::kAccepted);
+  });
   return keys;
 }
 
 std::vector<TableRow> MetricRows(const RunResult& result) {
-  return RowsWhere(result, [](const std::string&) { return true; });
+  return SelectRows(result, [](const std::string&) { return true; });
 }
 
-std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds) {
+std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
+                             const std::string& label) {
   std::vector<TableRow> rows;
-  for (const RowKind& kind : kinds) {
-    for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
-      if (KindOf(key) != kind.kind || key.find('@') != key.npos) continue;
-      if (IsExact(result, SubjectOf(key))) continue;
-      TableRow row = RowOf(result, key);
-      row.label = kind.label + row.label.substr(std::min(KindOf(key).size(), row.label.size()));
-      rows.push_back(std::move(row));
-    }
+  for (const std::string& text : Keys(result, &EstimatorResult::metrics)) {
+    const MetricKey key = MetricKey::Parse(text);
+    if (key.name != name || !key.segment.empty() || IsExact(result, key.subject)) continue;
+    rows.push_back(RowOf(result, text, label));
   }
   return rows;
 }
@@ -302,11 +310,11 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
 }
 
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects) {
-  std::vector<TableRow> all = ComparisonRows(result);
-  if (all.size() <= kMainRows) return all;
+  std::vector<TableRow> rows_of_all = ComparisonRows(result);
+  if (rows_of_all.size() <= kMainRows) return rows_of_all;
   const std::set<std::string> keys = MainKeys(result, subjects);
   std::vector<TableRow> rows =
-      RowsWhere(result, [&](const std::string& key) { return keys.contains(key); });
+      SelectRows(result, [&](const std::string& key) { return keys.contains(key); });
   AddHealthRows(result, rows);
   return rows;
 }

@@ -9,34 +9,29 @@
 
 namespace alidade::internal {
 
-/// Keys of all metrics of all estimators, the ones a person wants first: rmse, rmse over segments,
-/// lag, coverage, NEES, NIS, then what else there is.
+/// Keys of all metrics of all estimators: those that tables show, in the order of kMetrics, then the
+/// others.
 std::vector<std::string> OrderedMetrics(const RunResult& result);
-/// Keys of all counts, those accepted first.
+/// Keys of all counts, accepted measurements first.
 std::vector<std::string> OrderedCounts(const RunResult& result);
 
-/// The main metrics and all counts.
+/// The rows of the metrics that tables show, and of all counts.
 std::vector<TableRow> MetricRows(const RunResult& result);
-/// These, whether it diverged and whether its errors were inconsistent.
+/// MetricRows() and the rows `diverged` and `inconsistent`.
 std::vector<TableRow> ComparisonRows(const RunResult& result);
-/// What rows are about, in the order of the config: the blocks, their owners and the sensors of
+/// The subjects of rows, in the order of the config: the blocks, their owners and the sensors of
 /// each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
-/// At most ten rows of ComparisonRows, those that matter most, in its order; all of them if they
-/// are no more. `diverged` and `inconsistent` are two. The others are dealt out in turns: the first
-/// subject's rmse, nees.mean, nis.mean, accepted, coverage95, map.rmse, map.sim3.rmse and
-/// reprojection, then the second subject's, and so on. Segments are left out; unknown subjects come
-/// last, by name.
+/// ComparisonRows(), or if there are more than ten: `diverged`, `inconsistent` and eight others in
+/// the same order, without segments. They are chosen by the priority of the metrics in turns: one
+/// subject of each metric, then the second one. Unknown subjects come last.
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
-/// ComparisonTable() of these rows, with the number of those left out.
+/// The table of MainRows(), with the number of omitted rows.
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);
-/// Metrics whose keys begin alike, `rmse` of `rmse:target.depth`, and what a row calls them.
-struct RowKind {
-  std::string kind, label;
-};
-/// The metrics of these kinds, in their order, over whole runs.
-std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds);
-/// What the metrics compare with, in words; "" where that is truth.
+/// The rows of the metrics of this name over whole runs, labelled `label` in place of the name.
+std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
+                             const std::string& label);
+/// The reference of the errors, as a sentence; "" if it is truth.
 std::string ReferenceText(const RunResult& result);
 
 }  // namespace alidade::internal

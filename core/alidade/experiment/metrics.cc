@@ -15,6 +15,8 @@
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/implied_state.h"
 #include "alidade/experiment/joint_nees.h"
+#include "alidade/experiment/metric_key.h"
+#include "alidade/experiment/metric_table.h"
 #include "alidade/experiment/similarity.h"
 #include "alidade/experiment/time_series.h"
 #include "alidade/experiment/truth_match.h"
@@ -42,26 +44,52 @@ bool IsFarAngle(const MeasurementReport& m) {
 }  // namespace
 
 struct Metrics::Impl {
-  /// Mean of a quantity, and the share of it that lies inside a bound.
-  struct Tally {
-    double sum = 0.0;
-    std::int64_t count = 0, inside = 0;
+  /// The samples of one metric of one subject.
+  struct Accumulator {
+    double sum = 0.0, max = 0.0, last = 0.0;
+    std::int64_t count = 0;
 
-    void Add(double value, bool is_inside = false) {
+    void Add(double value) {
       sum += value;
+      max = count == 0 ? value : std::max(max, value);
+      last = value;
       ++count;
-      inside += is_inside;
     }
-    double mean() const { return sum / static_cast<double>(count); }
-    double share() const { return static_cast<double>(inside) / static_cast<double>(count); }
+    double Reduce(MetricReduction reduction) const {
+      const double mean = sum / static_cast<double>(count);
+      switch (reduction) {
+        case MetricReduction::kRootMean:
+          return std::sqrt(mean);
+        case MetricReduction::kMax:
+          return max;
+        case MetricReduction::kLast:
+          return last;
+        case MetricReduction::kMean:
+          break;
+      }
+      return mean;
+    }
   };
 
-  /// Sums over all timestamps, or over those of one segment.
+  /// The sampled metrics over all timestamps, or over those of one segment: for each of kMetrics
+  /// one accumulator a subject.
   struct Sums {
-    std::string suffix;                   ///< "" or `@SEGMENT`
-    std::vector<Tally> squares, covered;  ///< by tracked block
-    std::vector<Tally> nees;              ///< by owner
-    std::vector<Tally> nis, implied;      ///< by sensor
+    std::string segment;
+    std::array<std::vector<Accumulator>, kMetrics.size()> metrics;
+
+    /// Adds the sample of subject `index` to each metric that has this member function.
+    template <class Sample>
+    void Add(std::optional<double> (*MetricInfo::*function)(const Sample&), std::size_t index,
+             const Sample& sample) {
+      for (std::size_t m = 0; m < kMetrics.size(); ++m) {
+        const auto sampled = kMetrics[m].*function;
+        if (sampled == nullptr || (!segment.empty() && !kMetrics[m].has_segments)) continue;
+        const std::optional<double> value = sampled(sample);
+        if (!value) continue;
+        if (metrics[m].size() <= index) metrics[m].resize(index + 1);
+        metrics[m][index].Add(*value);
+      }
+    }
   };
 
   /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Only the
@@ -107,10 +135,11 @@ struct Metrics::Impl {
     bool scalar;
     double truth_variance;  ///< of each element
     LagSeries series;       ///< where scalar
-    double last_error = -1.0;
+    bool was_known = false;
 
-    bool known = false;  ///< at this timestamp, and so is what follows
+    bool known = false;  ///< at this timestamp, and so are the members below
     Eigen::VectorXd error;
+    double square;
   };
 
   /// Every n-th value of a series, n so that there are not too many for their autocorrelation.
@@ -140,7 +169,6 @@ struct Metrics::Impl {
     std::string name;
     std::vector<std::size_t> tracked;
     Thinned nees = {};  ///< per dof
-    double dofs = 0.0;  ///< sum over all timestamps
   };
 
   /// What the bounds of a sensor's NIS need.
@@ -156,7 +184,11 @@ struct Metrics::Impl {
   std::vector<std::string> sensors, motions;
   std::map<int, Implied> implied;  ///< by sensor
   bool has_landmarks = false, has_ransac = false;
-  std::vector<Tally> far;            ///< inside: far off
+  /// Measurements of a sensor that were accepted or gated, and those of them that are far off.
+  struct FarOff {
+    std::int64_t count = 0, far = 0;
+  };
+  std::vector<FarOff> far_off;       ///< by sensor
   std::vector<bool> angle;           ///< sensors that measure one
   std::vector<Whiteness> whiteness;  ///< by sensor
   std::int64_t reports = 0;
@@ -174,15 +206,15 @@ struct Metrics::Impl {
   void FindImplied(const Problem& problem, const std::vector<StreamInfo>& truths);
   void AddImplied(const Truth& truth, const std::vector<Sums*>& into, const UpdateReport& report);
   template <class ValueOf>
-  void AddErrors(Timestamp timestamp, const Truth& truth, const std::vector<Sums*>& into,
-                 const ValueOf& value_of);
-  void AddConsistency(Timestamp timestamp, const std::vector<Sums*>& into, const State& state);
+  void FindErrors(Timestamp timestamp, const Truth& truth, const ValueOf& value_of);
+  void AddErrors(Timestamp timestamp, const std::vector<Sums*>& into, const State* state);
   void CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma);
   void AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into, const State& state);
   void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
   void AddInnovation(std::size_t sensor, const MeasurementReport& m);
   /// The sums over all timestamps, and over the segments that a frame is in.
   std::vector<Sums*> SumsOf(const std::vector<bool>& in_segment);
+  const std::string& SubjectOf(const MetricInfo& metric, std::size_t index) const;
   void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
   void WriteBounds(std::map<std::string, double>& metrics) const;
 };
@@ -245,35 +277,35 @@ void Metrics::Impl::AddImplied(const Truth& truth, const std::vector<Sums*>& int
   for (const MeasurementReport& m : report.measurements()) {
     const auto found = implied.find(m.sensor);
     if (found == implied.end() || m.z.empty()) continue;
-    const Implied& one = found->second;
-    if (one.truth >= truth.size() || truth[one.truth].empty()) continue;
-    const std::optional<double> value = one.state.From(truth, m.z.data());
+    const Implied& state = found->second;
+    if (state.truth >= truth.size() || truth[state.truth].empty()) continue;
+    const std::optional<double> value = state.state.From(truth, m.z.data());
     if (!value) continue;
     double error = 0.0;
-    one.geometry.Minus(truth[one.truth].data(), &*value, &error);
-    for (Sums* s : into) s->implied[static_cast<std::size_t>(m.sensor)].Add(error * error);
+    state.geometry.Minus(truth[state.truth].data(), &*value, &error);
+    for (Sums* sums_of : into) {
+      sums_of->Add<ImpliedSample>(&MetricInfo::implied, static_cast<std::size_t>(m.sensor),
+                                  {error * error});
+    }
   }
 }
 
-/// value_of(id): the estimate of a block; null: there is none.
+/// Computes the error of each tracked block. value_of(id) is the estimate of a block, or null.
 template <class ValueOf>
-void Metrics::Impl::AddErrors(Timestamp timestamp, const Truth& truth,
-                              const std::vector<Sums*>& into, const ValueOf& value_of) {
-  for (std::size_t i = 0; i < tracked.size(); ++i) {
-    Tracked& block = tracked[i];
+void Metrics::Impl::FindErrors(Timestamp timestamp, const Truth& truth, const ValueOf& value_of) {
+  for (Tracked& block : tracked) {
     const double* const estimate = value_of(block.id);
     block.known = estimate != nullptr && block.truth < truth.size() && !truth[block.truth].empty();
     if (!block.known) continue;
     const double* const is = truth[block.truth].data();
     // In the tangent at the estimate, where P is.
     block.geometry.Minus(is, estimate, block.error.data());
-    const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
-    block.last_error = std::sqrt(square);
-    if (block.id == path && std::isfinite(square)) {
+    block.square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
+    block.was_known = true;
+    if (block.id == path && std::isfinite(block.square)) {
       alignment.Add(Eigen::Map<const Eigen::Vector3d>(estimate),
                     Eigen::Map<const Eigen::Vector3d>(is));
     }
-    for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
     double value = is[0];
     if (block.geometry.is_angle() && !block.series.truth.empty()) {
@@ -301,23 +333,27 @@ void Metrics::Impl::CheckElement(Timestamp timestamp, Tracked& block, int elemen
                         " timestamps; sigma is " + internal::RoundedText(sigma, 4) + unit});
 }
 
-void Metrics::Impl::AddConsistency(Timestamp timestamp, const std::vector<Sums*>& into,
-                                   const State& state) {
-  constexpr double kNormal95 = 1.959963984540054;
+/// Adds the errors that FindErrors found. `state` has the covariance; null: it is unknown.
+void Metrics::Impl::AddErrors(Timestamp timestamp, const std::vector<Sums*>& into,
+                              const State* state) {
   for (std::size_t i = 0; i < tracked.size(); ++i) {
     Tracked& block = tracked[i];
-    const Block& place = state.layout()[block.id];
-    if (!block.known || !place.has_covariance()) continue;
-    for (int e = 0; e < place.geometry().tangent; ++e) {
-      const double sigma =
-          std::sqrt(state.covariance().Variance(place.tangent_offset + e) + block.truth_variance);
-      CheckElement(timestamp, block, e, sigma);
-      if (!block.scalar) continue;
-      const bool covered = std::abs(block.error[0]) <= kNormal95 * sigma;
-      for (Sums* s : into) s->covered[i].Add(0.0, covered);
+    if (!block.known) continue;
+    std::optional<double> sigma;
+    const Block* const place = state == nullptr ? nullptr : &state->layout()[block.id];
+    for (int e = 0; place != nullptr && place->has_covariance() && e < block.geometry.tangent;
+         ++e) {
+      sigma =
+          std::sqrt(state->covariance().Variance(place->tangent_offset + e) + block.truth_variance);
+      CheckElement(timestamp, block, e, *sigma);
+    }
+    if (!block.scalar) sigma.reset();
+    for (Sums* sums_of : into) {
+      sums_of->Add<BlockSample>(&MetricInfo::block, i, {block.square, block.error[0], sigma});
     }
   }
-  for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, into, state);
+  if (state == nullptr) return;
+  for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, into, *state);
 }
 
 void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into,
@@ -331,14 +367,16 @@ void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<S
   if (dof == 0 || std::isnan(nees)) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
-  for (Sums* s : into) s->nees[index].Add(nees / dof, nees <= bound->second);
-  owner.dofs += dof;
+  for (Sums* sums_of : into) {
+    sums_of->Add<OwnerSample>(&MetricInfo::owner, index, {nees, dof, bound->second});
+  }
   owner.nees.Add(nees / dof);
 }
 
 void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& m) {
-  const bool far_off = m.nis > kFarSigmas * kFarSigmas * m.dof || (angle[sensor] && IsFarAngle(m));
-  far[sensor].Add(0.0, far_off);
+  ++far_off[sensor].count;
+  far_off[sensor].far +=
+      m.nis > kFarSigmas * kFarSigmas * m.dof || (angle[sensor] && IsFarAngle(m));
   Whiteness& white = whiteness[sensor];
   white.dof = m.dof;
   if (m.outcome == Outcome::kGated) {
@@ -365,19 +403,22 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     if (m.sensor < 0 || m.sensor >= static_cast<int>(sensors.size())) continue;
     const auto sensor = static_cast<std::size_t>(m.sensor);
     std::int64_t*& count = count_of[sensor][static_cast<std::size_t>(m.outcome)];
-    if (count == nullptr) count = &counts[std::string(ToString(m.outcome)) + ':' + sensors[sensor]];
+    if (count == nullptr)
+      count = &counts[MetricKey{ToString(m.outcome), sensors[sensor], ""}.text()];
     ++*count;
     const bool compared = m.outcome == Outcome::kAccepted || m.outcome == Outcome::kGated;
     if (compared && m.dof > 0) AddInnovation(sensor, m);
     if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
-    for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
+    for (Sums* sums_of : into) {
+      sums_of->Add<SensorSample>(&MetricInfo::sensor, sensor, {m.nis, m.dof});
+    }
   }
   for (auto& [sensor, frames] : reprojection) {
     const double rms = internal::FrameInnovationOf(report, sensor).rms;
     if (std::isfinite(rms)) frames.push_back(rms);
   }
   for (const int motion : report.inputs) {
-    ++counts["inputs:" + motions[static_cast<std::size_t>(motion)]];
+    ++counts[MetricKey{"inputs", motions[static_cast<std::size_t>(motion)], ""}.text()];
   }
 }
 
@@ -390,37 +431,44 @@ std::vector<Metrics::Impl::Sums*> Metrics::Impl::SumsOf(const std::vector<bool>&
   return into;
 }
 
-void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics) const {
-  for (std::size_t i = 0; i < tracked.size(); ++i) {
-    const std::string key = tracked[i].name + s.suffix;
-    if (s.squares[i].count > 0) metrics["rmse:" + key] = std::sqrt(s.squares[i].mean());
-    if (s.covered[i].count > 0) metrics["coverage95:" + key] = s.covered[i].share();
+/// The name of subject `index` of a metric.
+const std::string& Metrics::Impl::SubjectOf(const MetricInfo& metric, std::size_t index) const {
+  switch (metric.subject) {
+    case MetricSubject::kOwner:
+      return owners[index].name;
+    case MetricSubject::kSensor:
+      return sensors[index];
+    case MetricSubject::kBlock:
+    case MetricSubject::kRun:
+      break;
   }
-  for (std::size_t o = 0; o < owners.size(); ++o) {
-    if (s.nees[o].count == 0) continue;
-    metrics["nees.mean:" + owners[o].name + s.suffix] = s.nees[o].mean();
-    metrics["nees.within95:" + owners[o].name + s.suffix] = s.nees[o].share();
-  }
-  for (std::size_t i = 0; i < sensors.size(); ++i) {
-    const std::string key = sensors[i] + s.suffix;
-    if (s.nis[i].count > 0) metrics["nis.mean:" + key] = s.nis[i].mean();
-    if (s.implied[i].count > 0) metrics["implied.rmse:" + key] = std::sqrt(s.implied[i].mean());
+  return tracked[index].name;
+}
+
+void Metrics::Impl::Write(const Sums& sums_of, std::map<std::string, double>& metrics) const {
+  for (std::size_t m = 0; m < kMetrics.size(); ++m) {
+    const MetricInfo& metric = kMetrics[m];
+    for (std::size_t i = 0; i < sums_of.metrics[m].size(); ++i) {
+      const Accumulator& accumulator = sums_of.metrics[m][i];
+      if (accumulator.count == 0) continue;
+      metrics[MetricKey{metric.name, SubjectOf(metric, i), sums_of.segment}.text()] =
+          accumulator.Reduce(metric.reduction);
+    }
   }
 }
 
 void Metrics::Impl::WriteBounds(std::map<std::string, double>& metrics) const {
   const auto write = [&](const std::string& kind, const std::string& name, const Interval& bounds) {
-    metrics[kind + ".low:" + name] = bounds.low;
-    metrics[kind + ".high:" + name] = bounds.high;
+    metrics[MetricKey{kind + ".low", name, ""}.text()] = bounds.low;
+    metrics[MetricKey{kind + ".high", name, ""}.text()] = bounds.high;
   };
   for (std::size_t o = 0; o < owners.size(); ++o) {
     const Owner& owner = owners[o];
     const std::vector<double>& nees = owner.nees.values;
     if (nees.empty()) continue;
-    const double dof = owner.dofs / static_cast<double>(sums[0].nees[o].count);
+    const double dof = metrics.at(MetricKey{"nees.dof", owner.name, ""}.text());
     const double samples = static_cast<double>(nees.size()) / AutocorrelationTime(nees, 1.0);
     write("nees", owner.name, ConsistencyBounds(dof, samples));
-    metrics["nees.dof:" + owner.name] = dof;
   }
   for (std::size_t i = 0; i < sensors.size(); ++i) {
     const Whiteness& white = whiteness[i];
@@ -446,22 +494,15 @@ Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truth
     impl_->reprojection[static_cast<int>(s)] = {};
   }
   impl_->count_of.resize(impl_->sensors.size());
-  impl_->far.resize(impl_->sensors.size());
+  impl_->far_off.resize(impl_->sensors.size());
   const bool filters = spec.estimator == nullptr || !spec.estimator->offline();
   for (const SensorBinding& sensor : spec.problem.sensors) {
     const Geometry& measured = sensor.model->measurement().geometry;
     impl_->angle.push_back(measured.is_angle());
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
   }
-  const auto add_sums = [&](std::string suffix) {
-    const std::vector<Impl::Tally> blocks(impl_->tracked.size());
-    impl_->sums.push_back({std::move(suffix), blocks, blocks,
-                           std::vector<Impl::Tally>(impl_->owners.size()),
-                           std::vector<Impl::Tally>(impl_->sensors.size()),
-                           std::vector<Impl::Tally>(impl_->sensors.size())});
-  };
-  add_sums("");
-  for (const Segment& segment : segments) add_sums('@' + segment.name);
+  impl_->sums.resize(1 + segments.size());
+  for (std::size_t i = 0; i < segments.size(); ++i) impl_->sums[i + 1].segment = segments[i].name;
 }
 
 Metrics::~Metrics() = default;
@@ -471,10 +512,10 @@ void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment,
                   const UpdateReport& report) {
   const std::vector<Impl::Sums*> into = impl_->SumsOf(in_segment);
   if (!report.stale) {
-    impl_->AddErrors(frame.timestamp, frame.truth, into, [&](BlockId id) {
+    impl_->FindErrors(frame.timestamp, frame.truth, [&](BlockId id) {
       return state.layout()[id].present ? state.value(id) : nullptr;
     });
-    impl_->AddConsistency(frame.timestamp, into, state);
+    impl_->AddErrors(frame.timestamp, into, &state);
     impl_->AddImplied(frame.truth, into, report);
   }
   impl_->AddReport(into, report);
@@ -491,22 +532,23 @@ void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<d
     const std::vector<double>& value = estimate[static_cast<std::size_t>(id)];
     return value.empty() ? nullptr : value.data();
   };
-  impl_->AddErrors(timestamp, reference, impl_->SumsOf(in_segment), value_of);
+  impl_->FindErrors(timestamp, reference, value_of);
+  impl_->AddErrors(timestamp, impl_->SumsOf(in_segment), nullptr);
 }
 
 std::vector<std::string> Metrics::without_truth() const {
   std::vector<std::string> names;
   for (const Impl::Tracked& block : impl_->tracked) {
-    if (block.last_error < 0.0) names.push_back(block.name);
+    if (!block.was_known) names.push_back(block.name);
   }
   return names;
 }
 
 std::vector<int> Metrics::far_off() const {
   std::vector<int> sensors;
-  for (std::size_t i = 0; i < impl_->far.size(); ++i) {
-    const Impl::Tally& far = impl_->far[i];
-    if (2 * far.inside > far.count) sensors.push_back(static_cast<int>(i));
+  for (std::size_t i = 0; i < impl_->far_off.size(); ++i) {
+    const Impl::FarOff& far_off = impl_->far_off[i];
+    if (2 * far_off.far > far_off.count) sensors.push_back(static_cast<int>(i));
   }
   return sensors;
 }
@@ -522,10 +564,9 @@ std::map<std::string, double> Metrics::Finish() const {
   for (const Impl::Sums& sums : impl_->sums) impl_->Write(sums, metrics);
   impl_->WriteBounds(metrics);
   for (const Impl::Tracked& block : impl_->tracked) {
-    if (block.last_error >= 0.0) metrics["final_error:" + block.name] = block.last_error;
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
-    if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
+    if (std::isfinite(lag)) metrics[MetricKey{"lag_ms", block.name, ""}.text()] = lag;
   }
   if (const auto aligned = impl_->alignment.Result()) {
     metrics["trajectory.sim3.rmse"] = aligned->rmse;
@@ -535,8 +576,8 @@ std::map<std::string, double> Metrics::Finish() const {
     const Settling settling = SettlingOf(frames);
     if (std::isnan(settling.level)) continue;
     const std::string& name = impl_->sensors[static_cast<std::size_t>(sensor)];
-    metrics["reprojection:" + name] = settling.level;
-    metrics["settling_frames:" + name] = settling.count;
+    metrics[MetricKey{"reprojection", name, ""}.text()] = settling.level;
+    metrics[MetricKey{"settling_frames", name, ""}.text()] = settling.count;
   }
   return metrics;
 }

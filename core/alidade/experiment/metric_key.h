@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+/// Key of a metric or a count. Its text form is
+///
+///   NAME[:SUBJECT][@SEGMENT]      `rmse:target.depth@blind`, `accepted:stereo`, `map.rmse`
+struct MetricKey {
+  std::string name;     ///< `rmse`, `nees.mean`, `accepted`
+  std::string subject;  ///< the block, owner or sensor; "": the run
+  std::string segment;  ///< of `evaluate.segments`; "": the whole run
+
+  /// The key with this text form.
+  static MetricKey Parse(std::string_view text) {
+    MetricKey key;
+    const std::size_t segment = text.find('@');
+    if (segment != text.npos) key.segment = text.substr(segment + 1);
+    text = text.substr(0, segment);
+    const std::size_t subject = text.find(':');
+    if (subject != text.npos) key.subject = text.substr(subject + 1);
+    key.name = text.substr(0, subject);
+    return key;
+  }
+  std::string text() const {
+    return name + (subject.empty() ? "" : ':' + subject) + (segment.empty() ? "" : '@' + segment);
+  }
+};
+
+}  // namespace alidade

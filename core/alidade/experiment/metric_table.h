@@ -1,0 +1,385 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+namespace alidade {
+
+/// The subject of a metric's key.
+enum class MetricSubject { kRun, kBlock, kOwner, kSensor };
+
+enum class MetricUnit {
+  kNone,
+  kSubject,  ///< of the block, or of the block that a sensor determines
+  kMetre,
+  kMillisecond,
+  kMicrosecond,
+  kFrames,
+  kShare,  ///< 0 to 1, shown in %
+};
+
+/// The best value of a metric.
+enum class MetricGoal { kNone, kZero, kOne, k95Percent };
+
+/// How the samples of a run become the metric.
+enum class MetricReduction { kMean, kRootMean, kMax, kLast };
+
+/// The section of a comparison that shows a metric.
+enum class MetricSection {
+  kNone,
+  kAlong,  ///< over the run
+  kFinal,  ///< at its end
+};
+
+/// The error of a block at one timestamp.
+struct BlockSample {
+  double square;                ///< |e|^2; infinite if e is not finite
+  double error;                 ///< its first element
+  std::optional<double> sigma;  ///< of a scalar block with a variance
+};
+/// The joint error of the blocks of an owner at one timestamp.
+struct OwnerSample {
+  double nees;
+  int dof;
+  double bound95;  ///< chi2(0.95, dof)
+};
+/// One accepted measurement.
+struct SensorSample {
+  double nis;
+  int dof;
+};
+/// The error of the state that one measurement implies without a filter.
+struct ImpliedSample {
+  double square;
+};
+
+/// A metric: its meaning, its accumulation over a run, and its place in tables. A sampled metric
+/// has one of the sample functions. The others are computed by code of their own.
+struct MetricInfo {
+  const char* name;
+  const char* meaning;  ///< for the documentation, in Markdown
+  MetricSubject subject;
+  MetricUnit unit = MetricUnit::kNone;
+  MetricGoal goal = MetricGoal::kNone;
+  bool needs_truth = true;
+
+  /// Sampled: one value a timestamp or measurement, or none.
+  std::optional<double> (*block)(const BlockSample&) = nullptr;
+  std::optional<double> (*owner)(const OwnerSample&) = nullptr;
+  std::optional<double> (*sensor)(const SensorSample&) = nullptr;
+  std::optional<double> (*implied)(const ImpliedSample&) = nullptr;
+  MetricReduction reduction = MetricReduction::kMean;
+  bool has_segments = false;  ///< also taken over each segment
+
+  bool is_shown = false;             ///< a row of the tables of `run` and `sweep`
+  bool is_shown_by_segment = false;  ///< one for each segment, too
+  int priority = 0;                  ///< order among the ten rows of `run`, from 1; 0: not there
+
+  MetricSection section = MetricSection::kNone;
+  const char* label = "";  ///< in a comparison
+  bool is_main = false;    ///< also in the short form of a comparison
+  bool has_ratio = false;  ///< a comparison has its ratio to the reference
+  bool is_ratio = false;   ///< it is itself a ratio of means over the runs
+  bool is_cost = false;    ///< independent of the estimate
+};
+
+/// All metrics, in the order in which tables show them. A new sampled metric is one row.
+inline constexpr std::array kMetrics = {
+    MetricInfo{.name = "rmse",
+               .meaning = "sqrt(mean \\|e\\|^2); infinite if an estimate is not finite",
+               .subject = MetricSubject::kBlock,
+               .unit = MetricUnit::kSubject,
+               .goal = MetricGoal::kZero,
+               .block = [](const BlockSample& s) -> std::optional<double> { return s.square; },
+               .reduction = MetricReduction::kRootMean,
+               .has_segments = true,
+               .is_shown = true,
+               .is_shown_by_segment = true,
+               .priority = 1,
+               .section = MetricSection::kAlong,
+               .label = "rmse",
+               .is_main = true,
+               .has_ratio = true},
+    MetricInfo{.name = "mse_by_bound",
+               .meaning = "`compare --cramer-rao`: mean square error by the Cramer-Rao bound",
+               .subject = MetricSubject::kBlock,
+               .goal = MetricGoal::kOne,
+               .section = MetricSection::kAlong,
+               .label = "MSE / Cramer-Rao bound,",
+               .is_main = true,
+               .is_ratio = true},
+    MetricInfo{.name = "implied.rmse",
+               .meaning = "RMSE of the block that single measurements of the sensor imply, without "
+                          "a filter, as in `implied_states.csv`: the baseline that any filter must "
+                          "beat. Gated measurements count, too; other roles are at truth",
+               .subject = MetricSubject::kSensor,
+               .unit = MetricUnit::kSubject,
+               .goal = MetricGoal::kZero,
+               .implied = [](const ImpliedSample& s) -> std::optional<double> { return s.square; },
+               .reduction = MetricReduction::kRootMean,
+               .has_segments = true,
+               .is_shown = true,
+               .section = MetricSection::kAlong,
+               .label = "rmse of single measurements,"},
+    MetricInfo{.name = "trajectory.sim3.rmse",
+               .meaning = "with landmarks: RMSE of the position after the similarity that "
+                          "minimises it [Umeyama1991]",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .section = MetricSection::kAlong,
+               .label = "Sim3-aligned trajectory",
+               .is_main = true,
+               .has_ratio = true},
+    MetricInfo{.name = "trajectory.sim3.scale",
+               .meaning = "scale of that similarity: true = scale x estimate",
+               .subject = MetricSubject::kRun,
+               .goal = MetricGoal::kOne,
+               .section = MetricSection::kAlong,
+               .label = "trajectory, scale"},
+    MetricInfo{.name = "rmsd",
+               .meaning = "`compare`: root mean square difference from the reference estimator",
+               .subject = MetricSubject::kBlock,
+               .unit = MetricUnit::kSubject,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "RMSD",
+               .is_main = true},
+    MetricInfo{.name = "trajectory.sim3.rmsd",
+               .meaning =
+                   "`compare`: the same of the position, Sim(3)-aligned, if the scale of the "
+                   "problem is free",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "RMSD, Sim3-aligned trajectory",
+               .is_main = true},
+    MetricInfo{.name = "rmsd.sigmas",
+               .meaning = "`compare`: that difference in sigmas of the reference",
+               .subject = MetricSubject::kOwner,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "RMSD in sigmas",
+               .is_main = true},
+    MetricInfo{.name = "lag_ms",
+               .meaning = "delay after truth, see [Lag](#lag); > 0 is late. Scalar blocks",
+               .subject = MetricSubject::kBlock,
+               .unit = MetricUnit::kMillisecond,
+               .goal = MetricGoal::kZero,
+               .is_shown = true},
+    MetricInfo{.name = "coverage95",
+               .meaning = "share of timestamps with \\|e\\| <= 1.96 sigma. Scalar blocks",
+               .subject = MetricSubject::kBlock,
+               .unit = MetricUnit::kShare,
+               .goal = MetricGoal::k95Percent,
+               .block = [](const BlockSample& s) -> std::optional<double> {
+                 constexpr double kNormal95 = 1.959963984540054;
+                 if (!s.sigma) return std::nullopt;
+                 return std::abs(s.error) <= kNormal95 * *s.sigma ? 1.0 : 0.0;
+               },
+               .has_segments = true,
+               .is_shown = true,
+               .is_shown_by_segment = true,
+               .priority = 5},
+    MetricInfo{
+        .name = "nees.mean",
+        .meaning = "mean of e' C^-1 e / dof, jointly over the owner's estimated blocks with "
+                   "truth",
+        .subject = MetricSubject::kOwner,
+        .goal = MetricGoal::kOne,
+        .owner = [](const OwnerSample& s) -> std::optional<double> { return s.nees / s.dof; },
+        .has_segments = true,
+        .is_shown = true,
+        .priority = 2,
+        .section = MetricSection::kAlong,
+        .label = "NEES",
+        .is_main = true},
+    MetricInfo{.name = "nees.low",
+               .meaning = "lower 95 % bound of `nees.mean`, see [Bounds](#bounds-of-nees-and-nis)",
+               .subject = MetricSubject::kOwner},
+    MetricInfo{.name = "nees.high",
+               .meaning = "upper 95 % bound of `nees.mean`",
+               .subject = MetricSubject::kOwner},
+    MetricInfo{.name = "nees.dof",
+               .meaning = "number of error elements in the NEES, mean over the timestamps",
+               .subject = MetricSubject::kOwner,
+               .owner = [](const OwnerSample& s) -> std::optional<double> { return s.dof; }},
+    MetricInfo{.name = "nees.within95",
+               .meaning = "share of timestamps with e' C^-1 e <= chi2(0.95, dof)",
+               .subject = MetricSubject::kOwner,
+               .unit = MetricUnit::kShare,
+               .goal = MetricGoal::k95Percent,
+               .owner = [](const OwnerSample& s) -> std::optional<double> {
+                 return s.nees <= s.bound95 ? 1.0 : 0.0;
+               },
+               .has_segments = true,
+               .is_shown = true,
+               .is_shown_by_segment = true,
+               .section = MetricSection::kAlong,
+               .label = "in the 95 % region"},
+    MetricInfo{
+        .name = "nis.mean",
+        .meaning = "mean of r' S^-1 r / dof over accepted measurements",
+        .subject = MetricSubject::kSensor,
+        .goal = MetricGoal::kOne,
+        .needs_truth = false,
+        .sensor = [](const SensorSample& s) -> std::optional<double> { return s.nis / s.dof; },
+        .has_segments = true,
+        .is_shown = true,
+        .priority = 3,
+        .section = MetricSection::kAlong,
+        .label = "NIS"},
+    MetricInfo{.name = "nis.low",
+               .meaning = "lower 95 % bound of `nis.mean`, see [Bounds](#bounds-of-nees-and-nis)",
+               .subject = MetricSubject::kSensor,
+               .needs_truth = false},
+    MetricInfo{.name = "nis.high",
+               .meaning = "upper 95 % bound of `nis.mean`",
+               .subject = MetricSubject::kSensor,
+               .needs_truth = false},
+    MetricInfo{.name = "cpu_us",
+               .meaning = "`compare`: CPU time a frame",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMicrosecond,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "CPU time [us/frame]",
+               .is_main = true,
+               .is_cost = true},
+    MetricInfo{.name = "cpu_us.start",
+               .meaning = "`compare`: CPU time a frame of the filter that a batch starts from",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMicrosecond,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "  and of the filter it starts from",
+               .is_main = true,
+               .is_cost = true},
+    MetricInfo{.name = "time_us",
+               .meaning = "`compare`: wall-clock time a measurement, if the CPU time is unknown",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMicrosecond,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kAlong,
+               .label = "wall clock [us/measurement]",
+               .is_main = true,
+               .is_cost = true},
+    MetricInfo{
+        .name = "final_error",
+        .meaning = "\\|e\\| at the last timestamp with truth",
+        .subject = MetricSubject::kBlock,
+        .unit = MetricUnit::kSubject,
+        .goal = MetricGoal::kZero,
+        .block = [](const BlockSample& s) -> std::optional<double> { return std::sqrt(s.square); },
+        .reduction = MetricReduction::kLast,
+        .section = MetricSection::kFinal,
+        .label = "error",
+        .has_ratio = true},
+    MetricInfo{.name = "final_difference",
+               .meaning = "`compare`: difference from the reference estimator at the end",
+               .subject = MetricSubject::kBlock,
+               .unit = MetricUnit::kSubject,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kFinal,
+               .label = "difference"},
+    MetricInfo{.name = "final_difference.sigmas",
+               .meaning = "`compare`: that difference in sigmas of the reference",
+               .subject = MetricSubject::kOwner,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kFinal,
+               .label = "difference in sigmas"},
+    MetricInfo{.name = "map.rmse",
+               .meaning = "sqrt(mean \\|p - p_true\\|^2) of the landmarks in the state at the end "
+                          "whose true position the source knows",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .is_shown = true,
+               .priority = 6,
+               .section = MetricSection::kFinal,
+               .label = "map",
+               .is_main = true,
+               .has_ratio = true},
+    MetricInfo{.name = "map.sim3.rmse",
+               .meaning = "the same after the similarity that minimises it [Umeyama1991]",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .is_shown = true,
+               .priority = 7,
+               .section = MetricSection::kFinal,
+               .label = "Sim3-aligned map",
+               .is_main = true,
+               .has_ratio = true},
+    MetricInfo{.name = "map.sim3.scale",
+               .meaning = "scale of that similarity: true = scale x estimate",
+               .subject = MetricSubject::kRun,
+               .goal = MetricGoal::kOne,
+               .is_shown = true,
+               .section = MetricSection::kFinal,
+               .label = "map, scale"},
+    MetricInfo{.name = "map.rmsd",
+               .meaning = "`compare`: root mean square difference of the landmarks from the "
+                          "reference estimator",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kFinal,
+               .label = "RMSD, map",
+               .is_main = true},
+    MetricInfo{.name = "map.sim3.rmsd",
+               .meaning = "`compare`: the same after the similarity that minimises it",
+               .subject = MetricSubject::kRun,
+               .unit = MetricUnit::kMetre,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .section = MetricSection::kFinal,
+               .label = "RMSD, Sim3-aligned map",
+               .is_main = true},
+    MetricInfo{.name = "reprojection",
+               .meaning = "with landmarks: rms of the innovations that a frame accepts, as in "
+                          "`NAME/reprojection.csv`; median over the last half of the frames",
+               .subject = MetricSubject::kSensor,
+               .unit = MetricUnit::kNone,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .is_shown = true,
+               .priority = 8},
+    MetricInfo{.name = "settling_frames",
+               .meaning = "the first frame, from 1, from which on the centred rms over up to 9 "
+                          "frames stays within 20 % of `reprojection`; infinite if it is outside "
+                          "at the end",
+               .subject = MetricSubject::kSensor,
+               .unit = MetricUnit::kFrames,
+               .goal = MetricGoal::kZero,
+               .needs_truth = false,
+               .is_shown = true},
+};
+
+/// The place of a metric in kMetrics; kMetrics.size() if there is none of that name.
+constexpr std::size_t IndexOfMetric(std::string_view name) {
+  std::size_t index = 0;
+  while (index < kMetrics.size() && name != kMetrics[index].name) ++index;
+  return index;
+}
+/// The row of a metric; null if there is none of that name.
+constexpr const MetricInfo* FindMetric(std::string_view name) {
+  const std::size_t index = IndexOfMetric(name);
+  return index < kMetrics.size() ? &kMetrics[index] : nullptr;
+}
+
+}  // namespace alidade

@@ -9,19 +9,26 @@
 #include "alidade/base/text.h"
 #include "alidade/compare/compare.h"
 #include "alidade/compare/section.h"
+#include "alidade/experiment/metric_key.h"
 #include "alidade/experiment/metric_rows.h"
+#include "alidade/experiment/metric_table.h"
 #include "alidade/io/json.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/io/text_table.h"
 
 namespace alidade {
 
-using internal::RowKind;
 using internal::RowsOf;
 using internal::Section;
 using internal::TableRow;
 
 namespace {
+
+/// The rows of one metric, or of its ratios to the reference.
+struct RowKind {
+  std::string metric, label;
+  bool is_ratio = false;
+};
 
 /// A column of a table, in the form that rows are made of.
 struct Column {
@@ -36,7 +43,7 @@ std::string CellOf(double value) {
   RunResult one;
   one.estimators.resize(1);
   one.estimators[0].metrics["value"] = value;
-  return RowsOf(one, {{"value", ""}})[0].cells[0];
+  return RowsOf(one, "value", "")[0].cells[0];
 }
 
 /// Of fewer runs an interval is not what it says: that of three, as of a t distribution, would have
@@ -54,14 +61,14 @@ std::string RatioText(const Ratio& ratio) {
                                 : "");
 }
 
-/// The ratios of a kind, `rmse` or `map.rmse`.
+/// The ratios of a metric.
 std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
   std::map<std::string, TableRow> rows;  // by key
   for (const Column& column : columns) {
     for (const auto& [key, ratio] : column.ratios) {
-      const std::string of = key.substr(0, key.find(':'));
-      if (of != kind.kind) continue;
-      rows[key].label = kind.label + (of == key ? "" : ' ' + key.substr(of.size() + 1));
+      const MetricKey parsed = MetricKey::Parse(key);
+      if (parsed.name != kind.metric) continue;
+      rows[key].label = kind.label + (parsed.subject.empty() ? "" : ' ' + parsed.subject);
     }
   }
   std::vector<TableRow> all;
@@ -76,7 +83,7 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
 }
 
 /// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
-/// numbers share their unit and decimals with all others of the row. Kinds `ratio.KIND` are ratios.
+/// numbers share their unit and decimals with all others of the row.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
   RunResult all;
@@ -89,13 +96,12 @@ std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool severa
   }
   std::vector<TableRow> rows;
   for (const RowKind& kind : kinds) {
-    constexpr std::string_view kRatio = "ratio.";
-    if (kind.kind.starts_with(kRatio)) {
-      const auto ratios = RatioRows(columns, {kind.kind.substr(kRatio.size()), kind.label});
+    if (kind.is_ratio) {
+      const std::vector<TableRow> ratios = RatioRows(columns, kind);
       rows.insert(rows.end(), ratios.begin(), ratios.end());
       continue;
     }
-    for (TableRow& row : RowsOf(all, {kind})) {
+    for (TableRow& row : RowsOf(all, kind.metric, kind.label)) {
       std::vector<std::string> cells;
       for (std::size_t i = 0; i < row.cells.size(); i += 3) {
         const std::string* const c = &row.cells[i];
@@ -154,40 +160,29 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
   return section;
 }
 
-/// Those of `kinds` that `rows` asks for: a person first reads errors where truth is known, else
-/// differences.
-std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
-                             std::vector<RowKind> kinds) {
-  if (rows == ReportRows::kAll) return kinds;
-  static const std::set<std::string> errors = {"rmse",
-                                               "ratio.rmse",
-                                               "trajectory.sim3.rmse",
-                                               "ratio.trajectory.sim3.rmse",
-                                               "nees.mean",
-                                               "cpu_us",
-                                               "cpu_us.start",
-                                               "time_us",
-                                               "map.rmse",
-                                               "ratio.map.rmse",
-                                               "map.sim3.rmse",
-                                               "ratio.map.sim3.rmse",
-                                               "ratio.mse_by_bound"};
-  static const std::set<std::string> differences = {
-      "rmsd",     "trajectory.sim3.rmsd", "rmsd.sigmas", "cpu_us", "cpu_us.start", "time_us",
-      "map.rmsd", "map.sim3.rmsd"};
-  const auto& main = comparison.reference == "truth" ? errors : differences;
-  std::erase_if(kinds, [&](const RowKind& kind) { return !main.contains(kind.kind); });
+/// The rows of a section. The short form has errors if truth is known, else differences.
+std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section, ReportRows rows) {
+  const bool has_cpu_time = std::ranges::any_of(
+      comparison.estimators,
+      [](const ComparedEstimator& estimator) { return estimator.values.contains("cpu_us"); });
+  std::vector<RowKind> kinds;
+  for (const MetricInfo& metric : kMetrics) {
+    const bool is_main =
+        metric.is_main &&
+        (metric.is_cost || metric.needs_truth == (comparison.reference == "truth"));
+    if (metric.section != section || (rows != ReportRows::kAll && !is_main)) continue;
+    if (has_cpu_time && std::string_view(metric.name) == "time_us") continue;
+    if (metric.is_ratio) {
+      kinds.push_back({metric.name, metric.label, true});
+      continue;
+    }
+    kinds.push_back({metric.name, metric.label});
+    if (!metric.has_ratio) continue;
+    const bool is_of_blocks = metric.subject == MetricSubject::kBlock;
+    kinds.push_back(
+        {metric.name, is_of_blocks ? "  ratio" : std::string("  ratio, ") + metric.label, true});
+  }
   return kinds;
-}
-
-/// Rows of cost: CPU time, and where none is known, as of finished runs, the wall clock.
-std::vector<RowKind> CostKinds(const Comparison& comparison) {
-  const bool cpu = std::ranges::any_of(comparison.estimators, [](const ComparedEstimator& one) {
-    return one.values.contains("cpu_us");
-  });
-  if (!cpu) return {{"time_us", "wall clock [us/measurement]"}};
-  return {{"cpu_us", "CPU time [us/frame]"},
-          {"cpu_us.start", "  and of the filter it starts from"}};
 }
 
 /// The share of timestamps at which the average NEES over the runs is within its bounds.
@@ -221,25 +216,11 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
     any_diverged = any_diverged || one.diverged > 0;
   }
   if (of.empty()) return {};
-  std::vector<RowKind> kinds = {{"rmse", "rmse"},
-                                {"ratio.rmse", "  ratio"},
-                                {"ratio.mse_by_bound", "MSE / Cramer-Rao bound,"},
-                                {"implied.rmse", "rmse of single measurements,"},
-                                {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
-                                {"trajectory.sim3.scale", "trajectory, scale"},
-                                {"ratio.trajectory.sim3.rmse", "  ratio, Sim3-aligned trajectory"},
-                                {"rmsd", "RMSD"},
-                                {"trajectory.sim3.rmsd", "RMSD, Sim3-aligned trajectory"},
-                                {"rmsd.sigmas", "RMSD in sigmas"},
-                                {"nees.mean", "NEES"},
-                                {"nees.within95", "in the 95 % region"},
-                                {"nis.mean", "NIS"}};
-  for (RowKind& cost : CostKinds(comparison)) kinds.push_back(std::move(cost));
   Section section = TableOf(of, comparison.runs > 1,
                             smoothed ? "Smoothed: estimates from later data too"
                                      : "Online: every estimate from the data up to it",
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
-                            KindsOf(comparison, rows, std::move(kinds)));
+                            KindsOf(comparison, MetricSection::kAlong, rows));
   const std::vector<TableRow> average_nees = AverageNeesRows(of);
   section.rows.insert(section.rows.end(), average_nees.begin(), average_nees.end());
   if (any_diverged) section.rows.push_back(diverged);
@@ -251,18 +232,7 @@ Section FinalSection(const Comparison& comparison, ReportRows rows) {
   return TableOf(comparison.estimators, comparison.runs > 1,
                  "At the end, where all have the same data", &ComparedEstimator::final_reference,
                  &ComparedEstimator::final_reference_runs,
-                 KindsOf(comparison, rows,
-                         {{"final_error", "error"},
-                          {"ratio.final_error", "  ratio"},
-                          {"final_difference", "difference"},
-                          {"final_difference.sigmas", "difference in sigmas"},
-                          {"map.rmse", "map"},
-                          {"ratio.map.rmse", "  ratio, map"},
-                          {"map.sim3.rmse", "Sim3-aligned map"},
-                          {"map.sim3.scale", "map, scale"},
-                          {"ratio.map.sim3.rmse", "  ratio, Sim3-aligned map"},
-                          {"map.rmsd", "RMSD, map"},
-                          {"map.sim3.rmsd", "RMSD, Sim3-aligned map"}}));
+                 KindsOf(comparison, MetricSection::kFinal, rows));
 }
 
 /// The values of one kind by their subject, under another kind.

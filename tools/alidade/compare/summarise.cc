@@ -4,6 +4,8 @@
 
 #include "alidade/base/text.h"
 #include "alidade/compare/compare.h"
+#include "alidade/experiment/metric_key.h"
+#include "alidade/experiment/metric_table.h"
 
 namespace alidade {
 namespace {
@@ -18,8 +20,8 @@ class ValueCollector {
   std::map<std::string, Interval> MeanIntervals() const {
     std::map<std::string, Interval> intervals;
     for (const auto& [key, list] : values_) {
-      const bool is_error = key.starts_with("rmse:") || key.starts_with("final_error:") ||
-                            key == "map.rmse" || key == "map.sim3.rmse";
+      const MetricInfo* const metric = FindMetric(MetricKey::Parse(key).name);
+      const bool is_error = metric != nullptr && metric->has_ratio;
       const bool has_nan = std::ranges::any_of(list, [](double v) { return std::isnan(v); });
       if (is_error && !has_nan && list.size() > 1) intervals[key] = IntervalOfMean(list);
     }

@@ -8,6 +8,8 @@
 
 #include "alidade/base/text.h"
 #include "alidade/compare/distance.h"
+#include "alidade/experiment/metric_key.h"
+#include "alidade/experiment/metric_table.h"
 #include "alidade/io/text_table.h"
 
 namespace alidade {
@@ -201,16 +203,16 @@ void AddAll(const std::map<std::string, double>& source, const std::string& kind
   for (const auto& [key, value] : source) values[kind + key] = SingleValue(value);
 }
 
-/// Adds the ratios of the metrics whose keys begin with one of `kinds`.
-void AddRatios(const Candidate& estimator, const Candidate& reference,
-               const std::vector<std::string>& kinds, std::map<std::string, Ratio>& ratios) {
-  for (const auto& [key, value] : estimator.result.metrics) {
-    const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
-    const auto found = reference.result.metrics.find(key);
-    if (std::ranges::none_of(kinds, begins) || key.find('@') != key.npos) continue;
-    if (found == reference.result.metrics.end() || !(found->second > 0.0)) continue;
-    if (!std::isfinite(found->second)) continue;
-    ratios[key] = {value, found->second};
+/// Adds the ratios of the metrics of a section that have one.
+void AddRatios(const Candidate& estimator, const Candidate& reference, MetricSection section,
+               std::map<std::string, Ratio>& ratios) {
+  for (const auto& [text, value] : estimator.result.metrics) {
+    const MetricKey key = MetricKey::Parse(text);
+    const MetricInfo* const metric = FindMetric(key.name);
+    if (metric == nullptr || metric->section != section || !metric->has_ratio) continue;
+    const auto found = reference.result.metrics.find(text);
+    if (!key.segment.empty() || found == reference.result.metrics.end()) continue;
+    if (found->second > 0.0 && std::isfinite(found->second)) ratios[text] = {value, found->second};
   }
 }
 
@@ -238,10 +240,8 @@ void AddFinal(const Candidate& estimator, const Candidate& reference, ComparedEs
 
 /// Reports whether a metric of a run does not depend on truth.
 bool NeedsNoTruth(const std::string& key) {
-  for (const char* kind : {"nis.", "reprojection:", "settling_frames:"}) {
-    if (key.starts_with(kind)) return true;
-  }
-  return false;
+  const MetricInfo* const metric = FindMetric(MetricKey::Parse(key).name);
+  return metric != nullptr && !metric->needs_truth;
 }
 
 /// Adds the CPU time for each frame. The work of a batch of all data during the frames is the
@@ -287,7 +287,7 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
     const Candidate& along = *references.along;
     compared.reference = along.name;
     compared.reference_runs = 1;
-    if (truth) AddRatios(estimator, along, {"rmse:", "trajectory.sim3.rmse"}, compared.ratios);
+    if (truth) AddRatios(estimator, along, MetricSection::kAlong, compared.ratios);
     if (&along != &estimator) AddRmsd(estimator, along, compared);
   }
   if (references.final != nullptr && references.final->is_usable()) {
@@ -295,7 +295,7 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
     compared.final_reference = final.name;
     compared.final_reference_runs = 1;
     if (truth)
-      AddRatios(estimator, final, {"final_error:", "map.rmse", "map.sim3.rmse"}, compared.ratios);
+      AddRatios(estimator, final, MetricSection::kFinal, compared.ratios);
     if (&final != &estimator) AddFinal(estimator, final, compared);
   }
   return compared;

@@ -58,8 +58,8 @@ struct LandmarkOptions {
 
 /// Options of one-point RANSAC [Civera2010], the outlier rejection for landmarks. A hypothesis is
 /// the state after an update by one match. The matches that it predicts to within pixel noise are
-/// its support. The support of the best hypothesis is used for an update. The remaining matches that
-/// are consistent with the updated state are used for a second update.
+/// its support. The support of the best hypothesis is used for an update. The remaining matches
+/// that are consistent with the updated state are used for a second update.
 struct OnePointRansac {
   /// Probability that an inlier is within its own noise.
   double inlier_probability = 0.99;

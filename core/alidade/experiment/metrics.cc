@@ -223,10 +223,7 @@ namespace {
 
 /// Unit of the error of a block: rad for an orientation or a direction, else the unit of the block.
 std::string UnitOfError(const Problem& problem, BlockId id) {
-  const Geometry& geometry = problem.layout[id].geometry();
-  bool all_angular = true;
-  for (int i = 0; i < geometry.tangent; ++i) all_angular = all_angular && geometry.IsAngular(i);
-  return all_angular ? "rad" : internal::UnitOf(problem, id);
+  return problem.layout[id].geometry().is_angular() ? "rad" : internal::UnitOf(problem, id);
 }
 
 }  // namespace

@@ -77,6 +77,12 @@ bool Geometry::IsAngular(int i) const {
   return angular;
 }
 
+bool Geometry::is_angular() const {
+  int i = 0;
+  while (i < tangent && IsAngular(i)) ++i;
+  return i == tangent;
+}
+
 void Geometry::Plus(const double* x, const double* d, double* y) const {
   if (is_vector()) return Vec<kDynamic>::Plus(x, d, y, ambient);
   if (!is_product()) return row_->plus(x, d, y);

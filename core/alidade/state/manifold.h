@@ -47,6 +47,8 @@ class Geometry {
   bool has_transport() const;
   /// True if element `i` of a difference is an angle in rad.
   bool IsAngular(int i) const;
+  /// True if all elements of a difference are.
+  bool is_angular() const;
 
   /// Calls f(part, ambient offset, tangent offset) for each part of a product; for any other
   /// geometry once, for itself.

@@ -27,20 +27,16 @@ Ekf OneBlock(double sigma) {
   return {problem, EkfOptions{}, {{"z", 1}}};
 }
 
-bool Has(const UpdateReport& report, const std::string& kind) {
-  return std::ranges::find(report.events, kind, &Event::kind) != report.events.end();
-}
-
 TEST(EkfSnapshot, AWarningThatIsGivenOnceIsGivenAgainOnlyFromBeforeIt) {
   Ekf ekf = OneBlock(1e-9);
   const Ekf before = ekf;
-  EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
+  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kConditioning));
   const Ekf after = ekf;
   ekf = before;
-  EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
+  EXPECT_TRUE(testing::HasEvent(ekf.Process(FrameAt(0.0, {{0, 1.0}})), EventKind::kConditioning));
   ekf = before;
   ekf = after;
-  EXPECT_FALSE(Has(ekf.Process(FrameAt(0.5, {{0, 1.0}})), "conditioning"));
+  EXPECT_FALSE(testing::HasEvent(ekf.Process(FrameAt(0.5, {{0, 1.0}})), EventKind::kConditioning));
 }
 
 TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
@@ -49,7 +45,7 @@ TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
   const Ekf saved = ekf;
   const std::vector<double> values = saved.state().values();
   ekf.Process(FrameAt(0.5, {{0, 2.5}}));
-  ASSERT_TRUE(Has(ekf.Process(FrameAt(2.0, {{0, 1.0}})), "not_finite"));
+  ASSERT_TRUE(testing::HasEvent(ekf.Process(FrameAt(2.0, {{0, 1.0}})), "not_finite"));
   EXPECT_TRUE(ekf.failed());
   ekf = saved;
   EXPECT_FALSE(ekf.failed());
@@ -57,7 +53,7 @@ TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
   EXPECT_EQ(ekf.timestamp(), 0);
   EXPECT_EQ(ekf.state().values(), values);
   const UpdateReport& report = ekf.Process(FrameAt(2.0, {{0, 1.0}}));
-  ASSERT_TRUE(Has(report, "not_finite"));
+  ASSERT_TRUE(testing::HasEvent(report, "not_finite"));
   const std::string end = "sensor 'z' at 0.000000 s, z = 1.5";
   EXPECT_TRUE(report.events.back().text.ends_with(end)) << report.events.back().text;
 }

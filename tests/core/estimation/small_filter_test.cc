@@ -78,7 +78,7 @@ std::map<std::string, int> Compare(const Problem& problem, const EkfOptions& opt
     const UpdateReport& a = few.Process(frame);
     const UpdateReport& b = many.Process(frame);
     EXPECT_EQ(a.events.size(), b.events.size());
-    for (const Event& event : b.events) ++seen[event.kind];
+    for (const Event& event : b.events) ++seen[ToString(event.kind)];
     EXPECT_EQ(a.measurements().size(), b.measurements().size());
     for (std::size_t i = 0; i < a.measurements().size(); ++i) {
       const MeasurementReport& one = a.measurements()[i];

@@ -43,8 +43,7 @@ ErrorRecorder::ErrorRecorder(const EstimatorSpec& spec, const Experiment& experi
     blocks_.back().error.resize(layout[id].geometry().tangent);
     if (position == series_.owners.end()) series_.owners.push_back(owner);
     series_.blocks.push_back(layout[id].name);
-    const std::vector<bool> angles = AreAngles(layout[id].geometry());
-    series_.angles.push_back(std::ranges::find(angles, false) == angles.end());
+    series_.angles.push_back(layout[id].geometry().is_angular());
   }
   const bool is_online = spec.kind == EstimatorKind::kFilter ||
                          (spec.kind == EstimatorKind::kBatch && !spec.estimator->offline());

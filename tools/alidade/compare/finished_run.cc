@@ -6,10 +6,13 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "alidade/base/text.h"
 #include "alidade/compare/json_node.h"
+#include "alidade/experiment/metric_key.h"
 #include "alidade/io/number_rows.h"
 #include "alidade/io/read_file.h"
 #include "alidade/io/text_cell.h"
@@ -85,34 +88,55 @@ Timestamp TimestampOf(std::string_view row, const fs::path& file, int line) {
   return cell::ParseTimestamp(text, value, 9);
 }
 
-/// Appends the cells after the timestamp of a row of estimates.csv: for each block its values, then
-/// its sigmas.
-void AppendRow(Series& series, const std::vector<double>& row) {
-  auto cell = row.begin() + 1;
-  for (const SeriesBlock& block : series.blocks) {
-    const int values = block.geometry.ambient, sigmas = block.geometry.tangent;
-    series.values.insert(series.values.end(), cell, cell + values);
-    cell += values;
-    for (int i = 0; i < sigmas; ++i) series.covariances.push_back(cell[i] * cell[i]);
-    cell += sigmas;
+/// Places of the cells in a row of estimates.csv, in the order of the series.
+struct EstimateCells {
+  std::size_t columns = 0;
+  std::vector<std::size_t> values, sigmas;
+};
+
+/// Finds the cells of the blocks by `columns.json`.
+EstimateCells FindCells(const JsonNode& columns, const std::vector<SeriesBlock>& blocks,
+                        const fs::path& file) {
+  EstimateCells cells;
+  std::map<std::pair<std::string, std::string>, std::vector<std::size_t>> found;
+  for (const JsonNode& column : columns.Items()) {
+    found[{TextOf(column, "subject"), column.At("quantity").Text()}].push_back(cells.columns++);
   }
+  const auto append = [&](const SeriesBlock& block, const char* quantity, int size,
+                          std::vector<std::size_t>& list) {
+    const std::vector<std::size_t>& places = found[{block.name, quantity}];
+    if (std::ssize(places) != size) {
+      FailFile(file, 0, "the columns of block '" + block.name + "' differ from run.json");
+    }
+    list.insert(list.end(), places.begin(), places.end());
+  };
+  for (const SeriesBlock& block : blocks) {
+    append(block, "value", block.geometry.ambient, cells.values);
+    append(block, "sigma", block.geometry.tangent, cells.sigmas);
+  }
+  return cells;
+}
+
+void AppendRow(Series& series, const EstimateCells& cells, const std::vector<double>& row) {
+  for (const std::size_t cell : cells.values) series.values.push_back(row[cell]);
+  for (const std::size_t cell : cells.sigmas) series.covariances.push_back(row[cell] * row[cell]);
 }
 
 /// Reads estimates.csv. Returns the number of rows with cells that are not finite; empty cells,
 /// which represent missing values, do not count.
-std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
+std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std::int64_t rows,
+                           Series& series) {
   std::int64_t not_finite = 0;
   std::ifstream stream = Open(file);
   std::string line;
   std::getline(stream, line);
-  const auto columns = 1 + static_cast<std::size_t>(series.ambient() + series.tangent());
   for (int number = 2; std::getline(stream, line); ++number) {
     const std::vector<double> row = NumbersOf(line, file, number);
-    if (row.size() != columns)
-      FailFile(file, number, "the number of columns differs from run.json");
+    if (row.size() != cells.columns)
+      FailFile(file, number, "the number of columns differs from columns.json");
     if (stream.eof()) FailFile(file, number, "the last line is incomplete");
     series.timestamps.push_back(TimestampOf(line, file, number));
-    AppendRow(series, row);
+    AppendRow(series, cells, row);
     not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
   }
   if (std::ssize(series.timestamps) != rows) {
@@ -191,21 +215,24 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
 
 /// Reads the landmarks of the final state, without those that were removed earlier.
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
-  constexpr std::size_t kPosition = 3;  // columns x, y, z, after id, generation, representation
-  constexpr std::size_t kStatus = 21;
   constexpr const char* kAxes[] = {"x", "y", "z"};
   RequireFile(file);
   std::vector<LandmarkEstimate> map;
   NumberRows rows(file, Place{file.string()}, {});
-  rows.Next();  // the header
+  std::map<std::string, std::size_t, std::less<>> columns;
+  rows.Next();
+  for (std::size_t i = 0; i < rows.size(); ++i) columns.emplace(rows.text(i), i);
+  for (const char* name : {"id", "generation", "x", "y", "z", "status"}) {
+    if (!columns.contains(name)) FailFile(file, 1, std::string("no column '") + name + "'");
+  }
   while (rows.Next()) {
-    if (rows.size() < kPosition + 3) FailFile(file, rows.line(), "too few columns");
-    if (rows.size() > kStatus && rows.text(kStatus) == "removed") continue;
+    if (rows.size() < columns.size()) FailFile(file, rows.line(), "too few columns");
+    if (rows.text(columns.at("status")) == "removed") continue;
     LandmarkEstimate& landmark = map.emplace_back();
-    landmark.id = rows.Index(0, "id");
-    landmark.generation = static_cast<int>(rows.Index(1, "generation"));
+    landmark.id = rows.Index(columns.at("id"), "id");
+    landmark.generation = static_cast<int>(rows.Index(columns.at("generation"), "generation"));
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::size_t cell = kPosition + i;
+      const std::size_t cell = columns.at(kAxes[i]);
       const bool is_empty = rows.text(cell).empty();
       landmark.position[static_cast<Eigen::Index>(i)] =
           is_empty ? kNan : rows.Number(cell, kAxes[i]);
@@ -217,8 +244,8 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
 std::int64_t CountOf(const EstimatorResult& result, const std::vector<std::string>& outcomes) {
   std::int64_t sum = 0;
   for (const auto& [key, count] : result.counts) {
-    const std::string outcome = key.substr(0, key.find(':'));
-    if (outcome.size() < key.size() && std::ranges::count(outcomes, outcome) > 0) sum += count;
+    const MetricKey parsed = MetricKey::Parse(key);
+    if (!parsed.subject.empty() && std::ranges::count(outcomes, parsed.name) > 0) sum += count;
   }
   return sum;
 }
@@ -250,6 +277,9 @@ ComparedRun ReadRun(const fs::path& folder) {
   }
   const Json timing_json = ReadJson(timing_file);
   const JsonNode timing(timing_json, timing_file.string());
+  const fs::path columns_file = folder / "columns.json";
+  const Json columns_json = ReadJson(columns_file);
+  const JsonNode columns(columns_json, columns_file.string());
   run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));
   run.reason = root.At("reason").Text();
   run.reference = root.At("reference").Text();
@@ -265,8 +295,11 @@ ComparedRun ReadRun(const fs::path& folder) {
     candidate.series.blocks = ReadBlocks(entry);
     candidate.series.joint = false;
     candidate.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
+    const std::string estimates = name + "/estimates.csv";
+    const EstimateCells cells =
+        FindCells(columns.At(estimates), candidate.series.blocks, columns_file);
     candidate.not_finite_rows =
-        ReadEstimates(folder / name / "estimates.csv", entry.At("rows").Count(), candidate.series);
+        ReadEstimates(folder / estimates, cells, entry.At("rows").Count(), candidate.series);
     ReadCovariances(folder / name / "covariance.bin", candidate.series);
     const fs::path map = folder / name / "landmarks.csv";
     if (fs::exists(map)) candidate.result.landmarks = ReadMap(map);

@@ -3,63 +3,46 @@
 
 #include <cmath>
 
-#include "alidade/state/element_names.h"
-
 namespace alidade::internal {
 
-std::vector<bool> AreAngles(const Geometry& geometry) {
-  std::vector<bool> angles;
-  for (int i = 0; i < geometry.tangent; ++i) angles.push_back(geometry.IsAngular(i));
-  return angles;
+ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
+                       const std::vector<BlockLayout>& blocks, RunColumns& run_columns) {
+  std::vector<Column> columns = {kTimeColumn};
+  for (const BlockLayout& block : blocks) {
+    if (block.truth < 0) continue;
+    blocks_.push_back(block);
+    AppendColumns(kErrorColumns, block, columns);
+    int part = 0;
+    for (const std::string& name : TangentNames(block.name, block.space)) {
+      const bool is_angle = block.space.geometry.IsAngular(part);
+      elements_.push_back({name, block.unit, block.truth, part++, is_angle});
+    }
+  }
+  if (blocks_.empty()) return;
+  file_ = CreateCsv(folder, estimator + "/errors.csv", std::move(columns), run_columns);
 }
 
-ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
-                       const Problem& problem, const std::vector<int>& truth_of) {
-  std::vector<std::string> header = {"t_s"};
-  for (BlockId id = 0; id < static_cast<int>(problem.layout.blocks().size()); ++id) {
-    const int truth = truth_of[static_cast<std::size_t>(id)];
-    if (truth < 0) continue;
-    const Block& block = problem.layout[id];
-    const std::vector<std::string> names = TangentNames(block.name, block.space);
-    const std::vector<bool> angles = AreAngles(block.geometry());
-    blocks_.push_back({id, static_cast<std::size_t>(truth), elements_.size()});
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      elements_.push_back({names[i], UnitOf(problem, id), truth, static_cast<int>(i), angles[i]});
-      header.push_back(names[i]);
+/// Records which elements have a known error and a variance.
+void ErrorsFile::Record(const BlockRow& row) {
+  std::size_t first = 0;
+  for (const BlockLayout& block : blocks_) {
+    const std::vector<double> error = row.ErrorOf(block), sigmas = row.SigmasOf(block);
+    for (std::size_t i = 0; i < block.tangent(); ++i) {
+      RecordedError& element = elements_[first + i];
+      element.is_known = element.is_known || (i < error.size() && std::isfinite(error[i]));
+      element.is_random =
+          element.is_random || (i < sigmas.size() && std::isfinite(sigmas[i]) && sigmas[i] > 0.0);
     }
-    for (const std::string& name : names) header.push_back("sigma:" + name);
+    first += block.tangent();
   }
-  if (!blocks_.empty()) file_.emplace(folder, estimator + "/errors.csv", header);
 }
 
 void ErrorsFile::Add(const SourceFrame& frame, const State& state) {
   if (!file_) return;
+  const BlockRow row{frame, state};
+  Record(row);
   file_->Time(frame.timestamp);
-  std::vector<double> error, sigma;
-  for (const Tracked& tracked : blocks_) {
-    const Block& block = state.layout()[tracked.id];
-    const Geometry& geometry = block.geometry();
-    const auto size = static_cast<std::size_t>(geometry.tangent);
-    error.clear();
-    sigma.clear();
-    if (block.present && tracked.truth < frame.truth.size() &&
-        !frame.truth[tracked.truth].empty()) {
-      error.resize(size);
-      geometry.Minus(frame.truth[tracked.truth].data(), state.value(tracked.id), error.data());
-    }
-    for (std::size_t i = 0; i < error.size(); ++i) {
-      error[i] = 0.0 - error[i];
-      RecordedError& element = elements_[tracked.first + i];
-      element.is_known = element.is_known || std::isfinite(error[i]);
-    }
-    for (std::size_t i = 0; block.has_covariance() && i < size; ++i) {
-      const int row = block.tangent_offset + static_cast<int>(i);
-      sigma.push_back(std::sqrt(state.covariance().Variance(row)));
-      RecordedError& element = elements_[tracked.first + i];
-      element.is_random = element.is_random || (std::isfinite(sigma[i]) && sigma[i] > 0.0);
-    }
-    file_->Numbers(error.data(), error.size(), size).Numbers(sigma.data(), sigma.size(), size);
-  }
+  for (const BlockLayout& block : blocks_) WriteCells(kErrorColumns, block, row, *file_);
   file_->EndRow();
 }
 

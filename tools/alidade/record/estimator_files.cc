@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/reference_metrics.h"
@@ -18,8 +19,8 @@ std::string InParentheses(const std::string& unit) {
   return unit.find_first_of("/ ^") == unit.npos ? unit : '(' + unit + ')';
 }
 
-/// Of an element of that unit for one of a measurement; "" where it has none. A sensor of several
-/// elements without a unit may have one for each.
+/// Returns the unit of the gain of an element with this unit; "" if it has none or is unknown. A
+/// sensor of several elements without a common unit may have one for each element.
 std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
   if (unit == sensor.unit) return "";
   if (sensor.unit.empty()) return sensor.tangent == 1 ? unit : "";
@@ -46,24 +47,39 @@ RecordedEstimator EstimatorFiles::Describe(const EstimatorSpec& spec) {
 }
 
 EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec,
-                               const std::vector<StreamInfo>& truths,
-                               const std::vector<std::vector<std::string>>& truth_columns,
-                               bool covariances)
-    : recorded_(Describe(spec)),
-      estimates_(
-          folder, spec.name + "/estimates.csv",
-          EstimatesHeader(spec.problem, MatchTruths(spec.problem.layout, truths), truth_columns)),
-      innovations_(folder, spec.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, spec.name + "/gains.csv", GainsHeader(spec.problem)),
-      errors_(folder, spec.name, spec.problem, MatchTruths(spec.problem.layout, truths)) {
-  measured_.assign(spec.problem.sensors.size(), kNoTimestamp);
+                               const TruthLayout& truth, bool covariances, RunColumns& run_columns)
+    : recorded_(Describe(spec)) {
+  AddBlocks(spec.problem, truth);
   FindPath(spec.problem);
+  OpenEstimates(folder, run_columns);
+  const auto create = [&](const char* file, std::vector<Column> columns) {
+    return CreateCsv(folder, spec.name + file, std::move(columns), run_columns);
+  };
+  std::vector<Column> columns;
+  AppendColumns(kInnovationColumns, {static_cast<std::size_t>(recorded_.width)}, columns);
+  innovations_ = create("/innovations.csv", std::exchange(columns, {}));
+  gain_layout_ = AddGains(spec.problem);
+  AppendColumns(kGainColumns, gain_layout_, columns);
+  gains_ = create("/gains.csv", std::exchange(columns, {}));
+  if (std::ranges::any_of(spec.problem.sensors, HasReprojection)) {
+    AppendColumns(kReprojectionColumns, NoLayout{}, columns);
+    reprojection_ = create("/reprojection.csv", std::move(columns));
+  }
+  last_measured_.assign(spec.problem.sensors.size(), kNoTimestamp);
   OpenTrajectory(folder, spec.problem);
   if (covariances) covariances_ = folder.Create(spec.name + "/covariance.bin");
-  if (std::ranges::any_of(spec.problem.sensors, HasReprojection)) {
-    reprojection_.emplace(folder, spec.name + "/reprojection.csv",
-                          std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
+}
+
+void EstimatorFiles::OpenEstimates(const OutputFolder& folder, RunColumns& run_columns) {
+  std::vector<Column> columns = {kTimeColumn};
+  std::vector<BlockLayout> blocks;
+  for (const RecordedBlock& block : blocks_) {
+    AppendColumns(kEstimateColumns, block.layout, columns);
+    blocks.push_back(block.layout);
   }
+  estimates_ =
+      CreateCsv(folder, recorded_.name + "/estimates.csv", std::move(columns), run_columns);
+  errors_.emplace(folder, recorded_.name, blocks, run_columns);
 }
 
 void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& problem) {
@@ -83,122 +99,102 @@ void EstimatorFiles::FindPath(const Problem& problem) {
     recorded_.sensors[s].has_reprojection = HasReprojection(problem.sensors[s]);
   }
   const BlockId path = PositionBlockOf(problem);
-  for (const BlockColumns& columns : blocks_) {
-    if (columns.id == path) recorded_.path = static_cast<int>(columns.element);
+  for (const RecordedBlock& block : blocks_) {
+    if (block.layout.id == path) recorded_.path = static_cast<int>(block.element);
   }
 }
 
-std::vector<std::string> EstimatorFiles::EstimatesHeader(
-    const Problem& problem, const std::vector<int>& truth_of,
-    const std::vector<std::vector<std::string>>& truth_columns) {
-  std::vector<std::string> header = {"t_s"};
-  for (BlockId id = 0; id < static_cast<int>(problem.layout.blocks().size()); ++id) {
-    const Block& block = problem.layout[id];
-    const std::vector<std::string> names = AmbientNames(block.name, block.space);
-    const std::vector<std::string> tangents = TangentNames(block.name, block.space);
-    const int truth = truth_of[static_cast<std::size_t>(id)];
-    blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(),
-                       recorded_.sigmas.size(), truth});
-    const std::vector<bool> angles = AreAngles(block.geometry());
-    for (std::size_t i = 0; i < tangents.size(); ++i) {
-      recorded_.sigmas.push_back({tangents[i], angles[i] ? "rad" : UnitOf(problem, id)});
+void EstimatorFiles::AddBlocks(const Problem& problem, const TruthLayout& truth) {
+  for (const BlockLayout& layout : BlockLayoutsOf(problem, truth.truths)) {
+    blocks_.push_back({layout, recorded_.elements.size(), recorded_.sigmas.size()});
+    for (const Column& column : TangentColumns(layout, "")) {
+      recorded_.sigmas.push_back({column.name, column.unit});
     }
+    const std::vector<std::string> names = AmbientNames(layout.name, layout.space);
+    const bool has_sigma = names == TangentNames(layout.name, layout.space);
     for (std::size_t i = 0; i < names.size(); ++i) {
-      recorded_.elements.push_back({names[i], UnitOf(problem, id), names == tangents,
-                                    truth >= 0 ? truth_columns[truth][i] : ""});
+      const bool has_truth = layout.truth >= 0;
+      recorded_.elements.push_back(
+          {names[i], layout.unit, has_sigma, has_truth ? truth.names[layout.truth][i] : ""});
     }
-    header.insert(header.end(), names.begin(), names.end());
-    for (const std::string& name : tangents) header.push_back("sigma:" + name);
   }
-  return header;
 }
 
-std::vector<std::string> EstimatorFiles::InnovationsHeader() const {
-  std::vector<std::string> header = {"t_s",     "stream", "sensor", "landmark",
-                                     "outcome", "dof",    "nis"};
-  for (const char* what : {"z", "h", "s", "r"}) {
-    for (int i = 0; i < recorded_.width; ++i) header.push_back(what + std::to_string(i));
-  }
-  return header;
-}
-
-std::vector<std::string> EstimatorFiles::GainsHeader(const Problem& problem) {
-  std::vector<std::string> header = {"t_s", "sensor"};
-  std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
+GainLayout EstimatorFiles::AddGains(const Problem& problem) {
+  GainLayout layout;
+  std::map<std::string, std::size_t> known;  // sensors with the same measured names share columns
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const Space& space = problem.sensors[s].model->measurement();
     if (problem.sensors[s].model->has_landmark()) continue;
-    for (const BlockColumns& columns : blocks_) {
-      const Block& block = problem.layout[columns.id];
-      if (block.status == BlockStatus::kConstant) continue;
-      for (std::size_t i = 0; i < columns.tangent; ++i) {
-        const RecordedSigma& element = recorded_.sigmas[columns.sigma + i];
+    for (const RecordedBlock& block : blocks_) {
+      if (problem.layout[block.layout.id].status == BlockStatus::kConstant) continue;
+      for (std::size_t i = 0; i < block.layout.tangent(); ++i) {
+        const RecordedSigma& element = recorded_.sigmas[block.sigma + i];
         for (const std::string& measured : TangentNames(space.name, space)) {
           const std::string name = element.name + "<-" + measured;
+          const std::string unit = UnitOfGain(element.unit, recorded_.sensors[s]);
           const auto [cell, is_new] = known.try_emplace(name, known.size());
-          if (is_new) header.push_back(name);
-          recorded_.sensors[s].gains.push_back(
-              {name, UnitOfGain(element.unit, recorded_.sensors[s]), cell->second});
+          if (is_new) layout.elements.push_back({name, unit, "", block.layout.name});
+          recorded_.sensors[s].gains.push_back({name, unit, cell->second});
         }
       }
     }
   }
-  gain_columns_ = header.size() - 2;
-  return header;
+  return layout;
 }
 
 void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const UpdateReport& report) {
   if (!report.stale) {
     AddEstimate(frame, state);
-    errors_.Add(frame, state);
+    errors_->Add(frame, state);
     if (pose_) AddPose(frame.timestamp, state);
   }
-  for (const MeasurementReport& one : report.measurements()) {
-    if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
-    AddInnovation(frame.timestamp, one);
-    if (!one.gain.empty()) AddGain(frame.timestamp, state, one);
+  for (const MeasurementReport& measurement : report.measurements()) {
+    const int sensor = measurement.sensor;
+    if (sensor < 0 || sensor >= static_cast<int>(recorded_.sensors.size())) continue;
+    AddInnovation(frame.timestamp, measurement);
+    if (!measurement.gain.empty()) AddGain(frame.timestamp, state, measurement);
   }
   for (std::size_t s = 0; s < recorded_.sensors.size(); ++s) {
     if (!recorded_.sensors[s].has_reprojection) continue;
     const FrameInnovation innovation = FrameInnovationOf(report, static_cast<int>(s));
     if (innovation.measurements == 0) continue;
-    reprojection_->Time(frame.timestamp).Text(recorded_.sensors[s].name);
-    reprojection_->Integer(innovation.measurements).Number(innovation.rms).EndRow();
+    WriteCells(kReprojectionColumns, NoLayout{},
+               {frame.timestamp, recorded_.sensors[s].name, innovation}, *reprojection_);
+    reprojection_->EndRow();
+  }
+}
+
+/// Records which elements have a value, truth and variance.
+void EstimatorFiles::RecordEstimate(const SourceFrame& frame, const State& state) {
+  const BlockRow row{frame, state};
+  for (const RecordedBlock& recorded : blocks_) {
+    const BlockLayout& layout = recorded.layout;
+    const Block& block = state.layout()[layout.id];
+    if (!block.present) continue;
+    for (std::size_t i = 0; i < layout.ambient(); ++i) {
+      RecordedElement& element = recorded_.elements[recorded.element + i];
+      element.has_value = true;
+      element.varies = element.varies || block.status != BlockStatus::kConstant;
+      element.has_truth = element.has_truth || row.TruthOf(layout) != nullptr;
+    }
+    const std::vector<double> sigmas = row.SigmasOf(layout);
+    for (std::size_t i = 0; i < sigmas.size(); ++i) {
+      if (!(sigmas[i] > 0.0)) continue;
+      recorded_.sigmas[recorded.sigma + i].is_random = true;
+      RecordedElement& element = recorded_.elements[recorded.element + i];
+      if (element.has_sigma) element.is_random = true;
+    }
   }
 }
 
 void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
-  estimates_.Time(frame.timestamp);
-  for (const BlockColumns& columns : blocks_) {
-    const Block& block = state.layout()[columns.id];
-    if (!block.present) {
-      estimates_.Empty(columns.ambient + columns.tangent);
-      continue;
-    }
-    estimates_.Numbers(state.value(columns.id), columns.ambient, columns.ambient);
-    const auto truth = static_cast<std::size_t>(columns.truth);
-    const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
-    for (std::size_t i = 0; i < columns.ambient; ++i) {
-      RecordedElement& element = recorded_.elements[columns.element + i];
-      element.has_value = true;
-      element.varies = element.varies || block.status != BlockStatus::kConstant;
-      element.has_truth = element.has_truth || known;
-    }
-    if (!block.has_covariance()) {
-      estimates_.Empty(columns.tangent);
-      continue;
-    }
-    for (std::size_t i = 0; i < columns.tangent; ++i) {
-      const double variance =
-          state.covariance().Variance(block.tangent_offset + static_cast<int>(i));
-      estimates_.Number(std::sqrt(variance));
-      if (!(variance > 0.0)) continue;
-      recorded_.sigmas[columns.sigma + i].is_random = true;
-      RecordedElement& element = recorded_.elements[columns.element + i];
-      if (element.has_sigma) element.is_random = true;
-    }
+  RecordEstimate(frame, state);
+  estimates_->Time(frame.timestamp);
+  for (const RecordedBlock& block : blocks_) {
+    WriteCells(kEstimateColumns, block.layout, {frame, state}, *estimates_);
   }
-  estimates_.EndRow();
+  estimates_->EndRow();
   if (!covariances_) return;
   static_assert(std::endian::native == std::endian::little);
   std::vector<double> cells;
@@ -209,82 +205,65 @@ void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
 void EstimatorFiles::AddPose(Timestamp timestamp, const State& state) {
   const auto position = static_cast<BlockId>(pose_->position);
   const auto orientation = static_cast<BlockId>(pose_->orientation);
-  const Block& at = state.layout()[position];
-  const Block& turned = state.layout()[orientation];
-  if (!at.present || !turned.present) return;
+  const Block& position_block = state.layout()[position];
+  const Block& orientation_block = state.layout()[orientation];
+  if (!position_block.present || !orientation_block.present) return;
   trajectory_->Add(timestamp, state.value(position), state.value(orientation));
-  if (!trajectory_covariance_ || !at.has_covariance() || !turned.has_covariance()) return;
+  if (!trajectory_covariance_ || !position_block.has_covariance() ||
+      !orientation_block.has_covariance()) {
+    return;
+  }
   const auto covariance = [&](const Block& block) {
     const int size = block.geometry().tangent;
     return state.covariance().Block(block.tangent_offset, size, block.tangent_offset, size);
   };
   trajectory_covariance_->Add(timestamp, state.value(position), state.value(orientation),
-                              covariance(at), covariance(turned));
+                              covariance(position_block), covariance(orientation_block));
 }
 
 void EstimatorFiles::AddInnovation(Timestamp timestamp, const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
-  const auto width = static_cast<std::size_t>(recorded_.width);
-  innovations_.Time(timestamp).Text(sensor.stream).Text(sensor.name).Landmark(report.landmark);
-  innovations_.Text(ToString(report.outcome)).Integer(report.dof);
-  const bool reached = !report.s.empty();
-  if (reached) {
-    innovations_.Number(report.nis);
-  } else {
-    innovations_.Empty();
-  }
-  std::vector<double> sigma;
-  const auto m = static_cast<std::size_t>(report.dof);
-  for (std::size_t i = 0; i < m && reached; ++i) sigma.push_back(std::sqrt(report.s[i * m + i]));
-  innovations_.Numbers(report.z.data(), report.z.size(), width)
-      .Numbers(report.h.data(), report.h.size(), width)
-      .Numbers(sigma.data(), sigma.size(), width)
-      .Numbers(report.innovation.data(), report.innovation.size(), width)
-      .EndRow();
-  sensor.has_innovations = sensor.has_innovations || (reached && !report.innovation.empty());
-  Timestamp& before = measured_[static_cast<std::size_t>(report.sensor)];
-  sensor.has_several = sensor.has_several || before == timestamp;
-  before = timestamp;
+  const InnovationRow row{timestamp, sensor, report};
+  WriteCells(kInnovationColumns, {static_cast<std::size_t>(recorded_.width)}, row, *innovations_);
+  innovations_->EndRow();
+  const bool has_innovation = row.is_predicted() && !report.innovation.empty();
+  sensor.has_innovations = sensor.has_innovations || has_innovation;
+  Timestamp& last = last_measured_[static_cast<std::size_t>(report.sensor)];
+  sensor.has_several = sensor.has_several || last == timestamp;
+  last = timestamp;
 }
 
 void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
                              const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
-  std::vector<const double*> cells(gain_columns_, nullptr);
+  std::vector<const double*> cells(gain_layout_.elements.size(), nullptr);
   const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
-  std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
+  std::size_t next = 0;  // index into sensor.gains, by block, element and measured element
   std::size_t row = 0;   // of K
-  for (const BlockColumns& columns : blocks_) {
-    if (state.layout()[columns.id].status == BlockStatus::kConstant) continue;
-    const bool present = state.layout()[columns.id].present;
-    for (std::size_t i = 0; i < columns.tangent; ++i) {
+  for (const RecordedBlock& recorded : blocks_) {
+    const Block& block = state.layout()[recorded.layout.id];
+    if (block.status == BlockStatus::kConstant) continue;
+    for (std::size_t i = 0; i < recorded.layout.tangent(); ++i) {
       for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
-        if (!present) continue;
+        if (!block.present) continue;
         const double& k = report.gain[row + rows * static_cast<std::size_t>(j)];
         RecordedGain& gain = sensor.gains[next];
         cells[gain.cell] = &k;
         gain.used = gain.used || k != 0.0;
       }
-      row += present ? 1 : 0;
+      row += block.present ? 1 : 0;
     }
   }
-  gains_.Time(timestamp).Text(sensor.name);
-  for (const double* cell : cells) {
-    if (cell != nullptr) {
-      gains_.Number(*cell);
-    } else {
-      gains_.Empty();
-    }
-  }
-  gains_.EndRow();
+  WriteCells(kGainColumns, gain_layout_, {timestamp, sensor.name, cells}, *gains_);
+  gains_->EndRow();
 }
 
 void EstimatorFiles::Close() {
-  estimates_.Close();
-  innovations_.Close();
-  gains_.Close();
-  errors_.Close();
-  recorded_.errors = errors_.elements();
+  estimates_->Close();
+  innovations_->Close();
+  gains_->Close();
+  errors_->Close();
+  recorded_.errors = errors_->elements();
   if (trajectory_) trajectory_->Close();
   if (trajectory_covariance_) trajectory_covariance_->Close();
   if (covariances_) covariances_->Close();
@@ -292,9 +271,9 @@ void EstimatorFiles::Close() {
     reprojection_->Close();
     recorded_.reprojection_rows = reprojection_->rows();
   }
-  recorded_.estimate_rows = estimates_.rows();
-  recorded_.innovation_rows = innovations_.rows();
-  recorded_.gain_rows = gains_.rows();
+  recorded_.estimate_rows = estimates_->rows();
+  recorded_.innovation_rows = innovations_->rows();
+  recorded_.gain_rows = gains_->rows();
 }
 
 }  // namespace alidade::internal

@@ -5,13 +5,12 @@
 
 #include "alidade/experiment/experiment.h"
 #include "alidade/io/json.h"
-#include "alidade/state/element_names.h"
 
 namespace alidade {
 
 void Follower::Begin(const Experiment& experiment) {
   for (const EstimatorSpec& spec : experiment.estimators) {
-    estimators_.push_back({spec.name, spec.problem.layout});
+    estimators_.push_back({spec.name, internal::BlockLayoutsOf(spec.problem, {})});
   }
 }
 
@@ -21,18 +20,13 @@ void Follower::OnEstimate(int estimator, const SourceFrame& frame, const State& 
   internal::Json line;
   line["t_s"] = Seconds(frame.timestamp);
   line["estimator"] = followed.name;
-  for (std::size_t i = 0; i < followed.layout.blocks().size(); ++i) {
-    const auto id = static_cast<BlockId>(i);
-    const Block& block = state.layout()[id];
-    if (!block.present) continue;
-    const double* value = state.value(id);
-    for (const std::string& name : internal::AmbientNames(block.name, block.space)) {
-      line[name] = *value++;
-    }
-    if (!block.has_covariance()) continue;
-    int element = 0;
-    for (const std::string& name : internal::TangentNames(block.name, block.space)) {
-      line["sigma:" + name] = state.sigma(id, element++);
+  for (const internal::BlockLayout& block : followed.blocks) {
+    const internal::BlockRow row{frame, state};
+    for (const auto& info : internal::kEstimateColumns) {
+      const std::vector<double> numbers = info.numbers(block, row);
+      if (numbers.empty()) continue;
+      const std::vector<internal::Column> columns = info.columns(block);
+      for (std::size_t i = 0; i < columns.size(); ++i) line[columns[i].name] = numbers[i];
     }
   }
   write_(line.dump() + '\n');

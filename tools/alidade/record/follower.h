@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/estimation/problem.h"
 #include "alidade/experiment/run.h"
+#include "alidade/record/column_tables.h"
 
 namespace alidade {
 
@@ -26,7 +26,7 @@ class Follower : public RunObserver {
  private:
   struct FollowedEstimator {
     std::string name;
-    StateLayout layout;  ///< layout of its problem
+    std::vector<internal::BlockLayout> blocks;
   };
   std::function<void(std::string_view line)> write_;
   std::vector<FollowedEstimator> estimators_;

@@ -2,10 +2,9 @@
 #include "alidade/record/landmarks_file.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "alidade/io/csv_file.h"
+#include "alidade/record/column_tables.h"
 
 namespace alidade::internal {
 
@@ -31,57 +30,13 @@ std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result) {
 }
 
 void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
-                    const std::vector<LandmarkEstimate>& landmarks) {
-  CsvFile file(folder, estimator + "/landmarks.csv",
-               {"id",
-                "generation",
-                "representation",
-                "x",
-                "y",
-                "z",
-                "sigma_x",
-                "sigma_y",
-                "sigma_z",
-                "inverse_distance",
-                "sigma_inverse_distance",
-                "first_s",
-                "last_s",
-                "tried",
-                "accepted",
-                "true_x",
-                "true_y",
-                "true_z",
-                "cov_xy",
-                "cov_xz",
-                "cov_yz",
-                "status",
-                "removed_s"});
-  const auto number = [&file](double value) {
-    if (std::isfinite(value)) {
-      file.Number(value);
-    } else {
-      file.Empty();
-    }
-  };
+                    const std::vector<LandmarkEstimate>& landmarks, RunColumns& run_columns) {
+  std::vector<Column> columns;
+  AppendColumns(kLandmarkColumns, NoLayout{}, columns);
+  CsvFile file = CreateCsv(folder, estimator + "/landmarks.csv", std::move(columns), run_columns);
   for (const LandmarkEstimate& landmark : landmarks) {
-    file.Integer(landmark.id)
-        .Integer(landmark.generation)
-        .Text(landmark.representation ? ToString(*landmark.representation) : "");
-    for (const double x : landmark.position) number(x);
-    for (int i = 0; i < 3; ++i) number(std::sqrt(landmark.covariance(i, i)));
-    number(landmark.inverse_distance);
-    number(landmark.sigma);
-    file.Time(landmark.first)
-        .Time(landmark.last)
-        .Integer(landmark.tried)
-        .Integer(landmark.accepted);
-    for (const double x : landmark.true_position) number(x);
-    number(landmark.covariance(0, 1));
-    number(landmark.covariance(0, 2));
-    number(landmark.covariance(1, 2));
-    file.Text(landmark.removed == kNoTimestamp ? "kept" : "removed")
-        .Time(landmark.removed)
-        .EndRow();
+    WriteCells(kLandmarkColumns, NoLayout{}, landmark, file);
+    file.EndRow();
   }
   file.Close();
 }

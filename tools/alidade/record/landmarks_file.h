@@ -6,6 +6,7 @@
 
 #include "alidade/experiment/run.h"
 #include "alidade/io/output_folder.h"
+#include "alidade/record/columns.h"
 #include "alidade/record/contents.h"
 
 namespace alidade::internal {
@@ -19,6 +20,6 @@ std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result);
 
 /// Writes `NAME/landmarks.csv`. The cell of a number that is not finite is empty. Error: kIo.
 void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
-                    const std::vector<LandmarkEstimate>& landmarks);
+                    const std::vector<LandmarkEstimate>& landmarks, RunColumns& run_columns);
 
 }  // namespace alidade::internal

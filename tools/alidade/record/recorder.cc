@@ -14,6 +14,7 @@
 #include "alidade/io/log.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/io/read_file.h"
+#include "alidade/record/column_tables.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
@@ -29,14 +30,13 @@
 
 namespace alidade {
 
-using internal::CsvFile;
 using Clock = std::chrono::steady_clock;
 
 struct Recorder::Impl {
   Impl(const Options& recorder_options, const Config& run_config);
 
   internal::RecordedRun CloseFiles();
-  void WriteEvents(const EstimatorResult& result) const;
+  void WriteEvents(const EstimatorResult& result);
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result);
   /// Writes all files except run.json. Returns the error of writing the report, or null.
@@ -49,6 +49,7 @@ struct Recorder::Impl {
   std::string title, config_text;
   internal::RunFacts facts;
   std::vector<std::string> subjects;  ///< SubjectsOf the experiment
+  internal::RunColumns run_columns;
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
   std::optional<internal::TimingFile> timing;
@@ -62,6 +63,7 @@ struct Recorder::Impl {
 namespace {
 
 constexpr const char* kRunFile = "run.json";
+constexpr const char* kColumnsFile = "columns.json";
 
 /// Names in timing.json, by FramePart.
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
@@ -110,12 +112,16 @@ internal::RecordedRun Recorder::Impl::CloseFiles() {
   return recorded;
 }
 
-void Recorder::Impl::WriteEvents(const EstimatorResult& result) const {
-  CsvFile events(folder, result.name + "/events.csv", {"t_s", "kind", "text"});
+void Recorder::Impl::WriteEvents(const EstimatorResult& result) {
+  std::vector<internal::Column> columns;
+  internal::AppendColumns(internal::kEventColumns, internal::NoLayout{}, columns);
+  internal::CsvFile file =
+      internal::CreateCsv(folder, result.name + "/events.csv", std::move(columns), run_columns);
   for (const Event& event : result.events) {
-    events.Time(event.timestamp).Text(ToString(event.kind)).Text(event.text).EndRow();
+    internal::WriteCells(internal::kEventColumns, internal::NoLayout{}, event, file);
+    file.EndRow();
   }
-  events.Close();
+  file.Close();
 }
 
 std::string Recorder::Impl::TimingJson(const RunResult& result) const {
@@ -178,14 +184,15 @@ Recorder::~Recorder() = default;
 void Recorder::Begin(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
   impl_->subjects = internal::SubjectsOf(experiment);
-  impl_->source.emplace(impl_->folder, experiment);
+  impl_->source.emplace(impl_->folder, experiment, impl_->run_columns);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
-  impl_->timing.emplace(impl_->folder, experiment);
+  impl_->timing.emplace(impl_->folder, experiment, impl_->run_columns);
   for (const EstimatorSpec& spec : experiment.estimators) {
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
-        impl_->folder, spec, experiment.source->truths(), impl_->source->truth_columns(),
-        impl_->options.covariances));
+        impl_->folder, spec, impl_->source->truth_layout(), impl_->options.covariances,
+        impl_->run_columns));
   }
+  impl_->folder.Write(kColumnsFile, internal::ColumnsJson(impl_->run_columns));
   impl_->started = Clock::now();
 }
 
@@ -220,7 +227,7 @@ std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
     WriteEvents(estimator);
     if (!estimator.landmarks) continue;
     const std::vector<LandmarkEstimate> map = internal::AllLandmarks(estimator);
-    internal::WriteLandmarks(folder, estimator.name, map);
+    internal::WriteLandmarks(folder, estimator.name, map, run_columns);
     folder.Write(estimator.name + "/landmarks.ply", internal::LandmarksPly(map));
     if (e >= recorded.estimators.size()) continue;
     recorded.estimators[e].map = internal::DescribeMap(map);
@@ -229,6 +236,7 @@ std::exception_ptr Recorder::Impl::WriteResults(const RunResult& result) {
     facts.measurements_sha256 = data->measurements();
     facts.truth_sha256 = data->truth();
   }
+  folder.Write(kColumnsFile, internal::ColumnsJson(run_columns));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing_json);
   try {

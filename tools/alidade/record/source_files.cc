@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "alidade/experiment/truth_match.h"
 #include "alidade/state/element_names.h"
@@ -33,40 +34,39 @@ std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment)
 
 }  // namespace
 
-SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experiment)
+SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experiment,
+                         RunColumns& run_columns)
     : streams_(experiment.source->streams()),
-      truths_(experiment.source->truths()),
-      truth_columns_(TruthColumns(experiment)),
+      truth_layout_{experiment.source->truths(), TruthColumns(experiment)},
       stream_rows_(streams_.size(), 0),
       expected_rows_(streams_.size(), 0) {
   for (const StreamInfo& stream : streams_) {
-    width_ = std::max(width_, static_cast<std::size_t>(stream.size));
-    known_width_ = std::max(known_width_, static_cast<std::size_t>(stream.known));
+    layout_.width = std::max(layout_.width, static_cast<std::size_t>(stream.size));
+    layout_.known_width = std::max(layout_.known_width, static_cast<std::size_t>(stream.known));
   }
-  std::vector<std::string> header = {"t_s", "stream", "landmark"};
-  for (std::size_t i = 0; i < width_; ++i) header.push_back('v' + std::to_string(i));
-  for (std::size_t i = 0; i < known_width_; ++i) header.push_back("known" + std::to_string(i));
-  measurements_.emplace(folder, "measurements.csv", header);
-  if (!truths_.empty()) {
-    header = {"t_s"};
-    for (const auto& names : truth_columns_)
-      header.insert(header.end(), names.begin(), names.end());
-    truth_.emplace(folder, "truth.csv", header);
-    if (const auto pose = FindPose(truths_)) poses_.emplace(folder, "truth.tum", *pose);
+  const auto create = [&](const char* name, const auto& table, const auto& layout) {
+    std::vector<Column> columns;
+    AppendColumns(table, layout, columns);
+    return CreateCsv(folder, name, std::move(columns), run_columns);
+  };
+  measurements_ = create("measurements.csv", kMeasurementColumns, layout_);
+  const std::vector<StreamInfo>& truths = truth_layout_.truths;
+  if (!truths.empty()) {
+    truth_ = create("truth.csv", kTruthColumns, truth_layout_);
+    if (const auto pose = FindPose(truths)) poses_.emplace(folder, "truth.tum", *pose);
   }
   FindInverses(experiment);
   if (!expectations_.empty()) {
-    header = {"t_s", "stream"};
-    for (std::size_t i = 0; i < width_; ++i) header.push_back('v' + std::to_string(i));
-    expected_.emplace(folder, "expected.csv", header);
+    expected_ = create("expected.csv", kExpectedColumns, ExpectedLayout{layout_.width});
   }
   if (inverses_.empty()) return;
-  header = {"t_s", "sensor"};
+  std::vector<Column>& blocks = implied_layout_.blocks;
   for (const Inverse& inverse : inverses_) {
-    if (inverse.recorded.cell + 2 == header.size()) header.push_back(inverse.recorded.block);
+    const RecordedImplied& recorded = inverse.recorded;
+    if (recorded.cell != blocks.size()) continue;
+    blocks.push_back({recorded.block, recorded.unit, "", recorded.block});
   }
-  blocks_ = header.size() - 2;
-  implied_.emplace(folder, "implied_states.csv", header);
+  implied_ = create("implied_states.csv", kImpliedColumns, implied_layout_);
 }
 
 void SourceFiles::FindInverses(const Experiment& experiment) {
@@ -80,11 +80,11 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       });
       if (stream == streams_.end() || !sensors.insert(binding.name).second) continue;
       const int s = static_cast<int>(stream - streams_.begin());
-      std::vector<int> truths = TruthsOfRoles(problem, binding, truths_);
+      std::vector<int> truths = TruthsOfRoles(problem, binding, truth_layout_.truths);
       if (!truths.empty()) {
         expectations_.try_emplace(s, Expectation{binding.model, std::move(truths)});
       }
-      std::optional<ImpliedState> state = ImpliedState::Of(problem, binding, truths_);
+      std::optional<ImpliedState> state = ImpliedState::Of(problem, binding, truth_layout_.truths);
       if (!state) continue;
       const Block& block = problem.layout[state->block()];
       const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
@@ -101,23 +101,14 @@ void SourceFiles::Add(const SourceFrame& frame) {
   for (const Measurement& m : frame.measurements) {
     const auto stream = static_cast<std::size_t>(m.stream);
     ++stream_rows_[stream];
-    measurements_->Time(m.timestamp).Text(streams_[stream].name).Landmark(m.landmark);
-    measurements_->Numbers(m.values.data(), m.values.size(), width_);
-    measurements_->Numbers(m.known.data(), m.known.size(), known_width_).EndRow();
+    WriteCells(kMeasurementColumns, layout_, {m, streams_[stream].name}, *measurements_);
+    measurements_->EndRow();
     AddExpected(frame, m);
     AddImplied(frame, m);
   }
   if (!truth_) return;
   if (poses_) poses_->AddTruth(frame);
-  truth_->Time(frame.timestamp);
-  for (std::size_t t = 0; t < truths_.size(); ++t) {
-    const auto size = static_cast<std::size_t>(truths_[t].size);
-    if (t < frame.truth.size() && !frame.truth[t].empty()) {
-      truth_->Numbers(frame.truth[t].data(), frame.truth[t].size(), size);
-    } else {
-      truth_->Empty(size);
-    }
-  }
+  WriteCells(kTruthColumns, truth_layout_, frame, *truth_);
   truth_->EndRow();
 }
 
@@ -131,8 +122,9 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
     return;
   }
   const auto stream = static_cast<std::size_t>(m.stream);
-  expected_->Time(m.timestamp).Text(streams_[stream].name);
-  expected_->Numbers(z.data(), z.size(), width_).EndRow();
+  WriteCells(kExpectedColumns, ExpectedLayout{layout_.width},
+             {m.timestamp, streams_[stream].name, z}, *expected_);
+  expected_->EndRow();
   ++expected_rows_[stream];
 }
 
@@ -141,9 +133,9 @@ void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
     if (inverse.stream != m.stream) continue;
     const std::optional<double> value = inverse.state.From(frame.truth, m.values.data());
     if (!value) continue;
-    const std::size_t columns_before = inverse.recorded.cell;
-    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(columns_before).Number(*value);
-    implied_->Empty(blocks_ - columns_before - 1).EndRow();
+    WriteCells(kImpliedColumns, implied_layout_,
+               {m.timestamp, inverse.recorded.sensor, inverse.recorded.cell, *value}, *implied_);
+    implied_->EndRow();
     ++inverse.recorded.rows;
   }
 }

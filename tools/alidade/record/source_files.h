@@ -8,6 +8,7 @@
 #include "alidade/experiment/implied_state.h"
 #include "alidade/experiment/run.h"
 #include "alidade/io/csv_file.h"
+#include "alidade/record/column_tables.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/pose_file.h"
 
@@ -18,13 +19,12 @@ namespace alidade::internal {
 /// can be inverted from the measurement alone or with the truth of its other roles.
 class SourceFiles {
  public:
-  SourceFiles(const OutputFolder& folder, const Experiment& experiment);
+  SourceFiles(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
 
   /// Error: kIo.
   void Add(const SourceFrame& frame);
   void Close();
-  /// Returns the columns of truth.csv, by truth and element.
-  const std::vector<std::vector<std::string>>& truth_columns() const { return truth_columns_; }
+  const TruthLayout& truth_layout() const { return truth_layout_; }
   /// Fills the fields of `run` that describe the source's data.
   void Describe(RecordedRun& run) const;
 
@@ -44,13 +44,14 @@ class SourceFiles {
   void AddExpected(const SourceFrame& frame, const Measurement& measurement);
   void AddImplied(const SourceFrame& frame, const Measurement& measurement);
 
-  std::vector<StreamInfo> streams_, truths_;
-  std::vector<std::vector<std::string>> truth_columns_;
+  std::vector<StreamInfo> streams_;
+  TruthLayout truth_layout_;
   std::vector<std::int64_t> stream_rows_;    ///< rows in measurements.csv, by stream
   std::vector<std::int64_t> expected_rows_;  ///< rows in expected.csv, by stream
   std::map<int, Expectation> expectations_;  ///< by stream
   std::vector<Inverse> inverses_;
-  std::size_t width_ = 1, known_width_ = 0, blocks_ = 0;
+  MeasurementLayout layout_{1, 0};
+  ImpliedLayout implied_layout_;
   Timestamp first_ = kNoTimestamp, last_ = kNoTimestamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
   std::optional<PoseFile> poses_;

@@ -1,31 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/timing_file.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "alidade/base/number_text.h"
 
 namespace alidade::internal {
-namespace {
-
-std::vector<std::string> HeaderOf(const Experiment& experiment) {
-  std::vector<std::string> header = {"t_s"};
-  for (const EstimatorSpec& spec : experiment.estimators) {
-    if (!spec.estimator->offline()) header.push_back(spec.name);
-  }
-  return header;
-}
-
-}  // namespace
-
-TimingFile::TimingFile(const OutputFolder& folder, const Experiment& experiment)
-    : file_(folder, "timing.csv", HeaderOf(experiment)) {
+TimingFile::TimingFile(const OutputFolder& folder, const Experiment& experiment,
+                       RunColumns& run_columns) {
+  TimingLayout layout;
   for (const EstimatorSpec& spec : experiment.estimators) {
     const bool offline = spec.estimator->offline();
     column_of_.push_back(offline ? -1 : static_cast<int>(times_.size()));
-    if (!offline) times_.push_back({spec.name});
+    if (offline) continue;
+    times_.push_back({spec.name});
+    layout.estimators.push_back(spec.name);
   }
   row_.resize(times_.size());
+  std::vector<Column> columns;
+  AppendColumns(kTimingColumns, layout, columns);
+  file_ = CreateCsv(folder, "timing.csv", std::move(columns), run_columns);
 }
 
 void TimingFile::Add(const SourceFrame& frame) {
@@ -44,22 +39,19 @@ void TimingFile::EndRow() {
   const Timestamp timestamp =
       std::exchange(timestamp_, kNoTimestamp);  // once, even if writing fails
   if (timestamp == kNoTimestamp) return;
-  file_.Time(timestamp);
-  for (std::optional<double>& cell : row_) {
-    cell ? file_.Number(*cell) : file_.Empty();
-    cell.reset();
-  }
-  file_.EndRow();
+  WriteCells(kTimingColumns, TimingLayout{}, {timestamp, row_}, *file_);
+  std::ranges::fill(row_, std::nullopt);
+  file_->EndRow();
 }
 
 void TimingFile::Close() {
   EndRow();
-  file_.Close();
+  file_->Close();
 }
 
 void TimingFile::Describe(RecordedRun& run) const {
   run.times = times_;
-  run.timing_rows = file_.rows();
+  run.timing_rows = file_->rows();
 }
 
 FigureScript TimingFigure(const RecordedRun& run) {

@@ -6,6 +6,7 @@
 
 #include "alidade/experiment/run.h"
 #include "alidade/io/csv_file.h"
+#include "alidade/record/column_tables.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
 
@@ -15,7 +16,7 @@ namespace alidade::internal {
 /// are omitted, because most of their work does not belong to a frame.
 class TimingFile {
  public:
-  TimingFile(const OutputFolder& folder, const Experiment& experiment);
+  TimingFile(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
 
   /// Starts the row of a frame, which subsequent times belong to. Error: kIo.
   void Add(const SourceFrame& frame);
@@ -30,7 +31,7 @@ class TimingFile {
   std::vector<int> column_of_;              ///< column of each estimator; -1: none
   std::vector<std::optional<double>> row_;  ///< times by column
   Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the row
-  CsvFile file_;
+  std::optional<CsvFile> file_;
 };
 
 /// Returns figure `timing`: wall-clock time of each frame over time, with the frame period. The key

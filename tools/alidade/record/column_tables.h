@@ -1,0 +1,486 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/estimator.h"
+#include "alidade/estimation/problem.h"
+#include "alidade/experiment/frame_innovation.h"
+#include "alidade/experiment/source.h"
+#include "alidade/record/columns.h"
+#include "alidade/record/contents.h"
+#include "alidade/state/element_names.h"
+
+/// The columns of the csv files of a run folder, a table for each file. A new column is an entry of
+/// a table.
+namespace alidade::internal {
+
+/// `v0`, `v1` and so on.
+inline std::vector<Column> NumberedColumns(const std::string& letter, std::size_t count) {
+  std::vector<Column> columns;
+  for (std::size_t i = 0; i < count; ++i) columns.push_back({letter + std::to_string(i), "", ""});
+  return columns;
+}
+
+/// Writes a number, or an empty cell if it is not finite.
+inline void WriteFinite(double value, CsvFile& file) {
+  std::isfinite(value) ? file.Number(value) : file.Empty();
+}
+
+// measurements.csv
+
+struct MeasurementLayout {
+  std::size_t width, known_width;  ///< of the widest stream
+};
+struct MeasurementRow {
+  const Measurement& measurement;
+  const std::string& stream;
+};
+inline constexpr std::array kMeasurementColumns =
+    std::to_array<ColumnInfo<MeasurementLayout, MeasurementRow>>({
+        {"t_s", "s", "timestamp of the measurement",
+         [](const auto&, const MeasurementRow& row, CsvFile& file) {
+           file.Time(row.measurement.timestamp);
+         }},
+        {"stream", "", "stream of the source",
+         [](const auto&, const MeasurementRow& row, CsvFile& file) { file.Text(row.stream); }},
+        {"landmark", "", "id of the landmark; empty if the measurement has no id",
+         [](const auto&, const MeasurementRow& row, CsvFile& file) {
+           file.Landmark(row.measurement.landmark);
+         }},
+        {"v", "of the stream", "the values; as many columns as the widest stream needs",
+         [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
+           file.Numbers(row.measurement.values.data(), row.measurement.values.size(), layout.width);
+         },
+         [](const MeasurementLayout& layout) { return NumberedColumns("v", layout.width); },
+         "`v0`, `v1`, ..."},
+        {"known", "of the stream", "the known numbers of the measurement, if a stream has any",
+         [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
+           file.Numbers(row.measurement.known.data(), row.measurement.known.size(),
+                        layout.known_width);
+         },
+         [](const MeasurementLayout& layout) {
+           return NumberedColumns("known", layout.known_width);
+         },
+         "`known0`, `known1`, ..."},
+    });
+
+// truth.csv
+
+struct TruthLayout {
+  std::vector<StreamInfo> truths;
+  std::vector<std::vector<std::string>> names;  ///< of the elements of each truth
+};
+inline constexpr std::array kTruthColumns = std::to_array<ColumnInfo<TruthLayout, SourceFrame>>({
+    {"t_s", "s", "timestamp of the frame",
+     [](const auto&, const SourceFrame& frame, CsvFile& file) { file.Time(frame.timestamp); }},
+    {"truth", "of the block", "each element of each truth, with the names of the source",
+     [](const TruthLayout& layout, const SourceFrame& frame, CsvFile& file) {
+       for (std::size_t t = 0; t < layout.truths.size(); ++t) {
+         const auto size = static_cast<std::size_t>(layout.truths[t].size);
+         const bool is_known = t < frame.truth.size() && !frame.truth[t].empty();
+         file.Numbers(is_known ? frame.truth[t].data() : nullptr, is_known ? size : 0, size);
+       }
+     },
+     [](const TruthLayout& layout) {
+       std::vector<Column> columns;
+       for (std::size_t t = 0; t < layout.truths.size(); ++t) {
+         for (const std::string& name : layout.names[t]) {
+           columns.push_back({name, "", "", layout.truths[t].name});
+         }
+       }
+       return columns;
+     },
+     "`block.element`"},
+});
+
+// expected.csv
+
+struct ExpectedLayout {
+  std::size_t width;
+};
+struct ExpectedRow {
+  Timestamp timestamp;
+  const std::string& stream;
+  const std::vector<double>& values;
+};
+inline constexpr std::array kExpectedColumns =
+    std::to_array<ColumnInfo<ExpectedLayout, ExpectedRow>>({
+        {"t_s", "s", "timestamp of the measurement",
+         [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+        {"stream", "", "stream of the source",
+         [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Text(row.stream); }},
+        {"v", "of the stream", "h at truth",
+         [](const ExpectedLayout& layout, const ExpectedRow& row, CsvFile& file) {
+           file.Numbers(row.values.data(), row.values.size(), layout.width);
+         },
+         [](const ExpectedLayout& layout) { return NumberedColumns("v", layout.width); },
+         "`v0`, `v1`, ..."},
+    });
+
+// implied_states.csv
+
+struct ImpliedLayout {
+  std::vector<Column> blocks;  ///< a column each
+};
+struct ImpliedRow {
+  Timestamp timestamp;
+  const std::string& sensor;
+  std::size_t block;  ///< index into ImpliedLayout::blocks
+  double value;
+};
+inline constexpr std::array kImpliedColumns = std::to_array<ColumnInfo<ImpliedLayout, ImpliedRow>>({
+    {"t_s", "s", "timestamp of the measurement",
+     [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+    {"sensor", "", "sensor of the measurement",
+     [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Text(row.sensor); }},
+    {"value", "of the block", "the value of the block that the measurement implies",
+     [](const ImpliedLayout& layout, const ImpliedRow& row, CsvFile& file) {
+       file.Empty(row.block).Number(row.value).Empty(layout.blocks.size() - row.block - 1);
+     },
+     [](const ImpliedLayout& layout) { return layout.blocks; }, "`block`"},
+});
+
+// NAME/estimates.csv and NAME/errors.csv: the timestamp, then the entries below for each block
+
+inline const Column kTimeColumn{"t_s", "s", "t_s"};
+
+struct BlockLayout {
+  BlockId id;
+  Space space;
+  std::string name, unit;
+  int truth;  ///< index into SourceFrame::truth; -1: none
+
+  std::size_t ambient() const { return static_cast<std::size_t>(space.geometry.ambient); }
+  std::size_t tangent() const { return static_cast<std::size_t>(space.geometry.tangent); }
+};
+struct BlockRow {
+  const SourceFrame& frame;
+  const State& state;
+
+  /// The truth of a block; null if it is unknown.
+  const double* TruthOf(const BlockLayout& block) const {
+    const auto truth = static_cast<std::size_t>(block.truth);
+    const bool is_known = truth < frame.truth.size() && !frame.truth[truth].empty();
+    return is_known ? frame.truth[truth].data() : nullptr;
+  }
+  /// Empty if the block has no value.
+  std::vector<double> ValuesOf(const BlockLayout& block) const {
+    if (!state.layout()[block.id].present) return {};
+    const double* const values = state.value(block.id);
+    return {values, values + block.ambient()};
+  }
+  /// e = x (-) x_true in the tangent at x; empty if one of them is unknown.
+  std::vector<double> ErrorOf(const BlockLayout& block) const {
+    const double* const truth = TruthOf(block);
+    if (truth == nullptr || !state.layout()[block.id].present) return {};
+    std::vector<double> error(block.tangent());
+    block.space.geometry.Minus(truth, state.value(block.id), error.data());
+    for (double& element : error) element = 0.0 - element;
+    return error;
+  }
+  /// sqrt(P_ii); empty if the block has no covariance.
+  std::vector<double> SigmasOf(const BlockLayout& block) const {
+    const Block& place = state.layout()[block.id];
+    std::vector<double> sigmas;
+    for (int i = 0; place.has_covariance() && i < block.space.geometry.tangent; ++i) {
+      sigmas.push_back(std::sqrt(state.covariance().Variance(place.tangent_offset + i)));
+    }
+    return sigmas;
+  }
+};
+
+/// Returns the layouts of the blocks of a problem.
+std::vector<BlockLayout> BlockLayoutsOf(const Problem& problem,
+                                        const std::vector<StreamInfo>& truths);
+
+/// An entry of the table of a file with columns for each block.
+struct BlockColumnInfo {
+  const char* quantity;
+  const char* names;  ///< of the columns, for the documentation
+  const char* unit;   ///< for the documentation
+  const char* meaning;
+  std::size_t (BlockLayout::*size)() const;  ///< number of columns
+  std::vector<Column> (*columns)(const BlockLayout& block);
+  std::vector<double> (*numbers)(const BlockLayout& block, const BlockRow& row);  ///< empty: none
+};
+
+/// Returns a column for each tangent element of a block, with the name PREFIX and the element.
+inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::string& prefix) {
+  std::vector<Column> columns;
+  for (const std::string& name : TangentNames(block.name, block.space)) {
+    const bool is_angular = block.space.geometry.IsAngular(static_cast<int>(columns.size()));
+    columns.push_back({prefix + name, is_angular ? "rad" : block.unit, "", block.name});
+  }
+  return columns;
+}
+
+inline constexpr BlockColumnInfo kSigmaColumns{
+    "sigma",
+    "`sigma:block.element`",
+    "of the block; rad of an angle or rotation",
+    "sqrt(P_ii) of each tangent element; empty without a covariance",
+    &BlockLayout::tangent,
+    [](const BlockLayout& block) { return TangentColumns(block, "sigma:"); },
+    [](const BlockLayout& block, const BlockRow& row) { return row.SigmasOf(block); }};
+
+inline constexpr std::array kEstimateColumns{
+    BlockColumnInfo{
+        "value", "`block.element`", "of the block",
+        "each ambient element; empty until the block is initialised", &BlockLayout::ambient,
+        [](const BlockLayout& block) {
+          std::vector<Column> columns;
+          for (const std::string& name : AmbientNames(block.name, block.space)) {
+            columns.push_back({name, block.unit, "", block.name});
+          }
+          return columns;
+        },
+        [](const BlockLayout& block, const BlockRow& row) { return row.ValuesOf(block); }},
+    kSigmaColumns};
+
+inline constexpr std::array kErrorColumns{
+    BlockColumnInfo{
+        "error", "`block.element`", "of the block; rad of an angle or rotation",
+        "e = x (-) x_true of each tangent element, at the estimate; empty without truth",
+        &BlockLayout::tangent, [](const BlockLayout& block) { return TangentColumns(block, ""); },
+        [](const BlockLayout& block, const BlockRow& row) { return row.ErrorOf(block); }},
+    kSigmaColumns};
+
+/// Appends the columns of one block.
+template <std::size_t n>
+void AppendColumns(const std::array<BlockColumnInfo, n>& table, const BlockLayout& block,
+                   std::vector<Column>& columns) {
+  for (const BlockColumnInfo& info : table) {
+    for (Column& column : info.columns(block)) {
+      column.quantity = info.quantity;
+      columns.push_back(std::move(column));
+    }
+  }
+}
+
+/// Writes the cells of one block.
+template <std::size_t n>
+void WriteCells(const std::array<BlockColumnInfo, n>& table, const BlockLayout& block,
+                const BlockRow& row, CsvFile& file) {
+  for (const BlockColumnInfo& info : table) {
+    const std::vector<double> numbers = info.numbers(block, row);
+    file.Numbers(numbers.data(), numbers.size(), (block.*info.size)());
+  }
+}
+
+// NAME/innovations.csv
+
+struct InnovationLayout {
+  std::size_t width;  ///< of the widest measurement
+};
+struct InnovationRow {
+  Timestamp timestamp;
+  const RecordedSensor& sensor;
+  const MeasurementReport& report;
+
+  bool is_predicted() const { return !report.s.empty(); }
+};
+inline constexpr std::array kInnovationColumns =
+    std::to_array<ColumnInfo<InnovationLayout, InnovationRow>>({
+        {"t_s", "s", "timestamp of the frame",
+         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+        {"stream", "", "stream of the source",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Text(row.sensor.stream);
+         }},
+        {"sensor", "", "sensor of the estimator",
+         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.name); }},
+        {"landmark", "", "id of the landmark; empty if the measurement has no id",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Landmark(row.report.landmark);
+         }},
+        {"outcome", "", "outcome of the measurement, see [Outcomes](#outcomes)",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           file.Text(ToString(row.report.outcome));
+         }},
+        {"dof", "", "degrees of freedom",
+         [](const auto&, const InnovationRow& row,
+            CsvFile& file) { file.Integer(row.report.dof); }},
+        {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
+         [](const auto&, const InnovationRow& row, CsvFile& file) {
+           row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
+         }},
+        {"z", "of the sensor", "the measurement, ambient",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.z.data(), row.report.z.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("z", layout.width); },
+         "`z0`, `z1`, ..."},
+        {"h", "of the sensor", "the prediction h(x), ambient",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.h.data(), row.report.h.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("h", layout.width); },
+         "`h0`, `h1`, ..."},
+        {"s", "of the sensor",
+         "sqrt of the diagonal of S = H P H' + R, tangent; with a robust loss of H P H' + R / w",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           std::vector<double> sigmas;
+           const auto m = static_cast<std::size_t>(row.report.dof);
+           for (std::size_t i = 0; i < m && row.is_predicted(); ++i) {
+             sigmas.push_back(std::sqrt(row.report.s[i * m + i]));
+           }
+           file.Numbers(sigmas.data(), sigmas.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("s", layout.width); },
+         "`s0`, `s1`, ..."},
+        {"r", "of the sensor", "the innovation z (-) h, tangent",
+         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+           file.Numbers(row.report.innovation.data(), row.report.innovation.size(), layout.width);
+         },
+         [](const InnovationLayout& layout) { return NumberedColumns("r", layout.width); },
+         "`r0`, `r1`, ..."},
+    });
+
+// NAME/gains.csv
+
+struct GainLayout {
+  std::vector<Column> elements;  ///< `target.depth<-disparity`
+};
+struct GainRow {
+  Timestamp timestamp;
+  const std::string& sensor;
+  const std::vector<const double*>& cells;  ///< by element; null: not of this sensor
+};
+inline constexpr std::array kGainColumns = std::to_array<ColumnInfo<GainLayout, GainRow>>({
+    {"t_s", "s", "timestamp of the frame",
+     [](const auto&, const GainRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+    {"sensor", "", "sensor of the estimator",
+     [](const auto&, const GainRow& row, CsvFile& file) { file.Text(row.sensor); }},
+    {"gain", "of the block element by that of the measured one",
+     "K of a block element by a measured element; empty for other sensors",
+     [](const auto&, const GainRow& row, CsvFile& file) {
+       for (const double* const cell : row.cells) {
+         cell != nullptr ? file.Number(*cell) : file.Empty();
+       }
+     },
+     [](const GainLayout& layout) { return layout.elements; }, "`block.element<-measured`"},
+});
+
+// NAME/reprojection.csv, NAME/events.csv, NAME/landmarks.csv, timing.csv
+
+struct NoLayout {};
+
+struct ReprojectionRow {
+  Timestamp timestamp;
+  const std::string& sensor;
+  const FrameInnovation& innovation;
+};
+inline constexpr std::array kReprojectionColumns =
+    std::to_array<ColumnInfo<NoLayout, ReprojectionRow>>({
+        {"t_s", "s", "timestamp of the frame",
+         [](const auto&, const ReprojectionRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+        {"sensor", "", "sensor of landmarks",
+         [](const auto&, const ReprojectionRow& row, CsvFile& file) { file.Text(row.sensor); }},
+        {"landmarks", "", "number of accepted measurements",
+         [](const auto&, const ReprojectionRow& row, CsvFile& file) {
+           file.Integer(row.innovation.measurements);
+         }},
+        {"rms", "", "sqrt(mean r_i^2) over all elements of their innovations, unit of the sensor",
+         [](const auto&, const ReprojectionRow& row, CsvFile& file) {
+           file.Number(row.innovation.rms);
+         }},
+    });
+
+inline constexpr std::array kEventColumns = std::to_array<ColumnInfo<NoLayout, Event>>({
+    {"t_s", "s", "timestamp of the frame; empty for the whole run",
+     [](const auto&, const Event& event, CsvFile& file) { file.Time(event.timestamp); }},
+    {"kind", "", "kind of the event, see [Events](#events)",
+     [](const auto&, const Event& event, CsvFile& file) { file.Text(ToString(event.kind)); }},
+    {"text", "", "a sentence",
+     [](const auto&, const Event& event, CsvFile& file) { file.Text(event.text); }},
+});
+
+inline constexpr std::array kLandmarkColumns =
+    std::to_array<ColumnInfo<NoLayout, LandmarkEstimate>>({
+        {"id", "", "id of the measurements",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.id); }},
+        {"generation", "", "number of landmarks of this id that were deleted before",
+         [](const auto&, const auto& landmark, CsvFile& file) {
+           file.Integer(landmark.generation);
+         }},
+        {"representation", "", "representation in the state; empty for one of the sensor's own",
+         [](const auto&, const auto& landmark, CsvFile& file) {
+           file.Text(landmark.representation ? ToString(*landmark.representation) : "");
+         }},
+        {"x", "m", "position in the world",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[0], file); }},
+        {"y", "m", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[1], file); }},
+        {"z", "m", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[2], file); }},
+        {"sigma_x", "m", "its standard deviations",
+         [](const auto&, const auto& l,
+            CsvFile& file) { WriteFinite(std::sqrt(l.covariance(0, 0)), file); }},
+        {"sigma_y", "m", "",
+         [](const auto&, const auto& l,
+            CsvFile& file) { WriteFinite(std::sqrt(l.covariance(1, 1)), file); }},
+        {"sigma_z", "m", "",
+         [](const auto&, const auto& l,
+            CsvFile& file) { WriteFinite(std::sqrt(l.covariance(2, 2)), file); }},
+        {"inverse_distance", "1/m", "from the place of its first observation; empty for xyz",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.inverse_distance, file); }},
+        {"sigma_inverse_distance", "1/m", "its standard deviation",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.sigma, file); }},
+        {"first_s", "s", "timestamp of the first observation",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.first); }},
+        {"last_s", "s", "timestamp of the last observation",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.last); }},
+        {"tried", "", "number of measurements",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.tried); }},
+        {"accepted", "", "number of accepted measurements",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.accepted); }},
+        {"true_x", "m", "true position; empty if the source does not know it",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[0], file); }},
+        {"true_y", "m", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[1], file); }},
+        {"true_z", "m", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[2], file); }},
+        {"cov_xy", "m^2", "the other elements of the covariance of the position",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 1), file); }},
+        {"cov_xz", "m^2", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 2), file); }},
+        {"cov_yz", "m^2", "",
+         [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(1, 2), file); }},
+        {"status", "", "`kept`: in the state at the end; `removed`: removed before",
+         [](const auto&, const auto& landmark, CsvFile& file) {
+           file.Text(landmark.removed == kNoTimestamp ? "kept" : "removed");
+         }},
+        {"removed_s", "s", "timestamp of the removal; empty if it was not removed",
+         [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.removed); }},
+    });
+
+struct TimingLayout {
+  std::vector<std::string> estimators;
+};
+struct TimingRow {
+  Timestamp timestamp;
+  const std::vector<std::optional<double>>& wall_s;  ///< by estimator
+};
+inline constexpr std::array kTimingColumns = std::to_array<ColumnInfo<TimingLayout, TimingRow>>({
+    {"t_s", "s", "timestamp of the frame",
+     [](const auto&, const TimingRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+    {"wall", "s", "wall-clock time of each estimator that is not offline",
+     [](const auto&, const TimingRow& row, CsvFile& file) {
+       for (const std::optional<double>& cell : row.wall_s) {
+         cell ? file.Number(*cell) : file.Empty();
+       }
+     },
+     [](const TimingLayout& layout) {
+       std::vector<Column> columns;
+       for (const std::string& name : layout.estimators) columns.push_back({name, "s", "", name});
+       return columns;
+     },
+     "`NAME`"},
+});
+
+}  // namespace alidade::internal

@@ -28,7 +28,7 @@ void ForEachRepresentation(const F& f) {
   for (const auto representation :
        {LandmarkRepresentation::kInverseDepth, LandmarkRepresentation::kAnchored,
         LandmarkRepresentation::kXyz}) {
-    SCOPED_TRACE(kLandmarkRepresentations[static_cast<int>(representation)]);
+    SCOPED_TRACE(kLandmarkRepresentations[static_cast<std::size_t>(representation)]);
     WithRepresentation(representation, f);
   }
 }

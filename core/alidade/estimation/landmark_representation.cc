@@ -9,9 +9,12 @@
 namespace alidade {
 namespace {
 
-/// Whether the landmark roles are those of the representation.
+static_assert(detail::RepresentationTraits<LandmarkRepresentations>::kMaxTangent <=
+              internal::kMaxLandmarkTangent);
+
+/// Returns true if the landmark roles are those of the representation.
 template <class Representation>
-bool Writes(const std::vector<Space>& roles) {
+bool HasRoles(const std::vector<Space>& roles) {
   constexpr int count = detail::Blocks<Representation>::kCount;
   bool same = std::ssize(roles) == count;
   const auto compare = [&](auto index) {
@@ -29,19 +32,22 @@ bool Writes(const std::vector<Space>& roles) {
 }  // namespace
 
 const char* ToString(LandmarkRepresentation representation) {
-  return kLandmarkRepresentations[static_cast<int>(representation)];
+  return kLandmarkRepresentations[static_cast<std::size_t>(representation)];
 }
 
 bool IsXyz(LandmarkRepresentation representation) {
-  return representation == LandmarkRepresentation::kXyz;
+  return WithRepresentation(representation, [](auto chosen) { return decltype(chosen)::kIsXyz; });
 }
 
 std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>& roles) {
-  std::vector<Space> own;
-  std::ranges::copy_if(roles, std::back_inserter(own), &Space::landmark);
-  if (Writes<InverseDepth>(own)) return LandmarkRepresentation::kInverseDepth;
-  if (Writes<Anchored>(own)) return LandmarkRepresentation::kAnchored;
-  if (Writes<Xyz>(own)) return LandmarkRepresentation::kXyz;
+  std::vector<Space> landmark_roles;
+  std::ranges::copy_if(roles, std::back_inserter(landmark_roles), &Space::landmark);
+  for (std::size_t i = 0; i < kLandmarkRepresentations.size(); ++i) {
+    const auto representation = static_cast<LandmarkRepresentation>(i);
+    const bool is_same = WithRepresentation(
+        representation, [&](auto chosen) { return HasRoles<decltype(chosen)>(landmark_roles); });
+    if (is_same) return representation;
+  }
   return std::nullopt;
 }
 

@@ -11,8 +11,8 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/params.h"
 
-/// Representations of a landmark, a point of the world as it is written in the state. Every
-/// representation says where the point is as p = a + m / rho, which serves the rest:
+/// Representations of a landmark: the forms in which the state has a point of the world. Every
+/// representation provides the point as p = a + m / rho, which is all that the other code needs:
 ///
 ///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, a point infinitely far
 ///
@@ -20,10 +20,13 @@
 ///
 ///   using Spaces = std::tuple<...>;                      geometries of its blocks
 ///   static constexpr std::array kRoles{Quantity{...}};   one for each, ALIDADE_ROLE_LANDMARK
+///   static constexpr const char* kName = "...";          its name in configs
+///   static constexpr bool kIsXyz = false;                true: y is the point p itself
 ///   static Ray<T> ToRay(const T* y);                     y: values of the blocks side by side
 ///   static bool FromRay(const Ray<T>& ray, T* y);        false: there is no such y
 ///
-/// The last element of the tangent of inverse_depth and anchored is rho.
+/// Unless kIsXyz, the last element of its tangent is rho. A new representation is a struct here, a
+/// value of LandmarkRepresentation, and an entry of LandmarkRepresentations.
 namespace alidade {
 
 /// p = a + m / rho.
@@ -31,19 +34,21 @@ template <class T>
 struct Ray {
   T origin[3];     ///< a, m
   T direction[3];  ///< m
-  T rho;           ///< 1/m where m is of unit length
+  T rho;           ///< 1/m if m has unit length
 };
 
-/// Six numbers, the representation of MonoSLAM: where the camera was that saw the point first,
-/// azimuth and elevation of the ray, and the inverse distance along it.
+/// Six numbers, the representation of MonoSLAM: the position of the camera that observed the point
+/// first, azimuth and elevation of the ray, and the inverse distance along it.
 ///
 ///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
 ///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
 ///
-/// At the poles, where the world's y axis points to, theta is undefined: FromRay is false there.
+/// At the poles, the directions of the world's y axis, theta is undefined: FromRay returns false.
 /// Source  [MonoSlam2015] sec. 4.3, [Civera2008] sec. II-B.
 struct InverseDepth {
   using Spaces = std::tuple<Vec<6>>;
+  static constexpr const char* kName = "inverse_depth";
+  static constexpr bool kIsXyz = false;
   static constexpr std::array kRoles{
       Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
                "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
@@ -72,16 +77,18 @@ struct InverseDepth {
   }
 };
 
-/// A unit vector and the inverse distance from an anchor, which all landmarks share that were first
-/// seen in one frame. No pole, three degrees of freedom of its own.
+/// A unit vector and the inverse distance from an anchor. Landmarks that were first observed in one
+/// frame share their anchor. It has no pole, and three degrees of freedom of its own.
 ///
 ///   y = (a, m, rho)
 ///
 /// Source  [Sola2012], anchored points.
 struct Anchored {
   using Spaces = std::tuple<Vec<3>, UnitVector, Vec<1>>;
+  static constexpr const char* kName = "anchored";
+  static constexpr bool kIsXyz = false;
   static constexpr std::array kRoles{
-      Quantity{"anchor", "m", "where the camera was that saw it first", "x,y,z",
+      Quantity{"anchor", "m", "position of the camera that observed it first", "x,y,z",
                ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED},
       Quantity{"direction", "", "from the anchor to the landmark, in the world", "x,y,z",
                ALIDADE_ROLE_LANDMARK},
@@ -105,6 +112,8 @@ struct Anchored {
 /// unless rho > 0.
 struct Xyz {
   using Spaces = std::tuple<Vec<3>>;
+  static constexpr const char* kName = "xyz";
+  static constexpr bool kIsXyz = true;
   static constexpr std::array kRoles{
       Quantity{"landmark", "m", "the point in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
 
@@ -121,26 +130,51 @@ struct Xyz {
   }
 };
 
-/// The representations by name, as `landmarks.representation` chooses one.
+/// The representations, as `landmarks.representation` selects one.
 enum class LandmarkRepresentation { kInverseDepth, kAnchored, kXyz };
 
-/// Names of LandmarkRepresentation, in its order.
-inline constexpr const char* kLandmarkRepresentations[] = {"inverse_depth", "anchored", "xyz"};
+/// The structs of LandmarkRepresentation, in its order.
+using LandmarkRepresentations = std::tuple<InverseDepth, Anchored, Xyz>;
+
+namespace detail {
+
+template <class List>
+struct RepresentationTraits;
+template <class... Representations>
+struct RepresentationTraits<std::tuple<Representations...>> {
+  static constexpr std::array<const char*, sizeof...(Representations)> kNames{
+      Representations::kName...};
+  static constexpr int kMaxTangent = std::max({Blocks<Representations>::kTangent...});
+
+  /// Calls f(Representation{}) with the representation of this index.
+  template <class F>
+  static auto Visit(int index, const F& f) {
+    using First = std::tuple_element_t<0, std::tuple<Representations...>>;
+    using Result = decltype(f(First{}));
+    using Call = Result (*)(const F&);
+    constexpr Call kCalls[] = {[](const F& call) -> Result { return call(Representations{}); }...};
+    return kCalls[index](f);
+  }
+};
+
+}  // namespace detail
+
+/// Names of the representations, in the order of LandmarkRepresentation.
+inline constexpr auto kLandmarkRepresentations =
+    detail::RepresentationTraits<LandmarkRepresentations>::kNames;
 
 /// Reads the parameter `landmarks.representation`.
 inline LandmarkRepresentation ReadLandmarkRepresentation(Params& params) {
-  return static_cast<LandmarkRepresentation>(params.Choice(
-      "landmarks.representation",
-      {kLandmarkRepresentations[0], kLandmarkRepresentations[1], kLandmarkRepresentations[2]},
-      "how a landmark is written in the state", 0));
+  return static_cast<LandmarkRepresentation>(
+      params.Choice("landmarks.representation", kLandmarkRepresentations,
+                    "representation of a landmark in the state", 0));
 }
 
-/// f(Representation{}) of the struct that `representation` names.
+/// f(Representation{}) with the struct of a representation.
 template <class F>
 auto WithRepresentation(LandmarkRepresentation representation, const F& f) {
-  if (representation == LandmarkRepresentation::kAnchored) return f(Anchored{});
-  if (representation == LandmarkRepresentation::kXyz) return f(Xyz{});
-  return f(InverseDepth{});
+  return detail::RepresentationTraits<LandmarkRepresentations>::Visit(
+      static_cast<int>(representation), f);
 }
 
 /// h of (1), 3 numbers.
@@ -154,7 +188,7 @@ void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) 
 }
 
 /// Inverse measurement model: y of the point that a camera sees along h (in the camera, of any
-/// length) at the inverse distance rho, 1/m. False where the representation has no such y.
+/// length) at the inverse distance rho, 1/m. Returns false if the representation has no such y.
 template <class Representation, class T>
 bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;
@@ -180,8 +214,8 @@ Ray<double> RayOf(const double* const* blocks) {
   return Representation::ToRay(y);
 }
 
-/// p = a + m / rho of a landmark, with the Jacobian J_p_y, 3 x tangent of its blocks, where that is
-/// not empty. kOutOfDomain unless rho > 0.
+/// p = a + m / rho of a landmark. Also writes the Jacobian J_p_y, 3 x tangent of its blocks, unless
+/// it is empty. kOutOfDomain unless rho > 0.
 template <class Representation>
 Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   constexpr int n = detail::Blocks<Representation>::kTangent;
@@ -196,7 +230,7 @@ Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}
 }
 
 /// L_d = 4 sigma_rho |cos alpha| / (rho^2 d1), d1 = |p - r|, alpha the angle between the rays to p
-/// from the anchor and from the camera at r; sigma_rho in 1/m. Small where p is all but Gaussian;
+/// from the anchor and from the camera at r; sigma_rho in 1/m. Small if p is almost Gaussian;
 /// infinite at rho = 0, zero for Xyz.  [Civera2008] sec. III.
 inline double LinearityIndex(const Ray<double>& ray, double sigma_rho, const double* position) {
   double dot = 0.0, length2 = 0.0;  // with rho (p - r), so that nothing is divided by rho^2

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <initializer_list>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <string>
@@ -76,13 +77,14 @@ class Params {
     return value != 0.0;
   }
   /// Returns the index of the chosen name in `choices`; `fallback` is an index.
-  int Choice(const char* key, std::initializer_list<const char*> choices, const char* doc,
+  template <class Names = std::initializer_list<const char*>>
+  int Choice(const char* key, const Names& choices, const char* doc,
              std::optional<int> fallback = std::nullopt) {
     double value = fallback.value_or(0);
     const double default_value = value;
     AlidadeParam param =
         Describe(ALIDADE_PARAM_CHOICE, key, "", doc, {}, 1, fallback ? &default_value : nullptr);
-    param.choices = choices.begin();
+    param.choices = std::data(choices);
     param.choice_count = static_cast<std::int32_t>(choices.size());
     host_->read(host_->context, &param, &value, 1);
     return static_cast<int>(value);

@@ -45,7 +45,7 @@ TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
   const Ekf saved = ekf;
   const std::vector<double> values = saved.state().values();
   ekf.Process(FrameAt(0.5, {{0, 2.5}}));
-  ASSERT_TRUE(testing::HasEvent(ekf.Process(FrameAt(2.0, {{0, 1.0}})), "not_finite"));
+  ASSERT_TRUE(testing::HasEvent(ekf.Process(FrameAt(2.0, {{0, 1.0}})), EventKind::kNotFinite));
   EXPECT_TRUE(ekf.failed());
   ekf = saved;
   EXPECT_FALSE(ekf.failed());
@@ -53,7 +53,7 @@ TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
   EXPECT_EQ(ekf.timestamp(), 0);
   EXPECT_EQ(ekf.state().values(), values);
   const UpdateReport& report = ekf.Process(FrameAt(2.0, {{0, 1.0}}));
-  ASSERT_TRUE(testing::HasEvent(report, "not_finite"));
+  ASSERT_TRUE(testing::HasEvent(report, EventKind::kNotFinite));
   const std::string end = "sensor 'z' at 0.000000 s, z = 1.5";
   EXPECT_TRUE(report.events.back().text.ends_with(end)) << report.events.back().text;
 }

@@ -252,7 +252,7 @@ std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::s
 
 std::string TableOf(const RunResult& result, const std::vector<TableRow>& rows) {
   const std::string reference = ReferenceText(result);
-  return RightAlignedTable(NamesOf(result.estimators), rows) +
+  return FormatTable(MakeTable(NamesOf(result.estimators), rows), TableFormat::kText) +
          (reference.empty() ? "" : '\n' + reference + '\n');
 }
 

@@ -175,8 +175,10 @@ TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {
 }
 
 TEST(MarkdownTable, KeepsWhatWouldEndACell) {
-  EXPECT_EQ(internal::MarkdownTable("`ekf`", {"rmse", "|e|"}, {{"a|b", {"1", "2"}}}),
-            "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");
+  EXPECT_EQ(
+      internal::FormatTable(internal::MakeTable({"rmse", "|e|"}, {{"a|b", {"1", "2"}}}, "`ekf`"),
+                            internal::TableFormat::kMarkdown),
+      "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");
 }
 
 TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }

@@ -12,7 +12,7 @@ std::string PlainText(const Section& section) {
   for (const std::string& line : section.lines) text += "  " + line + '\n';
   if (section.rows.empty()) return text;
   return text + (section.lines.empty() ? "" : "\n") +
-         RightAlignedTable(section.columns, section.rows);
+         FormatTable(MakeTable(section.columns, section.rows), TableFormat::kText);
 }
 
 std::string Markdown(const Section& section) {
@@ -20,17 +20,14 @@ std::string Markdown(const Section& section) {
   for (const std::string& line : section.lines) text += "- " + line + '\n';
   if (section.rows.empty()) return text;
   if (!section.lines.empty()) text += '\n';
-  return text + MarkdownTable("", section.columns, section.rows);
+  return text + FormatTable(MakeTable(section.columns, section.rows), TableFormat::kMarkdown);
 }
 
 std::string Latex(const Section& section) {
   std::string text = "\\paragraph{" + LatexText(section.title) + "}\n";
   for (const std::string& line : section.lines) text += LatexText(line) + ".\n";
   if (section.rows.empty()) return text;
-  text += "\n\\begin{tabular}{l" + std::string(section.columns.size(), 'r') + "}\n\\hline\n";
-  text += LatexRow(CellsOf({"", section.columns})) + "\\hline\n";
-  for (const TableRow& row : section.rows) text += LatexRow(CellsOf(row));
-  return text + "\\hline\n\\end{tabular}\n";
+  return text + '\n' + FormatTable(MakeTable(section.columns, section.rows), TableFormat::kLatex);
 }
 
 std::string Html(const Section& section) {
@@ -47,8 +44,9 @@ std::string Html(const Section& section) {
     }
     return line + "</tr>\n";
   };
-  text += "<div class=\"scroll\"><table>\n" + row("th", CellsOf({"", section.columns}));
-  for (const TableRow& one : section.rows) text += row("td", CellsOf(one));
+  const Table table = MakeTable(section.columns, section.rows);
+  text += "<div class=\"scroll\"><table>\n" + row("th", table.header);
+  for (const TextRow& cells : table.rows) text += row("td", cells);
   return text + "</table></div>\n";
 }
 

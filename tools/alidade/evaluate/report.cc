@@ -87,7 +87,7 @@ std::string StatisticsTable(const Evaluation& evaluation) {
   };
   add("ATE", evaluation.absolute);
   add("RPE", evaluation.relative);
-  return internal::RightAlignedTable(names, rows);
+  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText);
 }
 
 std::string ConsistencyText(const Evaluation& evaluation) {
@@ -161,8 +161,8 @@ std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
   return texts.empty() ? header : header + " (" + internal::Join(texts, " or ") + " dof)";
 }
 
-/// Returns a header, and a row for each evaluation.
-std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evaluations) {
+/// Returns a table with a row for each evaluation.
+internal::Table SummaryTable(const std::vector<Evaluation>& evaluations) {
   internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
   for (const char* kind : {"ATE", "RPE"}) {
     for (const PoseRelation relation : evaluations.front().options.relations) {
@@ -176,11 +176,11 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
     header.push_back(NeesHeader("position", &Evaluation::position_nees, evaluations));
     header.push_back(NeesHeader("orientation", &Evaluation::orientation_nees, evaluations));
   }
-  std::vector<internal::TextRow> rows = {header};
+  internal::Table table{header, {}, 2};
   for (const Evaluation& evaluation : evaluations) {
     if (!evaluation.error.empty()) {
-      rows.push_back({evaluation.label, "failed"});
-      rows.back().resize(header.size(), "-");
+      table.rows.push_back({evaluation.label, "failed"});
+      table.rows.back().resize(header.size(), "-");
       continue;
     }
     internal::TextRow row = {evaluation.label, AlignText(evaluation),
@@ -195,9 +195,9 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
     for (const auto& quantity_nees : {evaluation.position_nees, evaluation.orientation_nees}) {
       if (nees) row.push_back(quantity_nees ? RoundedText(quantity_nees->mean, 4) : "-");
     }
-    rows.push_back(row);
+    table.rows.push_back(row);
   }
-  return rows;
+  return table;
 }
 
 /// Describes the options that all rows of a table share.
@@ -219,15 +219,16 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
 
 /// Returns the summary for a terminal, with a column for each evaluation.
 std::string SummaryText(const std::vector<Evaluation>& evaluations) {
-  const std::vector<internal::TextRow> summary = SummaryRows(evaluations);
+  const internal::Table summary = SummaryTable(evaluations);
   std::vector<std::string> names;
   std::vector<internal::TableRow> rows;
-  for (std::size_t c = 1; c < summary.front().size(); ++c) {
-    rows.push_back({summary.front()[c], {}});
-    for (std::size_t e = 1; e < summary.size(); ++e) rows.back().cells.push_back(summary[e][c]);
+  for (std::size_t c = 1; c < summary.header.size(); ++c) {
+    rows.push_back({summary.header[c], {}});
+    for (const internal::TextRow& row : summary.rows) rows.back().cells.push_back(row[c]);
   }
   for (const Evaluation& evaluation : evaluations) names.push_back(evaluation.label);
-  return internal::RightAlignedTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
+  return FormatTable(internal::MakeTable(names, rows), internal::TableFormat::kText) + '\n' +
+         SharedText(evaluations) + '\n';
 }
 
 Json JsonOf(const std::vector<PoseErrors>& relations) {
@@ -302,27 +303,14 @@ std::string EvaluationText(const std::vector<Evaluation>& evaluations) {
 
 std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations) {
   ALIDADE_EXPECTS(!evaluations.empty());
-  std::string text;
-  for (const internal::TextRow& row : SummaryRows(evaluations)) {
-    const bool header = text.empty();
-    text += internal::MarkdownRow(row);
-    if (!header) continue;
-    text += '|';
-    for (std::size_t c = 0; c < row.size(); ++c) text += c < 2 ? "---|" : "---:|";
-    text += '\n';
-  }
-  return text + '\n' + SharedText(evaluations) + '\n';
+  return FormatTable(SummaryTable(evaluations), internal::TableFormat::kMarkdown) + '\n' +
+         SharedText(evaluations) + '\n';
 }
 
 std::string EvaluationLatex(const std::vector<Evaluation>& evaluations) {
   ALIDADE_EXPECTS(!evaluations.empty());
-  const std::vector<internal::TextRow> rows = SummaryRows(evaluations);
-  std::string text = "% " + SharedText(evaluations) + "\n\\begin{tabular}{ll";
-  text.append(rows.front().size() - 2, 'r').append("}\n\\hline\n");
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    text += internal::LatexRow(rows[r]) + (r == 0 ? "\\hline\n" : "");
-  }
-  return text + "\\hline\n\\end{tabular}\n";
+  return "% " + SharedText(evaluations) + '\n' +
+         FormatTable(SummaryTable(evaluations), internal::TableFormat::kLatex);
 }
 
 std::string EvaluationJson(const std::vector<Evaluation>& evaluations) {

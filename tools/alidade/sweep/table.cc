@@ -118,7 +118,7 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
                      "inconsistent ones among them.\n\n";
-  text += MarkdownTable("", NamesOf(summaries), TableRows(summaries));
+  text += FormatTable(MakeTable(NamesOf(summaries), TableRows(summaries)), TableFormat::kMarkdown);
   return text + NeesLines(summaries) + ReferenceLines(result);
 }
 
@@ -127,7 +127,9 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
 namespace alidade {
 
 std::string SweepTable(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
-  return internal::RightAlignedTable(internal::NamesOf(summaries), internal::TableRows(summaries)) +
+  using internal::MakeTable, internal::NamesOf, internal::TableFormat;
+  return FormatTable(MakeTable(NamesOf(summaries), internal::TableRows(summaries)),
+                     TableFormat::kText) +
          internal::NeesLines(summaries) + internal::ReferenceLines(result);
 }
 

@@ -221,8 +221,8 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
       "them.\n";
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
-    text += '\n' + MarkdownTable('`' + column.front().name + "`: " + sweep.variation.key,
-                                 table.header, table.rows);
+    const std::string corner = '`' + column.front().name + "`: " + sweep.variation.key;
+    text += '\n' + FormatTable(MakeTable(table.header, table.rows, corner), TableFormat::kMarkdown);
   }
   return text + ReferenceLines(sweep);
 }
@@ -246,8 +246,9 @@ std::string SweepTable(const VariedSweep& sweep) {
   for (const internal::Column& column : internal::ColumnsOf(sweep)) {
     const internal::ValueTable table = internal::TableOf(sweep, column);
     if (!text.empty()) text += '\n';
-    text += column.front().name + ", by " + sweep.variation.key + '\n' +
-            internal::RightAlignedTable(table.header, table.rows);
+    text +=
+        column.front().name + ", by " + sweep.variation.key + '\n' +
+        FormatTable(internal::MakeTable(table.header, table.rows), internal::TableFormat::kText);
   }
   return text + internal::ReferenceLines(sweep);
 }

@@ -22,42 +22,60 @@ namespace alidade {
 
 class Filter;
 
-/// Result of processing one measurement.
+/// Result of processing one measurement. The meanings are in kOutcomes.
 enum class Outcome {
-  kAccepted,     ///< used by the update; also the initial value during a frame
-  kInitialised,  ///< consumed to initialise a block
+  kAccepted,
+  kInitialised,
   kGated,
-  kOutOfDomain,  ///< h is not defined at the prediction
-  kInvalid,      ///< beyond the limits of the sensor, or its covariance is not a covariance
-  kNotFinite,    ///< z, h, H, R, S or the update is not finite; an update was rolled back
-  kNotPd,        ///< the update would have lost positive definiteness, and was rolled back
-  kStale,        ///< older than the state
-  kNotReady,     ///< a required block has no value yet
-  kFailed,       ///< the plugin failed
-  kEnded,        ///< not processed: the estimator has failed before
+  kOutOfDomain,
+  kInvalid,
+  kNotFinite,
+  kNotPd,
+  kStale,
+  kNotReady,
+  kFailed,
+  kEnded,
 };
 
 /// Properties of an outcome.
 struct OutcomeInfo {
-  const char* name;  ///< in files
+  const char* name;     ///< in files
+  const char* meaning;  ///< a sentence for the documentation
   /// Whether it counts towards rejection recovery; `not_finite` only if h was computed.
   bool is_rejection = false;
   bool is_gated = false;           ///< by the gate or by outlier rejection
   bool is_initialisation = false;  ///< the measurement initialises a block, or could do so
 };
-/// Properties of all outcomes, indexed by Outcome.
+/// Properties of all outcomes, indexed by Outcome. A new outcome is a value of Outcome and a row.
 inline constexpr std::array kOutcomes = {
-    OutcomeInfo{"accepted"},
-    OutcomeInfo{.name = "initialised", .is_initialisation = true},
-    OutcomeInfo{.name = "gated", .is_rejection = true, .is_gated = true},
-    OutcomeInfo{.name = "out_of_domain", .is_rejection = true},
-    OutcomeInfo{"invalid"},
-    OutcomeInfo{.name = "not_finite", .is_rejection = true},
-    OutcomeInfo{.name = "not_pd", .is_rejection = true},
-    OutcomeInfo{"stale"},
-    OutcomeInfo{.name = "not_ready", .is_initialisation = true},
-    OutcomeInfo{"failed"},
-    OutcomeInfo{"ended"},
+    OutcomeInfo{.name = "accepted",
+                .meaning = "the update used it; also the initial value during a frame"},
+    OutcomeInfo{.name = "initialised",
+                .meaning = "it was consumed to initialise a block",
+                .is_initialisation = true},
+    OutcomeInfo{.name = "gated",
+                .meaning = "the gate or the outlier rejection rejected it",
+                .is_rejection = true,
+                .is_gated = true},
+    OutcomeInfo{.name = "out_of_domain",
+                .meaning = "h is not defined at the prediction",
+                .is_rejection = true},
+    OutcomeInfo{
+        .name = "invalid",
+        .meaning = "it is beyond the limits of the sensor, or its covariance is not a covariance"},
+    OutcomeInfo{.name = "not_finite",
+                .meaning = "z, h, H, R, S or the update is not finite; an update was rolled back",
+                .is_rejection = true},
+    OutcomeInfo{.name = "not_pd",
+                .meaning = "the update would have lost positive definiteness, and was rolled back",
+                .is_rejection = true},
+    OutcomeInfo{.name = "stale", .meaning = "it is older than the state"},
+    OutcomeInfo{.name = "not_ready",
+                .meaning = "a required block has no value yet",
+                .is_initialisation = true},
+    OutcomeInfo{.name = "failed", .meaning = "the plugin failed"},
+    OutcomeInfo{.name = "ended",
+                .meaning = "it was not processed: the estimator had failed before"},
 };
 static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
 /// Returns the properties of an outcome.

@@ -26,7 +26,7 @@ double Correlation(const std::vector<double>& a, const std::vector<double>& b) {
   return sum / static_cast<double>(a.size());
 }
 
-/// xoshiro256++ as its authors print it [Blackman2021].
+/// Reference implementation of xoshiro256++ by its authors [Blackman2021].
 std::uint64_t Xoshiro(std::array<std::uint64_t, 4>& s) {
   const auto rotl = [](std::uint64_t x, int k) { return (x << k) | (x >> (64 - k)); };
   const std::uint64_t result = rotl(s[0] + s[3], 23) + s[0];
@@ -41,8 +41,9 @@ std::uint64_t Xoshiro(std::array<std::uint64_t, 4>& s) {
 }
 
 TEST(Random, IsXoshiro256PlusPlusSeededBySplitmix64) {
-  // The test vector of the rand_xoshiro crate, from the authors' C code, holds for the function
-  // above; the state is the published output of splitmix64 for the seed 1234567.
+  // The function above must reproduce the test vector of the rand_xoshiro crate, which comes from
+  // the authors' C code. The state below is the published output of splitmix64 for the seed
+  // 1234567.
   std::array<std::uint64_t, 4> state = {1, 2, 3, 4};
   for (const std::uint64_t expected :
        {41943041ull, 58720359ull, 3588806011781223ull, 3591011842654386ull, 9228616714210784205ull,
@@ -57,7 +58,8 @@ TEST(Random, IsXoshiro256PlusPlusSeededBySplitmix64) {
 }
 
 TEST(Random, SameSeedAndStreamGiveTheSameNumbers) {
-  // Computed by an independent program; the logarithm of the C library may differ in the last bit.
+  // The expected values come from an independent program. The logarithm of the C library may differ
+  // in the last bit.
   Random zero(2017), one(2017, 1);
   for (const double expected : {1.028508934778973, 0.2839764101068146, -0.8565249074654515}) {
     EXPECT_NEAR(zero.Normal(), expected, 1e-15);
@@ -69,7 +71,8 @@ TEST(Random, SameSeedAndStreamGiveTheSameNumbers) {
 }
 
 TEST(Random, UniformFillsItsInterval) {
-  // Mean 1/2 +- 5 sqrt(1/12/N), and every tenth of the interval within 5 sigma of N/10.
+  // The mean is 1/2 +- 5 sqrt(1/12/N), and each tenth of the interval has N/10 values within 5
+  // sigma.
   Random random(3);
   double sum = 0.0;
   std::vector<int> histogram(10);
@@ -87,7 +90,8 @@ TEST(Random, UniformFillsItsInterval) {
 }
 
 TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
-  // Moments 0, 1, 0, 3, whose estimates vary by 1, 2, 15, 96 over N; 5 sigma.
+  // The moments are 0, 1, 0, 3. Their estimates have the variances 1, 2, 15, 96 over N; tolerance 5
+  // sigma.
   double m1 = 0.0, m2 = 0.0, m3 = 0.0, m4 = 0.0;
   int beyond = 0;
   for (const double x : Normals(Random(11))) {
@@ -105,7 +109,7 @@ TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
 }
 
 TEST(Random, NeighbouringNormalsAreIndependent) {
-  // Both of a pair come from one point of the disc.
+  // Two successive values are computed from one point in the unit disc.
   const std::vector<double> values = Normals(Random(12));
   const std::vector<double> later(values.begin() + 1, values.end());
   EXPECT_NEAR(Correlation(later, values), 0.0, 5.0 / std::sqrt(kCount));

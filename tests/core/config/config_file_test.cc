@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::string_view_literals;  // NOLINT(google-build-using-namespace)
 
-/// The error that `call` must fail with, as `CODE message`.
+/// Returns the error that `call` throws, as `CODE message`.
 template <class Call>
 std::string Failure(const Call& call) {
   try {
@@ -47,7 +47,7 @@ class ConfigFolder : public ::testing::Test {
     return file;
   }
 
-  /// The failure of reading `name`, with the folder shown as `D/`.
+  /// Returns the error of reading `name`, with `D/` for the folder.
   std::string Fault(const std::string& name) const {
     std::string message = Failure([&] { Config::FromFile(folder_ / name); });
     const std::string folder = folder_.path().string();
@@ -131,7 +131,7 @@ TEST(ConfigFile, DeepNestingFailsEarly) {
   }
   EXPECT_NE(TextError(Repeated("? ", kSize)), "no error");
   EXPECT_EQ(TextError(chain), "78 f:64:12: nested too deep; expected at most 64 levels");
-  // About 10 ms; a scanner that reads on to the end takes seconds in a debug build.
+  // Takes about 10 ms; a scanner that reads to the end needs seconds in a debug build.
   EXPECT_LT(std::clock() - start, 2 * CLOCKS_PER_SEC);
 }
 
@@ -206,7 +206,7 @@ TEST_F(ConfigFolder, UnreadableFileIsInputMissing) {
   fs::permissions(file, fs::perms::none);
   const pid_t child = fork();
   ASSERT_GE(child, 0);
-  if (child == 0) {  // root reads everything
+  if (child == 0) {  // root may read every file
     const bool dropped = geteuid() != 0 || seteuid(65534) == 0;
     _exit(!dropped                                                              ? 2
           : Fault("f.yaml") == "66 D/f.yaml: cannot be read: Permission denied" ? 0
@@ -238,7 +238,7 @@ TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
   const std::vector<Node> plugins = config.root().At("plugins").Items();
   EXPECT_EQ(plugins[0].Text(), (folder_ / "parts/../x.so").string());
   EXPECT_EQ(plugins[1].Text(), "/y.so");
-  // What a run writes down means the same wherever it lies.
+  // The written config has the same meaning in any folder.
   const Config again = Config::FromFile(Write("elsewhere/g.yaml", config.ToYaml()));
   EXPECT_EQ(again.ToYaml(), config.ToYaml());
 }

@@ -40,7 +40,7 @@ TEST(ConfigSet, RelativePathsAreTakenFromTheCurrentFolder) {
     EXPECT_EQ(config.root().At("source").At(key).Text(),
               (std::filesystem::current_path() / "tables/t.csv").string());
   }
-  config.Set("source.left", "3", "--set");  // some other plugin's: no such file
+  config.Set("source.left", "3", "--set");  // the parameter of a plugin, not a file name
   EXPECT_EQ(config.root().At("source").At("left").Text(), "3");
   config.Set("source.truth", "{depth: z}", "--set");
   EXPECT_EQ(config.root().At("source").At("truth").At("depth").Text(), "z");
@@ -80,7 +80,7 @@ TEST(ConfigSet, KeyPathMustFitTheTree) {
   }
 }
 
-// They would not be read again.
+// A file with these keys could not be read.
 TEST(ConfigSet, RefusesKeysThatAFileMayNotHave) {
   EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8");
   EXPECT_EQ(SetError("a.x\ny", "1").find("--set: control character in the key"), 0u);

@@ -19,7 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using testing::Message;
 using testing::Read;
 
-/// The message of `read` on the value of `v`, without the place `f.yaml:1:4 v: ` at its start.
+/// Returns the message of `read` for the value of `v`, without the leading `f.yaml:1:4 v: `.
 template <class Reader>
 std::string MessageOf(const std::string& value, const Reader& read) {
   const Config config = Read("v: " + value);
@@ -201,14 +201,14 @@ TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
   // Eigenvalues of [[1, 2], [2, 1]] are 3 and -1.
   EXPECT_EQ(error("[[1, 2], [2, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1; expected a covariance");
-  // So are they where the units of the blocks are far apart.
+  // A negative eigenvalue is found also if the blocks have units of very different size.
   const std::string mixed = "[[1e6, 0, 0], [0, 1e-14, 2e-14], [0, 2e-14, 1e-14]]";
   EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return internal::ReadCovariance(node, 3); }),
             "not positive semi-definite: its smallest eigenvalue is -1e-14; expected a covariance");
-  // A value that is known has no covariance with another: the eigenvalues are 1 and -1e-18.
+  // A value that is known exactly has no covariance with another: the eigenvalues are 1 and -1e-18.
   EXPECT_EQ(error("[[0, 1e-9], [1e-9, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
-  // A negative variance far below the other one's rounding is still seen.
+  // A negative variance is found even if it is far below the rounding error of the other variance.
   EXPECT_EQ(error("[[1e6, 0], [0, -1e-18]]"),
             "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
 }
@@ -244,7 +244,7 @@ TEST(Node, WrongUnitNamesTheRightOne) {
             "f.yaml:1:2 baseline_mm: wrong unit 'mm'; expected baseline_m");
   EXPECT_EQ(Message([&] { root.At("rate_rad_s"); }),
             "f.yaml:1:19 rate_deg_s: wrong unit 'deg_s'; expected rate_rad_s");
-  // Pixels do not convert to metres: sigma_m may be a key of its own that is read later.
+  // Pixels do not convert to metres: sigma_m may be another key that is read later.
   EXPECT_EQ(Message([&] { root.At("sigma_px"); }),
             "f.yaml:1:1 sigma_px: missing key; found 'sigma_m' at line 1");
   const std::string rejected = Message([&] { root.RejectUnread(); });
@@ -274,7 +274,8 @@ TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
   }
 }
 
-// Of another quantity it may be a key of its own: a slip only where nothing reads it.
+// A key with the unit of another quantity may be another key. It is an error only if no one reads
+// it.
 TEST(Node, UnitsOfDifferentQuantitiesDoNotConvert) {
   const std::vector<std::string> units = {"m",  "s",   "rad",  "hz", "px",     "m2",
                                           "s2", "px2", "rad2", "kg", "percent"};

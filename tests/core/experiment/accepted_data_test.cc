@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// An estimator that uses what a filter before it accepted.
+// An estimator that uses only the measurements that an earlier filter accepted.
 #include "support/driven.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
@@ -10,11 +10,11 @@ namespace {
 
 constexpr int kFrames = 80;
 
-/// A target as SwingingTarget has it, whose scale is off by 0.5 on every eleventh frame, from the
-/// fifth on; or without those measurements.
+/// SwingingTarget whose scale measurement is wrong by 0.5 on every eleventh frame, starting with
+/// frame 5. If `outliers` is false, those measurements are missing.
 class WithOutliers : public SwingingTarget {
  public:
-  /// `late`: each third frame comes after the one behind it.
+  /// `late`: swaps frames 3 i and 3 i + 1, so that every third frame is out of sequence.
   WithOutliers(bool outliers, bool late) : SwingingTarget(0) {
     SwingingTarget target(kFrames);
     SourceFrame frame;
@@ -59,7 +59,7 @@ Experiment MakeFiltered(bool late) {
   return experiment;
 }
 
-/// The state of an ekf without a gate over data without outliers.
+/// Returns the state of an ekf without a gate, run on the data without outliers.
 std::vector<double> Clean() {
   Experiment clean;
   clean.source = std::make_unique<WithOutliers>(false, false);
@@ -71,7 +71,7 @@ std::vector<double> Clean() {
 TEST(AcceptedBy, LeavesOutWhatTheFilterGated) {
   Experiment experiment = MakeFiltered(false);
   const RunResult run = alidade::Run(experiment, {});
-  // 5, 16, ..., 71
+  // The outliers are in frames 5, 16, ..., 71.
   EXPECT_EQ(run.estimators[0].counts.at("gated:inverse_scale"), 7);
   EXPECT_EQ(run.estimators[0].counts.count("gated:disparity"), 0u);
   EXPECT_EQ(run.estimators[1].counts.at("accepted:inverse_scale"), kFrames - 7);
@@ -90,7 +90,7 @@ TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   EXPECT_EQ(experiment.estimators[1].estimator->state().values(), Clean());
 }
 
-/// The given frames, of the given streams.
+/// Source of the given frames and streams.
 class GivenFrames : public Source {
  public:
   GivenFrames(std::vector<StreamInfo> streams, std::vector<Frame> frames)
@@ -109,7 +109,8 @@ class GivenFrames : public Source {
   std::size_t next_ = 0;
 };
 
-/// Three ekf, of which the first has a gate; the others see what the one before accepted.
+/// Builds a chain of three ekf: the first has a gate, each of the others uses the measurements that
+/// the ekf before it accepted.
 Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
                      std::vector<Frame> frames) {
   Experiment experiment;
@@ -126,7 +127,8 @@ Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
   return experiment;
 }
 
-// Nobody measures the odometry: all of it is passed on, where a fix is gated too.
+// No sensor uses the odometry stream: all its values are passed on, also in a frame whose fix is
+// gated.
 TEST(AcceptedBy, PassesOnTheControlInputs) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
@@ -148,7 +150,8 @@ TEST(AcceptedBy, PassesOnTheControlInputs) {
   }
 }
 
-/// Two landmarks before a camera at rest; the first is seen 0.5 aside at the second frame.
+/// Builds a chain for two landmarks in front of a camera at rest. The pixel of the first landmark
+/// is wrong by 0.5 in the second frame.
 Experiment MakeChainOfMaps() {
   const Problem problem = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
   return MakeChain(problem, {{"tracks", 2}},
@@ -157,7 +160,7 @@ Experiment MakeChainOfMaps() {
                     FrameOf(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
 }
 
-// Several measurements of one stream, of which one is gated, and those that enter a landmark.
+// The stream has several measurements per frame: some initialise a landmark, and one is gated.
 TEST(AcceptedBy, MayFollowAFollower) {
   for (const OutOfSequence order : {OutOfSequence::kReject, OutOfSequence::kRollback}) {
     Experiment experiment = MakeChainOfMaps();
@@ -177,7 +180,7 @@ TEST(AcceptedBy, MayFollowAFollower) {
   }
 }
 
-/// Accepts what comes, once.
+/// An ekf that accepts the measurements of its first frame and then ends.
 struct Once : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
@@ -191,7 +194,7 @@ struct Once : Ekf {
   bool gone_ = false;
 };
 
-// The frame at which the filter ended still counts: it accepted what came.
+// The frame at which the filter ended still counts: the filter accepted its measurements.
 TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
   Experiment experiment = MakeFiltered(false);
   EstimatorSpec& filter = experiment.estimators[0];

@@ -18,7 +18,8 @@ namespace {
 
 using testing::FrameAt;
 
-/// Depth 0.3 + 0.1 sin(t), measured with errors of a pixel and more; each third frame is blind.
+/// Frame k of a target at depth 0.3 + 0.1 sin(t). Its measurements have errors of a pixel and more;
+/// every third frame has no disparity.
 SourceFrame SwingingFrame(int k) {
   const double t_s = 0.1 * k, depth = 0.3 + 0.1 * std::sin(t_s), wobble = std::sin(37.0 * k);
   SourceFrame frame{FrameAt(t_s, {{1, depth / 0.3 + 0.01 * wobble}}),
@@ -30,7 +31,7 @@ SourceFrame SwingingFrame(int k) {
 
 const std::vector<StreamInfo> kTruths = {{"depth"}, {"depth_rate"}, {"inverse_distance"}};
 
-// The same by the information form, with the derivatives written out at truth.
+// Compares the bound with the information form, whose derivatives are written out at truth.
 TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
   const Problem problem = testing::DepthFilter();
   CramerRaoBound bound(problem, testing::StreamsOf(problem), kTruths);
@@ -75,7 +76,7 @@ TEST(CramerRaoBound, TakesTheMotionAtTruth) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
   testing::AddSensor(problem, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
-  problem.initial_time_s = -0.1;  // a step before the first frame, from about where that one is
+  problem.initial_time_s = -0.1;  // one step before the first frame, from nearly the same state
   CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"x"}});
   const double dt_s = 0.1, q = dt_s * dt_s;
   double p = 0.25, before = 0.0;
@@ -104,7 +105,8 @@ TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
   }
 }
 
-// A loss, a Schmidt gain and a Jacobian at what the measurement implies all make a filter worse.
+// A robust loss, a Schmidt (consider) gain and a Jacobian at the implied state make a filter worse,
+// but do not change the bound.
 TEST(CramerRaoBound, IsThatOfTheBestFilter) {
   Problem worse = testing::DepthFilter();
   worse.sensors[0].loss = {LossKind::kCauchy, 0.1};
@@ -165,7 +167,8 @@ Eigen::Vector2d Pixel(const Eigen::Vector3d& r, const Eigen::Vector3d& p) {
   return {h.x() / h.z(), h.y() / h.z()};
 }
 
-/// Landmark id is first seen in frame id, and then in all but each fourth.
+/// Whether frame k sees landmark id: the first time in frame id, then in all frames but every
+/// fourth.
 bool Sees(int k, int id) { return k >= id && (k == id || (k + id) % 4 != 0); }
 
 SourceFrame MappingFrame(int k, double noise) {
@@ -183,7 +186,8 @@ SourceFrame MappingFrame(int k, double noise) {
   return frame;
 }
 
-/// The information of a camera's path, frames 0 to `last`, and five points, by central differences.
+/// Fisher information of the camera positions of frames 0 to `last` and of five landmarks, by
+/// central differences.
 class JointInformation {
  public:
   explicit JointInformation(int last) : x_(3 * (last + 6)) {
@@ -205,7 +209,8 @@ class JointInformation {
     }
     information_ += j.transpose() * j;
   }
-  /// Of those seen by then, the last position.
+  /// Returns the covariance of the position in frame `last`, given the landmarks seen up to that
+  /// frame.
   Eigen::Matrix3d Covariance(int last) const {
     const Eigen::Index n = 3 * (last + 1 + std::min(last + 1, 5));
     return information_.topLeftCorner(n, n).inverse().block<3, 3>(3 * last, 3 * last);
@@ -239,7 +244,8 @@ Eigen::Matrix3d CovarianceByInformation(int last) {
   return joint.Covariance(last);
 }
 
-// Of a path and a map: the prior's mean and the noise of the data count for nothing.
+// Compares the bound of a trajectory and a map with the joint information. The mean of the landmark
+// prior and the noise of the data must not influence the bound.
 template <class Model>
 void ExpectJointBound(const Model& model, double max_linearity_index) {
   LandmarkOptions options = testing::WithPrior(0.8, 0.25);
@@ -277,7 +283,7 @@ struct TurningWalk : Motion<6, Vec<3>, UnitQuaternion> {
   }
 };
 
-/// The pixel of a landmark in the axes of such a camera.
+/// Pixel of a landmark seen by a TurningWalk camera.
 struct TurnedPixels : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitVector, Vec<1>>,
                       testing::Pinhole {
   static constexpr std::array kRoles{
@@ -338,8 +344,8 @@ Problem TurningSystem() {
   return problem;
 }
 
-/// Where the filter's data are exact and all begins at truth, it has its Jacobians there. The data
-/// of the bound have noise.
+/// Compares the bound with an ekf whose data are exact and which starts at truth, so that its
+/// Jacobians are evaluated at truth. The data of the bound have noise.
 void ExpectThatOfExactData(const Problem& problem, const std::vector<StreamInfo>& truths,
                            const CramerRaoBound::TrueLandmark& place,
                            const std::function<SourceFrame(int k, double noise)>& frame) {
@@ -355,7 +361,7 @@ void ExpectThatOfExactData(const Problem& problem, const std::vector<StreamInfo>
   }
 }
 
-// Landmarks at 2 m, which the prior says, all seen from the start.
+// The landmarks are at 2 m, as the prior states, and all are seen from the start.
 TEST(CramerRaoBound, OfATurningCamera) {
   const auto place = [](std::int64_t id) -> std::optional<Point> {
     const Eigen::Vector3d ray(0.2 * double(id) - 0.3, 0.2 * std::sin(3.0 * double(id)), 1.0);
@@ -380,14 +386,16 @@ TEST(CramerRaoBound, OfATurningCamera) {
   ExpectThatOfExactData(TurningSystem(), {{"position", 3}, {"orientation", 4}}, place, frame);
 }
 
-// Measured whole, so without a prior; and two that are known beforehand, one of them exactly.
+// The landmarks are measured in all three coordinates, so they need no prior. Two of them are known
+// beforehand, one of the two exactly.
 TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   LandmarkOptions options;
   options.known = {{0, *PlaceOf(0), 0.02}, {1, *PlaceOf(1), 0.0}};
   const Problem problem = testing::MapSystem(testing::Offset(0.05), options, 0.2);
   const auto frame = [](int k, double noise) {
     SourceFrame made{{TimestampFromSeconds(0.1 * k), {}}, {{0.0, 0.0, 0.0}}};
-    for (int id = k < 3 ? 2 : 0; id < 5; ++id) {  // the known ones later
+    for (int id = k < 3 ? 2 : 0; id < 5;
+         ++id) {  // landmarks 0 and 1, which are known, are seen later
       const Point p = *PlaceOf(id);
       made.measurements.push_back({made.timestamp,
                                    0,
@@ -400,7 +408,7 @@ TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   ExpectThatOfExactData(problem, {{"position", 3}}, PlaceOf, frame);
 }
 
-/// Of a landmark on the ground, which has two coordinates.
+/// Offset to a landmark on the ground, which has two coordinates.
 struct OnGround : Sensor<Vec<2>, Vec<3>, Vec<2>> {
   static constexpr std::array kRoles{testing::kPosition,
                                      Quantity{"landmark", "m", "", "x,y", testing::kOfLandmark}};
@@ -422,7 +430,7 @@ struct OnGround : Sensor<Vec<2>, Vec<3>, Vec<2>> {
   }
 };
 
-/// The pixel of a point, which starts at the prior's distance along its ray.
+/// Pixel of a point that is initialised on its ray, at the distance of the prior.
 struct XyzByPrior : testing::XyzPixels {
   static constexpr int kInitialises = 1, kPrior = 1;
   XyzByPrior() : XyzPixels(0.01) {}

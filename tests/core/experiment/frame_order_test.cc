@@ -18,12 +18,13 @@ INSTANTIATE_TEST_SUITE_P(Policies, FrameOrder,
                            return of.param == OutOfSequence::kBuffer ? "buffer" : "rollback";
                          });
 
-/// A frame as of FrameAt, without truth.
+/// Returns the frame of FrameAt, without truth.
 SourceFrame GivenAt(double t_s, const std::vector<std::pair<int, double>>& values) {
   return {FrameAt(t_s, values)};
 }
 
-/// What the test says, frame by frame; frame k is in line k + 2 of rows.csv.
+/// Source of the given frames; frame k is in line k + 2 of rows.csv. With `then_fails`, it throws
+/// after the last frame.
 class Given : public SwingingTarget {
  public:
   explicit Given(std::vector<SourceFrame> frames, bool then_fails = false)
@@ -54,7 +55,7 @@ Experiment MakeGiven(std::vector<SourceFrame> frames, OutOfSequence order,
 }
 
 TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
-  // 0.1 s behind the newest is in the window, a nanosecond more is not.
+  // A frame 0.1 s older than the newest is in the window; one that is a nanosecond older is not.
   SourceFrame beyond = GivenAt(0.2, {{0, 80.0}, {1, 1.0}});
   beyond.timestamp -= 1;
   Experiment experiment = MakeGiven(
@@ -98,7 +99,7 @@ TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
       result.reason,
       "rows.csv:6: two measurements of stream 'inverse_scale' at t = 0.050000 s; expected one "
       "measurement per timestamp; the first is in rows.csv:3");
-  EXPECT_EQ(result.frames, 3);  // what came before it is kept
+  EXPECT_EQ(result.frames, 3);  // the frames before the error are kept
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
 
@@ -118,7 +119,7 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
   }
 }
 
-// A source need not give those of one frame in the order of the sensors.
+// A source may return the measurements of one frame in an order other than that of the sensors.
 TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
   for (const bool swapped : {false, true}) {
     const TemporaryFolder folder;
@@ -136,7 +137,7 @@ TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
   }
 }
 
-// The place of each goes with it.
+// Each measurement keeps the line number of its own frame when frames are merged.
 TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   Experiment experiment = MakeGiven(
       {GivenAt(0.0, {{0, 80.0}, {1, 1.0}}), GivenAt(0.0, {{2, 5.0}}), GivenAt(0.0, {{2, 5.0}})},
@@ -197,7 +198,7 @@ TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
 }
 
 TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
-  // A negative depth is outside of the domain of both sensors, from the second frame on.
+  // Both sensors reject a negative depth as out of domain, from the second frame on.
   const std::vector<SourceFrame> frames = {GivenAt(0.0, {}), GivenAt(0.05, {{0, 80.0}}),
                                            GivenAt(0.1, {{0, 80.0}}), GivenAt(0.15, {{0, 80.0}})};
   std::vector<Timestamp> ends;
@@ -227,7 +228,7 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
   EXPECT_EQ(ends, std::vector<Timestamp>(4, frames[1].timestamp));
 }
 
-/// Fails at the frame of that timestamp.
+/// An ekf that fails at the frame with the timestamp `at`.
 struct Mortal : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
@@ -242,7 +243,7 @@ struct Mortal : Ekf {
   bool failed_ = false;
 };
 
-// Its depth is negative, and so it diverges at the first frame; it fails at the third.
+// The depth is negative, so the estimator diverges at the first frame; it fails at the third.
 TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
   std::vector<SourceFrame> frames;
   for (int k = 0; k < 8; ++k) frames.push_back(GivenAt(0.05 * k, {{0, 80.0 - k}, {1, 1.0}}));
@@ -291,7 +292,7 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
 }
 
-/// Remembers, with its copies, which frames it was given.
+/// An ekf that records the timestamps of its frames in a list shared with its copies.
 struct Watching : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
@@ -316,7 +317,7 @@ TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   EXPECT_EQ(*seen, (std::vector<Timestamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
 }
 
-/// Throws once, at the frame of that timestamp.
+/// An ekf that throws once, at the frame with the timestamp `at`.
 struct Throwing : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
@@ -330,7 +331,7 @@ struct Throwing : Ekf {
 };
 
 TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
-  // All are within the window: none is released before the third is tried.
+  // All frames are within the window: none is released before the third is processed.
   Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}}),
                                      GivenAt(0.04, {{1, 1.0}}), GivenAt(0.06, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
@@ -344,12 +345,13 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   EXPECT_EQ(result.reason, "internal: an invariant");
   EXPECT_EQ(result.frames, 2);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
-  for (const EstimatorSpec& one : experiment.estimators) {  // the first had the third frame
+  for (const EstimatorSpec& one :
+       experiment.estimators) {  // both: the first estimator had already processed the third frame
     EXPECT_EQ(one.estimator->timestamp(), TimestampFromSeconds(0.02));
   }
 }
 
-/// An estimator that cannot go back.
+/// An estimator without Clone, which Rollback needs.
 class Forward : public Estimator {
  public:
   explicit Forward(const Problem& problem) : state_(problem.InitialState()) {}

@@ -13,7 +13,7 @@
 namespace alidade::testing {
 namespace {
 
-constexpr double kWindow_s = 0.2;  // six frames of the simulator
+constexpr double kWindow_s = 0.2;  // six frame intervals of the simulator
 
 /// All types of filter, and a smoother, which waits for all frames.
 constexpr const char* kFilters = R"(alidade: 1
@@ -42,8 +42,8 @@ evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// Blocks that wait for their first measurement, and a gate so narrow that sensors need rejection
-/// recovery: what the filter keeps besides its state decides what comes.
+/// Blocks that are initialised from their first measurement, and a gate so narrow that sensors need
+/// rejection recovery. The results therefore depend on more of the filter than its state.
 constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -63,13 +63,13 @@ estimators:
   inflate: {type: ekf, gate: 0.5, rejection_recovery: {after: 3, action: inflate}}
 )";
 
-/// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each
-/// measurement comes by itself, and truth too.
+/// Frames of a source, each delayed by a random time of at most `most_s`; the first by `most_s`.
+/// With `split`, each measurement arrives in a frame of its own, as does truth.
 class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
     std::mt19937_64 random(7);
-    std::multimap<Timestamp, SourceFrame> arrivals;  // in the order of insertion where equal
+    std::multimap<Timestamp, SourceFrame> arrivals;  // equal timestamps in the order of insertion
     const auto add = [&](SourceFrame frame) {
       const auto most = static_cast<std::uint64_t>(TimestampFromSeconds(most_s));
       const auto delay = static_cast<Timestamp>(arrivals.empty() ? most : random() % (most + 1));
@@ -100,7 +100,7 @@ class Delayed : public Source {
   std::size_t next_ = 0;
 };
 
-/// The config's experiment with delays, recorded in `folder`.
+/// Runs the experiment of the config with delayed frames and records it in `folder`.
 RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSequence order,
                         double most_s, bool split = false) {
   const Config config = Config::FromText(text, "order.yaml");
@@ -138,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(Policies, Reordered,
 TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
   for (const char* config : {kFilters, kEventful}) {
     const fs::path here = folder_ / (config == kFilters ? "filters" : "eventful");
-    // In order no policy is asked, and the estimators are given the frames directly.
+    // Without delays the policy has no effect: the estimators receive the frames directly.
     const RunResult in_order =
         RecordDelayed(config, here / "in_order", OutOfSequence::kReject, 0.0);
     EXPECT_EQ(in_order.status, RunStatus::kOk);
@@ -156,7 +156,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     EXPECT_LE(late.arrivals.longest_lag, TimestampFromSeconds(kWindow_s));
     EXPECT_EQ(late.arrivals.dropped, 0);
     ExpectSameBytes(here / "in_order", here / "late");
-    // Unsorted, the same frames tell another story.
+    // Without reordering, the same frames lead to different counts.
     const RunResult rejected =
         RecordDelayed(config, here / "rejected", OutOfSequence::kReject, kWindow_s);
     EXPECT_NE(rejected.estimators[0].counts, in_order.estimators[0].counts);
@@ -181,7 +181,7 @@ TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirTimestamp) {
   EXPECT_TRUE(Read(folder_ / "whole/truth.csv") == Read(folder_ / "late/truth.csv"));
 }
 
-/// What BuildExperiment makes of the filters with `time` in their config.
+/// Returns the message with which BuildExperiment rejects kFilters with `time` appended.
 std::string Refused(const std::string& time) {
   std::string text;
   const Config config = Config::FromText(std::string(kFilters) + time + '\n', "order.yaml");
@@ -209,7 +209,7 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(ranks.size(), experiment.source->streams().size());
   EXPECT_EQ(ranks["disparity"], 0);
   EXPECT_EQ(ranks["inverse_scale"], 1);
-  EXPECT_EQ(ranks["disparity_all"], 2);  // of no sensor
+  EXPECT_EQ(ranks["disparity_all"], 2);  // a stream without a sensor
   EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
             "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
             "'window_s', the largest lag of an out-of-sequence frame");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// An estimator in the place of truth.
+// Metrics against an estimator as the reference, in place of truth.
 #include <malloc.h>
 
 #include <cmath>
@@ -12,7 +12,8 @@
 namespace alidade::testing {
 namespace {
 
-/// Knows at the end that the depth was 0.3 m, but not at the first frame; or fails to.
+/// A smoother whose estimate of the depth is 0.3 m at all frames but the first. With `fails`, it
+/// fails instead.
 struct Known : Estimator {
   Known(const Problem& problem, bool fails) : state_(problem.InitialState()), failed_(fails) {}
   void Start(Timestamp) override {}
@@ -39,7 +40,7 @@ struct Known : Estimator {
   bool failed_;
 };
 
-/// An ekf, `alone` and `reference`, which is compared with; the source knows no truth.
+/// A source without truth.
 class Blind : public SwingingTarget {
  public:
   using SwingingTarget::SwingingTarget;
@@ -66,7 +67,7 @@ Experiment MakeCompared(bool fails = false) {
   return experiment;
 }
 
-/// Depths of an ekf, frame by frame.
+/// Returns the depth that an ekf estimates at each frame.
 std::vector<double> Depths(bool alone) {
   Experiment experiment = MakeExperiment();
   Estimator& ekf = *experiment.estimators[alone ? 1 : 0].estimator;
@@ -106,7 +107,7 @@ TEST(Reference, MayBeAnyEstimatorOfTheRun) {
               std::abs(0.3 - alone.back()), 1e-12);
 }
 
-// What an estimator's covariance says of its distance from truth it does not say of that from
+// The covariance of an estimator describes its error relative to truth, not its distance from
 // another estimator. NIS needs neither.
 TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   Experiment experiment = MakeCompared();
@@ -114,10 +115,10 @@ TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   for (const EstimatorResult& one : run.estimators) {
     EXPECT_EQ(one.metrics.count("coverage95:target.depth"), 0u);
     EXPECT_EQ(one.metrics.count("nees.mean:target"), 0u);
-    EXPECT_FALSE(one.diverged);  // the ekf is a hundred sigma off
+    EXPECT_FALSE(one.diverged);  // although the ekf is a hundred sigma from the reference
   }
   EXPECT_EQ(run.estimators[0].metrics.count("nis.mean:disparity"), 1u);
-  EXPECT_EQ(run.estimators[2].metrics.size(), 0u);  // not even compared with itself
+  EXPECT_EQ(run.estimators[2].metrics.size(), 0u);  // the reference is not compared with itself
   EXPECT_EQ(run.estimators[0].counts.at("accepted:inverse_scale"), 60);
 }
 
@@ -134,7 +135,7 @@ TEST(Reference, ThatFailedIsNone) {
             std::string::npos);
 }
 
-/// Tells how many bytes of the heap are in use at its end more than at its beginning.
+/// Source that measures the growth of the heap, in bytes, from its first to its last frame.
 class Counting : public Blind {
  public:
   Counting(int frames, std::size_t& grown) : Blind(frames), grown_(grown) {}
@@ -154,8 +155,8 @@ class Counting : public Blind {
   std::size_t& grown_;
 };
 
-// P of 302 elements has 0.7 MB: 100 frames of two estimators would have 146 MB. Their values have
-// 0.5 MB.
+// P of a state with 302 elements has 0.7 MB: the covariances of 100 frames of two estimators would
+// need 146 MB. Their values need 0.5 MB.
 TEST(Reference, KeepsNoCovariances) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   std::size_t grown = 0;
@@ -181,7 +182,7 @@ TEST(Reference, KeepsNoCovariances) {
   EXPECT_LT(grown, std::size_t{10} << 20);
 }
 
-/// Fails before there is anything to smooth.
+/// Source that throws after `left_` frames, before the smoother has run.
 class Torn : public Blind {
  public:
   using Blind::Blind;
@@ -201,7 +202,7 @@ TEST(Reference, WithoutEstimatesIsNone) {
   EXPECT_EQ(run.code, ExitCode::kBadData);
   EXPECT_EQ(run.withheld,
             "no reference: estimator 'known' has no estimates, the comparison with it is withheld");
-  // A filter has those up to there.
+  // An online filter has the estimates up to the error.
   Experiment online = MakeCompared();
   online.source = std::make_unique<Torn>(60);
   online.reference = 1;

@@ -17,7 +17,7 @@ namespace {
 
 using testing::MakeExperiment;
 
-/// Steps to infinity at the first step.
+/// Motion that becomes infinite at the first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -46,9 +46,9 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
       << result.reason;
   EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
   EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
-  // The event is at the frame of the failed step too.
+  // The event has the timestamp of the failed step, too.
   EXPECT_EQ(result.estimators[2].events.back().timestamp, TimestampFromSeconds(0.033));
-  // The others saw all frames.
+  // The other estimators processed all frames.
   EXPECT_EQ(result.frames, 60);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 60);
 }
@@ -82,7 +82,7 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
       << result.reason;
 }
 
-/// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
+/// A smoother whose depth is 1 m at the first frame and a millimetre more at each further frame.
 struct Hindsight : Estimator {
   explicit Hindsight(const Problem& problem) : state_(problem.InitialState()) {}
   void Start(Timestamp) override {}
@@ -134,7 +134,7 @@ TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
   EXPECT_EQ(std::ranges::count(events, "all is known", &Event::text), 1);
 }
 
-/// Finds at the end that it cannot say anything.
+/// A smoother that fails in Smooth without an estimate.
 struct Speechless : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override {
@@ -178,7 +178,7 @@ TEST(Run, AStopAfterAFailureIsStillAFailure) {
   EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
 }
 
-/// Ends by a signal while it waits for frame 7, as a pipe does.
+/// Source that is interrupted by a signal while it waits for frame 7, as a pipe may be.
 struct SignalledSource : Source {
   explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
   const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
@@ -205,7 +205,7 @@ TEST(Run, ASignalToItsSourceAfterAFailureIsStillAFailure) {
   }
 }
 
-/// Is stopped in its smoothing.
+/// A smoother that a signal stops.
 struct Interrupted : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override { throw Error(ExitCode::kStopped, "a signal"); }
@@ -229,7 +229,7 @@ TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   EXPECT_EQ(std::ranges::count(events, EventKind::kStopped, &Event::kind), 1);
 }
 
-/// A value that walks by N(0, 0.1^2) each second, and is measured with noise of sigma 1.
+/// Random walk with steps N(0, 0.1^2) each second, measured with noise of sigma 1.
 class Walking : public testing::SwingingTarget {
  public:
   explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
@@ -248,7 +248,8 @@ class Walking : public testing::SwingingTarget {
   int k_ = 0;
 };
 
-/// Events of a filter of Walking that takes the noises for `factor` times what they are.
+/// Returns the result of a filter on Walking that assumes `factor` times the true standard
+/// deviations.
 EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   Experiment experiment;
   experiment.source = std::make_unique<Walking>(seed);
@@ -291,7 +292,7 @@ TEST(Run, AnUnderconfidentFilterIsAnEvent) {
   EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
 }
 
-// 5 % of 200 runs are 10, with a standard deviation of 3; the bounds of the NEES are wider.
+// 5 % of 200 runs are 10 runs, with a standard deviation of 3; the bounds of the NEES are wider.
 TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
   std::size_t nees = 0, nis = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
@@ -329,7 +330,8 @@ struct Turn : Motion<1, Angle> {
   void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.2 * std::sqrt(dt_s); }
 };
 
-/// Turns at a steady rate, and measures its heading ten times a second in a unit of its own.
+/// A heading that turns at a constant rate and is measured ten times a second, in units of `unit`
+/// rad, wrapped or not.
 class Turning : public testing::SwingingTarget {
  public:
   Turning(double rate_rad_s, double unit, bool wrapped)
@@ -380,7 +382,7 @@ TEST(Run, DegreesForRadiansAreAnEvent) {
   }
 }
 
-// Across the seam, or counted on over several turns.
+// The heading is either wrapped to one turn or counted over several turns.
 TEST(Run, RadiansAreNoEvent) {
   for (const double gate : {1.0, 0.9999}) {
     for (const double rate : {0.0, 0.3, 0.9, -0.9}) {
@@ -393,15 +395,16 @@ TEST(Run, RadiansAreNoEvent) {
 }
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
-  Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
+  Experiment experiment = MakeExperiment();  // 60 frames, every 33 ms
   EstimatorSpec& ekf = experiment.estimators[0];
   ekf.problem.initial_time_s = 49.5 * 0.033;
   ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
   const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
   EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
-  // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is
-  // off, by 75 mm of curvature: sqrt(75^2 / 10) mm, and a little for the wobble.
+  // The prior, 0.35 m, has an RMS error of 80 mm over the first 50 frames. After them, only the
+  // first update has a large error, 75 mm because of curvature: sqrt(75^2 / 10) mm, and a little
+  // for the oscillation.
   EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
 }
 
@@ -421,7 +424,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   EstimatorSpec& ekf = experiment.estimators[0];
   const SharedSensor linear = testing::LinearSensor(1.0, 1.0);
   testing::AddSensor(ekf.problem, "elsewhere", linear, {"target.depth"});
-  for (Prior& prior : ekf.problem.priors) prior.covariance *= 1e-12;  // sure of what is wrong
+  for (Prior& prior : ekf.problem.priors) prior.covariance *= 1e-12;  // certain of a wrong value
   EkfOptions options;
   options.gate = 1e-6;
   options.rejection_recovery = RejectionRecovery::kNone;
@@ -433,7 +436,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
                    "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
 }
 
-/// Five frames, then bad data.
+/// Source that throws an error after five frames.
 class Failing : public testing::SwingingTarget {
  public:
   explicit Failing(ExitCode code) : SwingingTarget(60), code_(code) {}
@@ -447,7 +450,7 @@ class Failing : public testing::SwingingTarget {
   int count_ = 0;
 };
 
-/// A speed and a fix each second.
+/// Source of a speed and a fix each second.
 class EachSecond : public testing::SwingingTarget {
  public:
   explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
@@ -463,7 +466,7 @@ class EachSecond : public testing::SwingingTarget {
   double t_s_ = 0.0;
 };
 
-// An input that always comes too late: the run says it once, and counts.
+// Each input arrives too late: the run reports one event and counts the others.
 TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   Experiment experiment;
   experiment.source = std::make_unique<EachSecond>(100);
@@ -493,7 +496,7 @@ TEST(Run, BadDataKeepsWhatWasDone) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
-/// A defect of the program half-way.
+/// Source that throws a logic_error after five frames: a defect of the program.
 class Breaking : public testing::SwingingTarget {
  public:
   Breaking() : SwingingTarget(60) {}
@@ -506,7 +509,7 @@ class Breaking : public testing::SwingingTarget {
   int count_ = 0;
 };
 
-/// Has landmarks at the end, but cannot say where they are.
+/// A smoother whose landmarks() throws.
 struct Mapless : Hindsight {
   using Hindsight::Hindsight;
   std::vector<LandmarkEstimate> landmarks() const override {
@@ -527,7 +530,7 @@ TEST(Run, AFailureAtTheEndKeepsTheResults) {
   EXPECT_FALSE(result.estimators[1].metrics.empty());
 }
 
-/// Fails in its smoothing.
+/// A smoother that fails in Smooth.
 struct FailsLate : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override {
@@ -559,7 +562,7 @@ TEST(Run, ADefectIsAResultToo) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
-/// Spoils its fourth frame.
+/// Source that applies `spoil` to its fourth frame.
 class Spoiling : public testing::SwingingTarget {
  public:
   explicit Spoiling(void (*spoil)(SourceFrame&)) : SwingingTarget(60), spoil_(spoil) {}
@@ -623,7 +626,7 @@ TEST(Experiment, KeysAndScalarsOfAConfig) {
       Config::FromText("a: {model: b, list: [c, {d: 1.5}]}\ne: 'f g'", "test.yaml");
   EXPECT_EQ(KeysAndScalarsOf(config),
             (std::set<std::string>{"a", "model", "b", "list", "c", "d", "1.5", "e", "f g"}));
-  EXPECT_THROW(config.root().RejectUnread(), Error);  // nothing counts as read
+  EXPECT_THROW(config.root().RejectUnread(), Error);  // no key is marked as read
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ std::optional<internal::SimilarityFit> FromSums(const Matrix3Xd& points, const M
   return alignment.Result();
 }
 
-/// 12 points of a line, of a plane and of space.
+/// Returns 12 points on a line, in a plane or in space.
 Matrix3Xd Points(int dimensions) {
   Matrix3Xd points = Matrix3Xd::Zero(3, 12);
   for (int k = 0; k < 12; ++k) {
@@ -65,7 +65,7 @@ TEST(AlignBySimilarity, AndTrajectoryAlignmentRefuseTheSame) {
   EXPECT_TRUE(refused(points.leftCols(2), points.leftCols(2)));
   EXPECT_TRUE(refused(points, still));
   EXPECT_TRUE(refused(still, points));
-  // Nothing in common but rounding.
+  // Two sets of points whose deviations are uncorrelated except for rounding.
   Matrix3Xd one = still, other = still;
   for (int k = 0; k < 12; ++k) {
     one(0, k) += k % 2 == 0 ? 1.0 : -1.0;
@@ -74,7 +74,7 @@ TEST(AlignBySimilarity, AndTrajectoryAlignmentRefuseTheSame) {
   EXPECT_TRUE(refused(one, other));
 }
 
-/// A path that turns, and what a similarity makes of it.
+/// Trajectory of 40 points on a curve.
 std::vector<Eigen::Vector3d> TurningPath() {
   std::vector<Eigen::Vector3d> path;
   for (int k = 0; k < 40; ++k) {
@@ -96,7 +96,8 @@ TEST(TrajectoryAlignment, FindsASimilarity) {
   EXPECT_LT(aligned->rmse, 1e-6);
 }
 
-// Against Eigen's, which takes all points at once; a mirrored path needs the sign of D.
+// Compares with Eigen's umeyama, which needs all points at once. A mirrored trajectory needs the
+// sign of D.
 TEST(TrajectoryAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
   for (const double mirror : {1.0, -1.0}) {
     const std::vector<Eigen::Vector3d> path = TurningPath();

@@ -23,7 +23,8 @@ TEST(FollowLinks, LeadsToWhatIsThereOrIsNot) {
   fs::create_directory_symlink(folder / "a", folder / "absolute");
   fs::create_symlink("nothing", folder / "dangling");
   EXPECT_EQ(FollowLinks(folder / "a/./b/"), folder / "a/b");
-  EXPECT_EQ(FollowLinks(folder / "relative/../x"), folder / "a/x");  // as the kernel takes `..`
+  EXPECT_EQ(FollowLinks(folder / "relative/../x"),
+            folder / "a/x");  // `..` applies to the target of the link, as in the kernel
   EXPECT_EQ(FollowLinks(folder / "absolute/b"), folder / "a/b");
   EXPECT_EQ(FollowLinks(folder / "dangling"), folder / "nothing");
 }

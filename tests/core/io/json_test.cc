@@ -40,13 +40,13 @@ TEST(JsonText, WritesNumbersThatReadBack) {
     const std::string text = JsonText(value);
     EXPECT_EQ(ParseJson(text, "").get<double>(), value) << text;
   }
-  EXPECT_EQ(JsonText(1.0), "1.0\n");  // a double is not an integer
+  EXPECT_EQ(JsonText(1.0), "1.0\n");  // a double keeps its decimal point
   EXPECT_EQ(JsonText(std::uint64_t{18446744073709551615u}), "18446744073709551615\n");
 }
 
 TEST(JsonText, ReplacesWhatIsNotUtf8) {
   EXPECT_EQ(JsonText("a\xFF"), "\"a\xEF\xBF\xBD\"\n");
-  EXPECT_EQ(JsonText("\xC3"), "\"\xEF\xBF\xBD\"\n");  // cut short
+  EXPECT_EQ(JsonText("\xC3"), "\"\xEF\xBF\xBD\"\n");  // a truncated character
   EXPECT_EQ(JsonText("\xC3\xA9 \"\\\n\x01"), "\"\xC3\xA9 \\\"\\\\\\n\\u0001\"\n");
   EXPECT_EQ(JsonText({{"k\xFF", 1}}), "{\n  \"k\xEF\xBF\xBD\": 1\n}\n");
 }

@@ -48,7 +48,7 @@ TEST(Log, GivesEachSinkItsLevelAndAbove) {
     EXPECT_TRUE(IsLogged(LogLevel::kDebug));
     EXPECT_FALSE(IsLogged(LogLevel::kTrace));
     Log(LogLevel::kTrace, "t");
-    Log(LogLevel::kDebug, "{d}");  // a text, not a format
+    Log(LogLevel::kDebug, "{d}");  // printed as it is, not used as a format
     Log(LogLevel::kInfo, "i");
     Log(LogLevel::kWarning, "w");
     Log(LogLevel::kError, "e");
@@ -110,7 +110,7 @@ TEST(LogScope, NamesOneRunOfManyAndLimitsItsLevel) {
                                 "warning: seed 8: inner", "warning: after"}));
 }
 
-// 4 threads, 500 messages each; a fifth adds and removes sinks meanwhile.
+// Four threads log 500 messages each, while another thread adds and removes sinks.
 TEST(Log, TakesMessagesFromSeveralThreads) {
   Messages messages;
   const LogSubscription sink(LogLevel::kInfo, Into(messages));

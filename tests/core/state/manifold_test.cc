@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
 #include <vector>
 
+#include "alidade/state/element_names.h"
 #include "alidade/testing/manifold_invariants.h"
 
 namespace alidade {
@@ -79,7 +81,7 @@ TEST_P(GeometryLaws, SmallStepsKeepTheirDigits) {
   // absolute.
   const Values x = [&] {
     Values identity{};
-    geometry_.Identity(identity.data());
+    std::ranges::copy(geometry_.Identity(), identity.begin());
     return identity;
   }();
   for (double length = 1e-12; length < 1e-3; length *= 1.7) {
@@ -343,6 +345,44 @@ TEST(Geometry, NormaliseGivesTheNearestPoint) {
   double angle = 7.0;
   Geometry::Angle().Normalise(&angle);
   EXPECT_NEAR(angle, 7.0 - 2.0 * kPi, 1e-15);
+}
+
+TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
+  for (const GeometryRow* row : detail::kGeometryRows) {
+    if (row->ambient == 0) continue;  // the model determines the size
+    SCOPED_TRACE(row->name);
+    EXPECT_EQ(FindGeometry(row->number), row);
+    const Geometry geometry(row->number);
+    Space space;
+    space.geometry = geometry;
+    space.elements = internal::ElementsOf("", geometry);
+    EXPECT_EQ(std::ssize(space.elements), row->ambient);
+    EXPECT_EQ(std::ssize(internal::TangentNames("b", space)), row->tangent);
+    EXPECT_LT(row->angular, 1U << row->tangent);
+    EXPECT_EQ(DistanceFrom(geometry, geometry.Identity().data()), 0.0);
+    std::vector<double> x = geometry.Identity();
+    geometry.Normalise(x.data());
+    EXPECT_EQ(x, geometry.Identity());
+  }
+  EXPECT_EQ(FindGeometry(99), nullptr);
+}
+
+// The same derivative by dual numbers, to rounding.
+TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
+  const auto visit = [&]<class G>(G) {
+    const Geometry geometry = Geometry::Of<G>();
+    std::vector<double> x = geometry.Identity();
+    const double turn[3] = {0.4, -0.7, 0.2}, d[3] = {-0.3, 1.1, 0.6};
+    geometry.Plus(x.data(), turn, x.data());
+    std::array<double, detail::kMaxTangent * detail::kMaxTangent> closed{}, dual{};
+    PlusJacobian(geometry, x.data(), d, closed.data());
+    detail::DifferentiatePlus<G>(x.data(), d, dual.data());
+    for (int i = 0; i < G::kTangent * G::kTangent; ++i) {
+      EXPECT_NEAR(closed[static_cast<std::size_t>(i)], dual[static_cast<std::size_t>(i)], 1e-14)
+          << geometry.name() << ", element " << i;
+    }
+  };
+  for (const GeometryRow* row : detail::kGeometryRows) VisitGeometry(row->number, visit);
 }
 
 TEST(ColumnNames, AreTheBlockOrBlockAndElement) {

@@ -47,6 +47,12 @@ class ErrorsOfACamera : public ::testing::Test {
               {has_position ? position : std::vector<double>(), {1.0, 0.0, 0.0, 0.0}, {-3.1}}},
              state_);
   }
+  /// The blocks with these truths.
+  std::vector<internal::BlockLayout> Layouts(const std::vector<int>& truths) const {
+    std::vector<internal::BlockLayout> layouts = internal::BlockLayoutsOf(system_, {});
+    for (std::size_t i = 0; i < truths.size(); ++i) layouts.at(i).truth = truths[i];
+    return layouts;
+  }
 
   Problem system_;
   BlockId position_, orientation_, heading_;
@@ -56,7 +62,8 @@ class ErrorsOfACamera : public ::testing::Test {
 TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   const TemporaryFolder folder;
   internal::OutputFolder out(folder / "out", false);
-  internal::ErrorsFile file(out, "ekf", system_, {0, 1, 2, -1});
+  internal::RunColumns columns;
+  internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
   Add(file);  // no block has a value
   EXPECT_FALSE(file.elements()[0].is_known);
   AddBlocks();
@@ -86,7 +93,8 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
 TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {
   const TemporaryFolder folder;
   internal::OutputFolder out(folder / "out", false);
-  internal::ErrorsFile file(out, "ekf", system_, {0, 1, 2, -1});
+  internal::RunColumns columns;
+  internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
   AddBlocks();
   Add(file);
   internal::RecordedEstimator estimator;
@@ -111,7 +119,8 @@ TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {
 TEST_F(ErrorsOfACamera, WithoutTruthIsNoFile) {
   const TemporaryFolder folder;
   internal::OutputFolder out(folder / "out", false);
-  internal::ErrorsFile file(out, "ekf", system_, {-1, -1, -1, -1});
+  internal::RunColumns columns;
+  internal::ErrorsFile file(out, "ekf", Layouts({-1, -1, -1, -1}), columns);
   AddBlocks();
   Add(file);
   file.Close();

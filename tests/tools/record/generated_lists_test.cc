@@ -46,8 +46,8 @@ std::string UnitText(const MetricInfo& metric) {
 std::string MetricList() {
   constexpr const char* kSubjects[] = {"", ":BLOCK", ":OWNER", ":SENSOR"};
   constexpr const char* kGoals[] = {"", "0", "1", "0.95"};
-  std::string list = Row({"key", "meaning", "unit", "best", "truth", "segments"}) +
-                     "|---|---|---|---|---|---|\n";
+  std::string list =
+      Row({"key", "meaning", "unit", "best", "truth", "segments"}) + "|---|---|---|---|---|---|\n";
   for (const MetricInfo& metric : kMetrics) {
     list += Row({Quoted(std::string(metric.name) + kSubjects[static_cast<int>(metric.subject)]),
                  metric.meaning, UnitText(metric), kGoals[static_cast<int>(metric.goal)],

@@ -203,7 +203,8 @@ TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
   far_off.sigma = 0.5;
   const TemporaryFolder folder;
   internal::OutputFolder out(folder / "out", false);
-  internal::WriteLandmarks(out, "ekf", {far_off});
+  internal::RunColumns columns;
+  internal::WriteLandmarks(out, "ekf", {far_off}, columns);
   out.Commit();
   EXPECT_EQ(Lines(folder / "out/ekf/landmarks.csv").at(1),
             "7,2,inverse_depth,,,,,,,-0.25,0.5,,,0,0,,,,,,,kept,");

@@ -262,7 +262,9 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   one.counts = {{"accepted:stereo", 151}};
   one.units = {{"target.depth", "m"}};
   one.diverged = true;
-  one.events = {{0, "rejection_recovery", ""}, {1, "rejection_recovery", ""}, {2, "diverged", ""}};
+  one.events = {{0, EventKind::kRejectionRecovery, ""},
+                {1, EventKind::kRejectionRecovery, ""},
+                {2, EventKind::kDiverged, ""}};
   one.unobservable = {{"a.x", "b.y"}};
   result.estimators = {one};
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig());

@@ -18,8 +18,9 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which have their own
-// Every allocation of this program is counted, those of operator new and of Eigen too.
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // the sanitizers replace malloc themselves
+// Counts every allocation of this program, including those of operator new and of Eigen.
 extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
 extern "C" void* malloc(std::size_t size) noexcept {
   ++allocations;
@@ -30,7 +31,7 @@ extern "C" void* malloc(std::size_t size) noexcept {
 namespace alidade {
 namespace {
 
-/// The depth filter, with a motion model besides that is of no sensor.
+/// The depth filter with a second motion model, whose block no sensor uses.
 Problem WalkingDepthFilter() {
   Problem problem = testing::DepthFilter();
   testing::AddMotion(problem, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
@@ -59,7 +60,8 @@ TEST(Log, TakesNoAllocationWithoutASink) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-/// Both sensors, one, an outlier, none, and the other order.
+/// Frames with both sensors, with one, with an outlier, without measurements, and with the sensors
+/// in reverse order.
 std::vector<Frame> Frames() {
   std::vector<Frame> frames;
   for (int k = 0; k < 60; ++k) {
@@ -87,7 +89,7 @@ void ExpectNoAllocation(Estimator& filter) {
   const std::vector<Frame> frames = Frames();
   for (std::size_t k = 0; k < 20; ++k) filter.Process(frames[k]);
   const long before = allocations;
-  EXPECT_GT(before, 0);  // they are counted
+  EXPECT_GT(before, 0);  // the counter works
   for (std::size_t k = 20; k < frames.size(); ++k) filter.Process(frames[k]);
   EXPECT_EQ(allocations - before, 0);
   EXPECT_FALSE(filter.diverged());
@@ -131,7 +133,7 @@ TEST_P(Allocation, AStepOfTheUkfTakesNone) {
 INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
                          ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
 
-/// Adds `count` states that walk; with `considered` the first one is never corrected.
+/// Adds `count` states that walk at random. With `considered`, the first one is a consider state.
 void AddWalking(Problem& problem, int count, bool considered) {
   const SharedMotion model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
@@ -148,14 +150,14 @@ void AddWalking(Problem& problem, int count, bool considered) {
   }
 }
 
-/// Landmark `id` from a camera that walks along x, in pixels.
+/// Returns the pixel of landmark `id` seen by a camera that moves along x.
 std::vector<double> PixelOf(std::int64_t id, double x) {
   const double angle = static_cast<double>(id), depth = 4.0 + static_cast<double>(id % 5);
   return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
 }
 
-/// Counts allocations in frames of `measured` landmarks out of half as many again. In each frame a
-/// tenth of them leaves, and as many come; one measurement is wild.
+/// Expects no allocations in frames of `measured` landmarks out of 1.5 times as many. In each frame
+/// a tenth of them leaves and as many enter; one measurement is an outlier.
 void ExpectNoAllocationOf(Filter& filter, int measured) {
   if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
   const int known = measured * 3 / 2, change = measured / 10;
@@ -235,7 +237,7 @@ TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
   ExpectNoAllocationOf(filter, 20);
 }
 
-/// Thirty states in fifteen points that move, one measurement each.
+/// Thirty states of fifteen moving points, one measurement for each point.
 Problem ThirtyStates() {
   Problem problem;
   for (int i = 0; i < 15; ++i) {

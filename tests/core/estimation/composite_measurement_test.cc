@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A measurement of several parts, with one covariance: as its parts by themselves where they are
-// independent, and as the closed form where they are not.
+// A composite measurement has several parts with one covariance. With independent parts, it must
+// match separate measurements of the parts; otherwise, the closed form of the Kalman update.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -25,7 +25,7 @@ using testing::ManifoldSensor;
 using testing::ManifoldWalk;
 using testing::StreamsOf;
 
-/// Both blocks at once, with the noise that ManifoldSensor has of each.
+/// Measures both blocks at once, each with the noise that ManifoldSensor assumes for it.
 template <class A, class B>
 struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
@@ -45,7 +45,7 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   }
 };
 
-/// A block of each geometry, which walk at random; correlated with one another by the prior.
+/// One block of each geometry. Both walk at random and are correlated by the prior.
 template <class A, class B>
 Problem Walking() {
   Problem problem;
@@ -63,7 +63,7 @@ Problem Walking() {
   return problem;
 }
 
-/// z of both blocks at a step, near the means of the priors and off them by some noise.
+/// Returns z of both blocks at step k: the means of the priors with noise.
 std::vector<std::vector<double>> MeasuredAt(const Problem& problem, int k) {
   std::vector<std::vector<double>> z;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -106,7 +106,7 @@ void ExpectBothAreTheTwo() {
       const UpdateReport& joint = other->Process(Frame{t, {{t, 0, -1, both, {}}}});
       ASSERT_EQ(joint.measurements()[0].outcome, Outcome::kAccepted);
       EXPECT_EQ(joint.measurements()[0].dof, A::kTangent + B::kTangent);
-      if (k == 0) {  // the blocks are not yet correlated
+      if (k == 0) {  // the blocks are still uncorrelated
         EXPECT_NEAR(joint.measurements()[0].nis, nis, 1e-10);
       }
       for (std::size_t i = 0; i < one->state().values().size(); ++i) {
@@ -124,7 +124,7 @@ TEST(CompositeMeasurement, OfIndependentPartsIsTwoSensors) {
   ExpectBothAreTheTwo<Angle, Vec<2>>();
 }
 
-// x' = x + P (P + R)^-1 (z - x), with a whole R that came with the measurement.
+// x' = x + P (P + R)^-1 (z - x), in which R is a full matrix supplied with the measurement.
 TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   Problem problem = Walking<Vec<2>, Vec<1>>();
   AddSensor(problem, "z", MakeSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
@@ -145,7 +145,7 @@ TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   }
 }
 
-// An angle within a composite wraps: 3.1 rad seen from -3.1 rad is 0.083 rad off.
+// An angle within a composite wraps: -3.1 rad and 3.1 rad differ by 0.083 rad.
 TEST(CompositeMeasurement, WrapsTheAnglesAmongItsParts) {
   Problem problem = Walking<Vec<1>, Angle>();
   problem.priors[1].mean = {-3.1};

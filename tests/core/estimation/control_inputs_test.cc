@@ -26,7 +26,8 @@ constexpr double kNoise = 0.2, kSigma = 0.3;  // m/s^0.5, m
 
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 
-/// `car.position`, 1 +- 0.5 m, driven by stream `odometry`; sensor `fix` measures it.
+/// `car.position` starts at 1 +- 0.5 m and is driven by stream `odometry`; sensor `fix` measures
+/// it.
 Problem Car(double timeout_s = kInfinity) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
@@ -35,7 +36,7 @@ Problem Car(double timeout_s = kInfinity) {
   return problem;
 }
 
-/// Fixes and speeds, at times both: t / s, fix / m, speed / (m/s); NaN: none.
+/// One row of the drive: time t / s, fix / m, speed / (m/s). NaN means no measurement.
 struct Seen {
   double t_s, fix, speed;
 };
@@ -58,8 +59,8 @@ struct Gaussian {
   double x, p;
 };
 
-/// The Kalman filter written out: between two rows the distance is the integral of u(t), which is
-/// the last speed until timeout after it, and then 0; P grows by kNoise^2 dt.
+/// Kalman filter in closed form. The distance between two rows is the integral of u(t), the last
+/// speed until `timeout_s` after it and then 0. P grows by kNoise^2 dt.
 std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_s) {
   std::vector<Gaussian> estimates;
   double x = 1.0, p = 0.25, t = drive[0].t_s, speed = 0.0, since = t;
@@ -82,7 +83,7 @@ std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_
   return estimates;
 }
 
-/// Kinds of all events, in their order; what the filter makes is compared with the written out.
+/// Compares the filter with WrittenOut and returns the kinds of all events in order.
 std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<Seen>& drive,
                                           double timeout_s, double tolerance) {
   std::vector<std::string> kinds;
@@ -100,7 +101,7 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   return kinds;
 }
 
-/// The problem with a constant block next to it.
+/// Returns the problem with an additional constant block.
 Problem WithConstantBlock(Problem problem) {
   const BlockId id =
       problem.layout.Declare("aside.x", "aside", problem.layout[0].space, BlockStatus::kConstant);
@@ -109,7 +110,7 @@ Problem WithConstantBlock(Problem problem) {
 }
 
 TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
-  const std::vector<std::string> first = {"input_stale"};  // none yet from 0 s to 0.5 s
+  const std::vector<std::string> first = {"input_stale"};  // no input from 0 s to 0.5 s
   for (const Problem& problem : {Car(), WithConstantBlock(Car())}) {
     Ekf ekf(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, kInfinity, 1e-12), first);
@@ -126,13 +127,14 @@ TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
   for (const Problem& problem : {Car(0.4), WithConstantBlock(Car(0.4))}) {
     Ekf ekf(problem, {}, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, 0.4, 1e-12);
-    // Before the first, and after each but the last, for the next comes 0.5 s later or more.
+    // Before the first input, and after each but the last, because the next input comes at least
+    // 0.5 s later.
     EXPECT_EQ(kinds, std::vector<std::string>(6, "input_stale"));
     Ukf ukf(problem, {}, kStreams);
     ExpectWrittenOut(ukf, kDrive, 0.4, 1e-9);
   }
   Ekf ekf(Car(1.5), {}, kStreams);
-  // Before the first, and from 4 s to 6.5 s: two frames, one episode.
+  // Before the first input, and from 4 s to 6.5 s: two frames, but one event.
   EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, 1.5, 1e-12), std::vector<std::string>(2, "input_stale"));
 }
 
@@ -143,7 +145,7 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
     Ekf ekf(Car(timeout_s), options, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, timeout_s, 1e-12);
     std::erase(kinds, "input_stale");
-    // 0.5 s: 5 parts; 3 s: 30, the only gap of at least twice as many.
+    // 0.5 s needs 5 parts; 3 s needs 30, the only gap with at least twice as many.
     EXPECT_EQ(kinds, std::vector<std::string>(2, "substeps")) << timeout_s;
   }
   Ekf ekf(Car(), options, kStreams);
@@ -166,7 +168,7 @@ TEST(ControlInputs, AnOldOneIsToldOnceUntilOneActsAgain) {
     }
   };
   step(0.0, 1.0);
-  step(0.5, kNone);  // exactly as old as it may become
+  step(0.5, kNone);  // exactly at the timeout
   EXPECT_TRUE(texts.empty());
   for (const double t_s : {0.6, 0.7, 0.8}) step(t_s, kNone);
   EXPECT_EQ(texts, std::vector<std::string>{"the control input of 'car' from stream 'odometry' is "
@@ -197,13 +199,13 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   EXPECT_FALSE(ekf.failed());
 }
 
-// Under `policy: reject` a frame may come late.
+// With `policy: reject`, a frame may be late.
 TEST(ControlInputs, ALateOneActsFromTheNextStepOnUnlessANewerOneIsHeld) {
   Ekf ekf(Car(), {}, kStreams);
   ekf.Process(FrameOf({0.0, kNone, 2.0}));
   ekf.Process(FrameOf({1.0, kNone, kNone}));
   EXPECT_TRUE(ekf.Process(FrameOf({0.5, 9.0, 4.0})).stale);
-  EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 3.0, 1e-15);  // not stepped again
+  EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 3.0, 1e-15);  // no second step
   ekf.Process(FrameOf({2.0, kNone, 5.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 7.0, 1e-15);
   EXPECT_TRUE(ekf.Process(FrameOf({1.9, kNone, 100.0})).inputs.empty());
@@ -275,7 +277,7 @@ TEST(ControlInputs, DriveTheSmootherToo) {
   EXPECT_EQ(count, kDrive.size());
 }
 
-/// x' = x + q_w dt for a unit quaternion q: its neutral element is not all zeros.
+/// x' = x + q_w dt for a unit quaternion q, whose neutral element is not zero.
 struct TurnedByInput : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   using Input = UnitQuaternion;
@@ -296,7 +298,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   const auto frame = [](double t_s, const std::vector<double>& q) {
     return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}};
   };
-  ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // 1e-4 too long
+  ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // the norm is 1e-4 too large
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.0, 1e-15);
   const UpdateReport& report = ekf.Process(frame(1.0, {2.0, 0.0, 0.0, 0.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.6, 1e-15);
@@ -327,7 +329,8 @@ TEST(ControlInputs, OfAnotherSizeThanTheStreamAreAMisuse) {
   EXPECT_THROW(Ekf(Car(), {}, {{"fix", 1}, {"odometry", 2}}), ContractViolation);
 }
 
-/// A point that goes where it looks: its heading shows only while it moves.
+/// A point that moves in the direction of its heading: the heading is observable only while it
+/// moves.
 struct Heading : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}, Quantity{"heading"}};
   using Input = Vec<1>;
@@ -368,7 +371,8 @@ TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
   }
 }
 
-// Of two frames at one timestamp, taken as they come, the later has the last word.
+// If two frames with the same timestamp are processed one by one, the input of the later frame
+// acts.
 TEST(ControlInputs, OfTwoAtOneTimestampTheLaterActs) {
   const Problem problem = Car();
   Ekf ekf(problem, {}, kStreams);

@@ -13,7 +13,7 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
-  // 1/scale = lambda Z: dh/dZ = lambda at its start, dh/dlambda = Z as it is.
+  // 1/scale = lambda Z: dh/dZ uses the first estimate of lambda, dh/dlambda the current Z.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   EkfOptions options;
@@ -66,7 +66,8 @@ TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
 }
 
 TEST(Ekf, AResetMakesANewFirstEstimate) {
-  // The scale alone, its lambda far off: rejection recovery resets it to z / Z.
+  // Only the scale is measured, and its lambda is far from the truth: rejection recovery resets it
+  // to z / Z.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   problem.priors[0].covariance(0, 0) = 1e-6;
@@ -83,12 +84,12 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   ASSERT_NEAR(lambda, 2.0 / 0.35, 1e-12);
   const Eigen::Matrix3d p = ekf.state().covariance().Dense();
   const Eigen::RowVector3d h(lambda, 0.0, 0.35);
-  const double sigma = 2.0 / 300.0 * 8.0;  // of 1/scale = 2
+  const double sigma = 2.0 / 300.0 * 8.0;  // sigma of the measurement 1/scale = 2
   const UpdateReport& next = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
   EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
 }
 
-/// A direction that stays.
+/// A constant direction.
 struct StillDirection : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"u", "", "", "x,y,z"}};
   template <class T>
@@ -114,7 +115,7 @@ struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
   }
 };
 
-// H d = R B(u) d: the tangent at the latest u, turned the short way to the first, R u = u0.
+// H d = R B(u) d: R is the shortest rotation from the latest u to the first, R u = u0.
 TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
   Problem problem;
   MotionBinding binding{"s", MakeMotion(StillDirection(), "still"), {}};

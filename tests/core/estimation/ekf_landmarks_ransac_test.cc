@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// 1-point RANSAC among the matches of a frame.
+// 1-point RANSAC on the matches of a frame.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -19,7 +19,7 @@ Eigen::Vector3d PointAt(int i) {
   return {0.1 * (i % 8 - 4), 0.1 * (i / 8 - 2), 2.0 + 0.1 * (i % 5)};
 }
 
-/// A known map, and a camera that may have moved by 0.1 m, or `sigma_0`, since.
+/// A known map and a camera whose position has the standard deviation `sigma_0`.
 Problem KnownMap(double sigma_0 = 0.1) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {
@@ -38,7 +38,8 @@ Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustL
   return {problem, gated, {{"tracks", 2}}};
 }
 
-/// What the camera sees at `r`; each `every`-th match has moved sideways, all alike.
+/// Returns the matches of a camera at `r`. Every `every`-th match is shifted by the same offset
+/// `aside`.
 Frame Matches(const Eigen::Vector3d& r, int every, double aside) {
   Random random(5);
   std::vector<Observation> observations;
@@ -61,7 +62,7 @@ int Accepted(const UpdateReport& report, int every, bool wrong) {
 
 TEST(OnePointRansac, LeavesOutWhatTheGateOfEachCannot) {
   const Eigen::Vector3d r(0.05, -0.03, 0.02);
-  // 0.03 aside: twenty times the noise, yet within what the camera may have moved.
+  // A shift of 0.03 is twenty times the noise, but within the uncertainty of the camera.
   const Frame frame = Matches(r, 3, 0.03);
   Ekf gate_alone = Filter(false), ekf = Filter(true);
   EXPECT_EQ(Accepted(gate_alone.Process(frame), 3, true), 14);
@@ -69,7 +70,7 @@ TEST(OnePointRansac, LeavesOutWhatTheGateOfEachCannot) {
   EXPECT_EQ(Accepted(report, 3, true), 0);
   EXPECT_GE(Accepted(report, 3, false), 25);
   EXPECT_GT((PositionOf(gate_alone) - r).norm(), 0.01);
-  // As if only those that are right had been there.
+  // The result is as if only the correct matches had been measured.
   Frame right = frame;
   std::erase_if(right.measurements, [](const Measurement& m) { return m.landmark % 3 == 0; });
   Ekf told = Filter(false);
@@ -87,7 +88,8 @@ TEST(OnePointRansac, TriesFewerTheMoreAgree) {
   EXPECT_LT(more, kPoints);
 }
 
-// Half of the matches belong to a sensor that asks for more: as many are tried as if all did.
+// Half of the matches belong to a sensor with a higher confidence. The number of hypotheses is as
+// large as if all belonged to it.
 TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
   const auto hypotheses = [](double first, double second) {
     Problem problem = KnownMap();
@@ -109,7 +111,8 @@ TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
 }
 
 TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
-  // One match does not tell how far the camera went ahead: others then miss it by more than noise.
+  // One match does not determine the forward motion of the camera: the residuals of the others then
+  // exceed the noise.
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   Ekf ekf = Filter(true);
   const UpdateReport& report = ekf.Process(frame);
@@ -117,14 +120,14 @@ TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
   const auto accepted =
       std::ranges::count(report.measurements(), Outcome::kAccepted, &MeasurementReport::outcome);
   EXPECT_GE(accepted, kPoints - 2);
-  // Each match counts once: the error is what P says.
+  // Each match counts only once: P describes the error.
   const Eigen::Vector3d error = PositionOf(ekf) - Eigen::Vector3d(0.05, -0.03, 0.08);
   const Eigen::MatrixXd p = ekf.state().covariance().Block(0, 3, 0, 3);
   EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // chi2(0.999, 3)
 }
 
-// Cauchy's R / w grows as fast as r^2: were it the noise of the test, any match would support any
-// hypothesis. What agrees is weighed all the same, here by less than 1.
+// Cauchy's R / w grows as fast as r^2: if the test used this noise, any match would support any
+// hypothesis. Inliers are weighted all the same, here by less than 1.
 TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   const RobustLoss loss{LossKind::kCauchy, 1.0};
   const Eigen::Vector3d r(0.001, 0.0, 0.0);
@@ -146,7 +149,7 @@ TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   EXPECT_GT((PositionOf(plain) - PositionOf(told)).norm(), 5e-5);
 }
 
-// What fits must fit by the threshold of its own, whatever the support is asked for.
+// The threshold of the rescue is independent of that of the support.
 TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   int rescued[2];
@@ -160,7 +163,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
-// A sensor that asks for none needs nobody's support: far off, and without a gate, it is used.
+// A sensor without outlier rejection needs no support: its measurement is used even if it is far
+// off, because it has no gate.
 TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   Problem problem = KnownMap();
   problem.sensors[0].outlier_rejection = OnePointRansac{};
@@ -174,8 +178,8 @@ TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 1.0, 1e-12);
 }
 
-// A value that is nearly too large, with a sensor that nobody rejects, takes the update by those
-// that agree with it: there is no corrected state then that the others could fit.
+// A huge value overflows if it is measured. The update with the inliers then fails and is rolled
+// back, so there is no corrected state that the other matches could fit.
 TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   for (const bool overflows : {false, true}) {
     Problem problem = KnownMap();
@@ -197,7 +201,8 @@ TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   }
 }
 
-// By a support that no match meets all are tried and none agrees; all fit the state as it was.
+// With a threshold that no match meets, all hypotheses are tried and none has an inlier. All
+// matches fit the prior state and are rescued.
 TEST(OnePointRansac, AgreesByItsOwnThreshold) {
   Problem problem = KnownMap();
   problem.sensors[0].outlier_rejection = OnePointRansac{.inlier_probability = 1e-9};
@@ -207,8 +212,8 @@ TEST(OnePointRansac, AgreesByItsOwnThreshold) {
   EXPECT_EQ(report.landmarks.rescued, kPoints);
 }
 
-// No match moves a camera that is a consider state, so none explains 0.05 m, 25 times the noise.
-// All join afterwards, by the uncertainty of the camera.
+// No match corrects a camera that is a consider state, so no hypothesis explains 0.05 m, 25 times
+// the noise. All matches are rescued afterwards, because of the uncertainty of the camera.
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {
@@ -227,8 +232,9 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   }
 }
 
-// Points that entered from one camera share its uncertainty. A sensor that holds the camera sees
-// them all 0.1 m aside: one match moves them all, and all agree.
+// Points that were initialised from one camera share its uncertainty. For a sensor whose camera
+// position counts as known, all points are shifted by 0.1 m: one match corrects them all, and all
+// agree.
 TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
   Problem problem = MapSystem(Offset(0.01), {}, 0.3);
   SensorBinding held = problem.sensors[0];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landmarks in the filter: how they enter its state, change there and leave it.
+// Landmarks in the filter: their initialisation, conversion and removal.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -21,7 +21,7 @@ bool IsPoint(const LandmarkEstimate& landmark) {
 
 std::vector<double> Vector(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 
-/// A walk and points before it, and what the camera sees of them at each step.
+/// A camera on a random walk, points in front of it, and the measurements at each step.
 struct Scene {
   std::vector<Vector3d> camera, points;
   Random random{7};
@@ -48,7 +48,7 @@ struct Scene {
   }
 };
 
-/// Point i is seen at steps of its own.
+/// Whether point i is seen at `step`; each point has its own pattern.
 bool Seen(int step, int i) { return (step + 2 * i) % 5 < 3 && step >= i / 2; }
 
 TEST(Landmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
@@ -94,7 +94,7 @@ TEST(Landmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
-/// y = g(r, z, rho) of InverseDepthPixels, anew.
+/// y = g(r, z, rho) of InverseDepthPixels, implemented independently.
 VectorXd InverseObservation(const VectorXd& x) {
   const double u = x[3], v = x[4];
   VectorXd y(6);
@@ -146,7 +146,7 @@ TEST(Landmarks, ASharedAnchorGivesWhatAnchorsOfTheirOwnGive) {
     shared.Process(frame);
     alone.Process(frame);
   }
-  // 3 of the camera; of each landmark 3, and 3 for each anchor: two frames have new ones.
+  // The camera has 3 rows, each landmark 3, and each anchor 3: two frames have new anchors.
   EXPECT_EQ(shared.state().covariance().size(), 3 + 3 * kPoints + 3 * 2);
   EXPECT_EQ(alone.state().covariance().size(), 3 + 6 * kPoints);
   EXPECT_LT((PositionOf(shared) - PositionOf(alone)).norm(), 1e-9);
@@ -168,7 +168,7 @@ TEST(Landmarks, ASharedAnchorGoesWithItsLastLandmark) {
   EXPECT_EQ(ekf.landmarks().size(), 1u);
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
   for (int k = 3; k < 5; ++k) ekf.Process(FrameOf(0.1 * k, {{3, {0.0, 0.1}}}));
-  // 2 has gone with its anchor; 3 has come with one.
+  // Landmark 2 was removed with its anchor; landmark 3 came with a new one.
   EXPECT_EQ(ekf.landmarks().size(), 1u);
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
 }
@@ -206,7 +206,7 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
   for (const bool anchored : {false, true}) {
     Scene scene(kSteps, kPoints);
     LandmarkOptions options = WithPrior();
-    for (int i = 0; i < kKnown; ++i) {  // the last three, for the scale
+    for (int i = 0; i < kKnown; ++i) {  // the last three are known and fix the scale
       const Vector3d& p = scene.points[static_cast<std::size_t>(kPoints - 1 - i)];
       options.known.push_back({kPoints - 1 - i, {p[0], p[1], p[2]}, 0.0});
     }
@@ -230,21 +230,21 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
     }
     ASSERT_GT(converted, 0);
     ASSERT_LT(converted, kPoints - kKnown);
-    // Place and covariance are the ones of before, of those too that were not converted.
+    // Positions and covariances are unchanged, also those of landmarks that were not converted.
     const std::vector<LandmarkEstimate> before = never.landmarks(), after = ekf.landmarks();
     for (std::size_t i = 0; i < before.size(); ++i) {
       EXPECT_LT((before[i].position - after[i].position).norm(), 1e-9);
       EXPECT_LT((before[i].covariance - after[i].covariance).norm(), 1e-9);
     }
     EXPECT_EQ(std::ranges::count_if(after, IsPoint), converted + kKnown);
-    // And it goes on: pixels of landmarks of both representations in one update.
+    // The filter continues: landmarks of both representations are measured in one update.
     for (; k < kSteps; ++k) {
       for (const auto& entry : ekf.Process(frame_at(k)).measurements()) {
         EXPECT_EQ(entry.outcome, Outcome::kAccepted);
       }
     }
     EXPECT_EQ(std::ranges::count_if(ekf.landmarks(), IsPoint), kPoints);
-    // The anchor has gone with the last.
+    // The anchor was removed with its last landmark.
     EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 * (kPoints - kKnown));
     for (const LandmarkEstimate& landmark : ekf.landmarks()) {
       const Vector3d error =
@@ -266,7 +266,7 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
   for (int k = 0; k < 5000; ++k) {
     std::vector<Observation> observations;
     for (int i = 0; i < kInView; ++i) {
-      // One landmark leaves and one comes with every step.
+      // At every step, one landmark leaves and one enters.
       const int id = k + i;
       const Vector3d p(0.03 * id, 0.3 * (id % 3), 2.0 + 0.2 * (id % 4));
       observations.push_back({id, {(p[0] - 0.03 * k) / p[2], p[1] / p[2]}});
@@ -278,8 +278,8 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
     ASSERT_FALSE(ekf.failed());
   }
   EXPECT_GT(converted, 1000);
-  // In view, and two frames on: 12 landmarks of at most three blocks, 6 rows and 7 values each; one
-  // more of each as one enters.
+  // Landmarks remain for two frames after they leave the view: at most 12, each with at most three
+  // blocks, 6 rows and 7 values. While a landmark is initialised, there is one more.
   EXPECT_LE(ekf.landmarks().size(), std::size_t{kInView + 2});
   EXPECT_LE(most_rows, 3 + 6 * (kInView + 3));
   EXPECT_LE(blocks, std::size_t{1 + 3 * (kInView + 3) + 1});
@@ -293,7 +293,7 @@ TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
       {1, {0.0, 0.0, 2.0}, 0.0}, {2, {1.0, 0.0, 2.0}, 0.01}, {3, {0.0, 1.0, 2.0}, 0.0}};
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options, 0.5));
   EXPECT_EQ(ekf.state().covariance().size(), 6);
-  // The camera is at (0.1, -0.2, 0.3).
+  // The true position of the camera.
   const Vector3d r(0.1, -0.2, 0.3);
   for (int k = 0; k < 10; ++k) {
     std::vector<Observation> observations;

@@ -29,7 +29,7 @@ TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   EXPECT_FALSE(ekf.failed());
 }
 
-/// Overflows as soon as it moves.
+/// Motion that overflows in its first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -58,7 +58,7 @@ TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
 }
 
-/// Counts how often it is asked whether a measurement is of use.
+/// Counts the calls of Valid.
 struct Asked : Linear {
   static inline int times = 0;
   using Linear::Linear;
@@ -129,7 +129,7 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// Nor do covariances that are none: what is wrong with them is not the filter's.
+// Nor do invalid covariances: they are a fault of the measurement, not of the filter.
 TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
   const Problem problem = DepthFilter();
   for (const double variance : {std::nan(""), -1e6}) {
@@ -145,12 +145,12 @@ TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
     }
     EXPECT_EQ(ekf.state().values(), before.values());
     EXPECT_EQ(ekf.state().covariance().Dense(), before.covariance().Dense());
-    frame.measurements[0].covariance = {0.0};  // an exact measurement
+    frame.measurements[0].covariance = {0.0};  // zero variance: an exact measurement
     EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome, Outcome::kAccepted);
   }
 }
 
-/// Two numbers, of which only the sum has noise.
+/// Measures x twice, with noise on the sum only.
 struct OfSum : Sensor<Vec<2>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -165,7 +165,8 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
   }
 };
 
-// What S rejects counts as much as what the gate rejects: the sensor's blocks become less certain.
+// A measurement rejected because of S counts as much as one rejected by the gate: the covariance of
+// the sensor's blocks is increased.
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -217,14 +218,14 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   ASSERT_FALSE(report.events.empty());
   EXPECT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
-  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
+  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the other blocks; the rate has its prior again.
   EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
               0.4 * 0.4 / 26.0, 1e-12);
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 0.25);
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements()[0].outcome, Outcome::kAccepted);
 }
 
-// After a second the rate is known to 1 more than its prior; the reset measures it no better.
+// After one second, the variance of the rate exceeds its prior by 1. The reset must not reduce it.
 TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EkfOptions options;
   options.gate = 0.999;
@@ -240,7 +241,7 @@ TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth", "target.depth_rate"), 0.0);
 }
 
-// Filters that carry more than P, and so cannot follow what others make of it.
+// Filters that maintain more than P, and so do not support a change of P from outside.
 template <class Type>
 class WithoutRecovery : public ::testing::Test {};
 using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
@@ -266,7 +267,7 @@ TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
   EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
 }
 
-/// x' = x + w of both blocks, and of neither by the other.
+/// x' = x + w for each of the two blocks, independently.
 struct Pair : Motion<2, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"a"}, Quantity{"b"}};
   template <class T>
@@ -277,7 +278,7 @@ struct Pair : Motion<2, Vec<1>, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 1e-3; }
 };
 
-/// z = a + b, which tells b.
+/// z = a + b, which determines b.
 struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -298,7 +299,8 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// b = z - a: a, which moves with it, is put back to its prior first, and b is correlated with that.
+// b = z - a. Block a has the same motion model, so it is first reset to its prior; b is then
+// correlated with it.
 TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
@@ -331,7 +333,7 @@ struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
 };
 
-// Each half of it is a covariance.
+// The lower and the upper triangle each define a valid covariance.
 TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
@@ -354,7 +356,7 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   problem.priors[0] = {0, {}, {}, "disparity"};
   problem.priors[2] = {2, {}, {}, "inverse_scale"};
   Ekf ekf(problem, {}, StreamsOf(problem));
-  // The scale alone has to wait for a depth.
+  // The scale alone is not sufficient without a depth.
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements()[0].outcome, Outcome::kNotReady);
   const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
@@ -392,7 +394,7 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"), 0.0);
-  // lambda = s / Z with Z = 0.35 as exact, sigma_s = 2/300 at s = 1.
+  // lambda = s / Z with an exact Z = 0.35, sigma_s = 2/300 at s = 1.
   EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
               std::pow(2.0 / 300.0 / 0.35, 2), 1e-15);
 }
@@ -428,11 +430,11 @@ TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
   ASSERT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
-  // 0.25 of the prior and 1 of the acceleration over the second.
+  // 0.25 from the prior and 1 from the acceleration over one second.
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
 }
 
-/// z = x + y, which tells y; y may stay unbound.
+/// z = x + y, which determines y; the role of y is optional.
 struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"},
                                      Quantity{"y", "", "", "", ALIDADE_ROLE_OPTIONAL}};

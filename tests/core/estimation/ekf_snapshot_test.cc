@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a filter says once, or says of its past, is part of what it goes back to.
+// A copy of a filter also contains its memory for one-time warnings and for the last measurement.
 #include <algorithm>
 #include <limits>
 
@@ -9,7 +9,7 @@
 namespace alidade::testing {
 namespace {
 
-/// Stays where it is for a second, and is not finite after more.
+/// Motion that is constant for steps up to one second, and not finite for longer ones.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -19,7 +19,7 @@ struct Breaking : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// One block of known value 1 +- 1, measured directly with the given noise.
+/// One block with the prior 1 +- 1, measured directly with the given noise.
 Ekf OneBlock(double sigma) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});

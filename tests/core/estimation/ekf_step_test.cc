@@ -14,8 +14,8 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Variance of the velocity after a gap of `gap` ns stepped in parts of at most `max_dt_s`. The
-/// acceleration is constant within a part: n parts of one gap add gap^2 / n to 9.
+/// Returns the variance of the velocity after a gap of `gap` ns, in steps of at most `max_dt_s`.
+/// The acceleration is constant within a step: n steps add gap^2 / n to 9.
 double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
   EkfOptions options;
   options.max_dt_s = max_dt_s;
@@ -40,7 +40,7 @@ TEST(EkfStep, TheLongestStepMayBeOfAnySize) {
   for (const double longest : {infinity, 1e300, 1e10, 9.3e9}) {
     EXPECT_NEAR(VelocityVarianceAfter(2'000'000'000, longest), 9.0 + 4.0, 1e-12) << longest;
   }
-  // Timestamps are of whole nanoseconds: so are the parts.
+  // Timestamps are whole nanoseconds, and so are the steps.
   EXPECT_NEAR(VelocityVarianceAfter(4, 1e-12) - 9.0, 0.0, 1e-12);
 }
 
@@ -55,7 +55,7 @@ struct Stretching : Motion<1, Vec<1>> {
 };
 
 TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
-  // F P F' = 1e20 * 1e300; the point next to it steps without trouble.
+  // F P F' = 1e20 * 1e300 overflows; the other point has a valid step.
   Problem problem = MovingPoint();
   AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
   Ekf ekf(problem, {}, {});
@@ -71,7 +71,7 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
 }
 
 TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
-  // 1e20 * 1e287 is finite, though the bound that spares the copy is not.
+  // 1e20 * 1e287 is finite. The bound that decides whether a backup copy is needed overflows.
   Problem problem;
   AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
   Ekf ekf(problem, {}, {});
@@ -81,7 +81,7 @@ TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "q.x", "q.x") / 1e307, 1.0, 1e-12);
 }
 
-/// The angle grows by 1 rad a step; a quaternion turns about z, and its length by 0.1 %.
+/// The angle grows by 1 rad per step. The quaternion turns about z, and its norm grows by 0.1 %.
 struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}, Quantity{"q"}};
   template <class T>
@@ -93,7 +93,7 @@ struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// z = a + pi, which tells a.
+/// z = a + pi, which determines a.
 struct Opposite : Sensor<Angle, Angle> {
   static constexpr std::array kRoles{Quantity{"a", "rad"}};
   static constexpr Quantity kMeasurement{"z", "rad"};
@@ -154,7 +154,7 @@ TEST(EkfStep, ABlockThatStartsFromAMeasurementIsOnItsManifold) {
   EXPECT_NEAR(ValueOf(ekf.state(), "t.a"), kPi - 1.0, 1e-12);
 }
 
-/// z = a + 6 rad, and leaves it where that falls.
+/// z = a + 6 rad, not wrapped.
 struct Unwrapped : Opposite {
   template <class T>
   bool Predict(const T* a, T* z) const {
@@ -177,7 +177,7 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   }
 }
 
-// FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update takes the short way round.
+// FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update uses the shorter direction.
 TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   Problem problem = Turn();
   AddSensor(problem, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
@@ -197,7 +197,8 @@ TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   }
 }
 
-// Said of one step in parts, and then of each that takes at least twice as many.
+// The event is reported for the first gap in several steps, and then for each gap with at least
+// twice as many.
 TEST(Ekf, AGapInPartsIsNotedWhereItTakesTwiceAsManyAsBefore) {
   EkfOptions options;
   options.max_dt_s = 0.1;

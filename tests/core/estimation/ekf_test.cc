@@ -14,8 +14,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Textbook Kalman filter of MovingPoint in full: x' = F x, P' = F P F' + G q G', and an update
-/// by the inverse of S.
+/// Textbook Kalman filter of MovingPoint: x' = F x, P' = F P F' + G q G', and an update with the
+/// inverse of S.
 struct Textbook {
   Eigen::Vector2d x{1.0, -0.5};
   Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();
@@ -75,7 +75,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
       measurements(problem, per_measurement, StreamsOf(problem));
   Random random(12);
   for (int k = 0; k < 200; ++k) {
-    // Two measurements of the first stream at one timestamp, one of the second.
+    // Two measurements of the first stream with the same timestamp, one of the second.
     const Frame frame =
         FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
     for (Ekf* ekf : {&joint, &sensors, &measurements}) ekf->Process(frame);
@@ -120,7 +120,7 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
     passed += report.measurements()[0].outcome == Outcome::kAccepted ? 1 : 0;
   }
-  // 5 sigma of a binomial share.
+  // Tolerance: 5 sigma of a binomial share.
   EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
 }
 
@@ -157,8 +157,8 @@ struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// Two updates of three rows each, by Joseph's form: the gain of c is zero for all rows where c is a
-// consider state, for those of the one sensor where that one considers it.
+// Two updates of three rows each, in Joseph form. If c is a consider state, its gain is zero for
+// all rows; if only one sensor considers c, for the rows of that sensor.
 TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   for (const bool by_role : {false, true}) {
     Problem problem;
@@ -196,7 +196,7 @@ TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   }
 }
 
-/// z = x, which implies x where it is positive.
+/// z = x. The implied x exists only if z is positive.
 struct Implies : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -218,7 +218,7 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// What cannot have come from anywhere tells of the measurement, not of the filter.
+// A measurement without an implied state is invalid; it is not a divergence of the filter.
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
@@ -252,7 +252,7 @@ TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
 }
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
-  // z = lambda Z, lambda a consider state; Schmidt's gain by hand.
+  // z = lambda Z with lambda as a consider state; the Schmidt gain is computed by hand.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   problem.sensors[0].roles[1].mode = RoleMode::kConsider;
@@ -293,7 +293,7 @@ TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
   Ekf ekf(problem, {}, StreamsOf(problem));
   const double d = 80.0, bf = 26.0;
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, d}}));
-  // H1 = -d^2 / BF; the innovation stays at the prediction.
+  // H1 = -d^2 / BF, evaluated at the measurement; the innovation is evaluated at the prediction.
   const double jacobian = -d * d / bf;
   EXPECT_NEAR(report.measurements()[0].s[0], jacobian * jacobian * 0.01 + 1.0, 1e-9);
   EXPECT_NEAR(report.measurements()[0].innovation[0], d - bf / 0.35, 1e-12);
@@ -355,7 +355,7 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
                 "the frame at 0.500000 s is older than the state at 1.000000 s: its measurements "
                 "are not used; if it came late, set `out_of_sequence: {policy: rollback, ...}` or, "
                 "in C++, process frames by alidade::Rollback"});
-  EXPECT_EQ(stale(0.6), none);  // of the same run
+  EXPECT_EQ(stale(0.6), none);  // same episode
   EXPECT_EQ(stale(1.1), none);
   EXPECT_EQ(stale(1.0).size(), 1u);
 }
@@ -405,7 +405,7 @@ struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// z = x^2 at x = 2: H = (4, 0), S = 17. The two roles are as many as the states.
+// z = x^2 at x = 2: H = (4, 0), S = 17. The number of roles equals that of the states.
 TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
@@ -425,7 +425,7 @@ TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   }
 }
 
-/// z = p - r, a sensor of landmarks.
+/// z = p - r: a sensor of landmarks.
 struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"position"},
                                      Quantity{"landmark", "", "", "", ALIDADE_ROLE_LANDMARK}};
@@ -441,8 +441,8 @@ struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// p ~ N(0, 4), r ~ N(0, 1), z = 6: S = 6, so p = 4 and r = -1. The blocks fill the state in another
-// order than the roles.
+// p ~ N(0, 4), r ~ N(0, 1), z = 6: S = 6, so p = 4 and r = -1. The order of the blocks in the state
+// differs from that of the roles.
 TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   Problem problem;
   AddMotion(problem, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
@@ -459,8 +459,8 @@ TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   }
 }
 
-// P R / (P + R) is R but for 1e-14 of it; the difference P - P^2 / (P + R) has the last digit of P,
-// 1.5 % of R.
+// P R / (P + R) equals R up to 1e-14. The difference P - P^2 / (P + R) is accurate only to the last
+// digit of P, 1.5 % of R.
 TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
   for (const int n : {3, 20}) {
     Problem problem;

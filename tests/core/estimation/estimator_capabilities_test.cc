@@ -78,7 +78,7 @@ bool Makes(const Problem& problem) {
   return true;
 }
 
-/// Whether the filter is made from exactly the problems that its kCapabilities allows.
+/// Expects that the filter accepts exactly the problems that its kCapabilities allows.
 template <class Filter>
 void ExpectAsSupported() {
   const EstimatorCapabilities& can = Filter::kCapabilities;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Data that bring their own calibration: models read it where the config leaves it out. A config
-// that tells another is refused.
+// Data with their own calibration: a model reads it if the config omits it. A config with a
+// different calibration is refused.
 #include "support/program.h"
 
 namespace alidade {
@@ -22,20 +22,21 @@ class CalibrationCli : public testing::ProgramTest {
     if (!setting.empty()) arguments.insert(arguments.end(), {"--set", setting});
     return Call(arguments);
   }
-  /// The estimates of a config that runs.
+  /// Returns the estimates of a config, whose run must succeed.
   std::string Estimates(const std::string& config, const std::string& setting = "") const {
     const Outcome outcome = Run(config, setting);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.code == 0 ? Read("out/ekf/estimates.csv") : "";
   }
 
-  /// Disparities of a target at 0.3 m before a pair with f B = 26 px m, below `comment`.
+  /// Writes disparities of a target at 0.3 m, seen by a stereo pair with f B = 26 px m, below
+  /// `comment`.
   void WriteTable(const std::string& comment) const {
     std::string text = comment + "t_s,d\n";
     for (int k = 0; k < 20; ++k) text += std::to_string(0.1 * k) + ",86.5\n";
     Write("table.csv", text);
   }
-  /// A config of the table, with `keys` of its stereo sensor.
+  /// Writes a config that reads the table, with `keys` of its stereo sensor.
   void WriteConfig(const std::string& keys) const {
     Write("depth.yaml", testing::kTargetConfig +
                             "sensors:\n  stereo: {model: stereo_disparity, stream: disparity, "
@@ -45,7 +46,7 @@ class CalibrationCli : public testing::ProgramTest {
                             "estimators: {ekf: {type: ekf}}\n");
   }
 
-  /// Four points at rest before a camera at rest, in three frames.
+  /// Writes tracks of four points at rest, seen by a camera at rest, in three frames.
   void WriteTracks(const std::string& calibration) const {
     std::string tracks, times = "frame,t_s\n";
     for (int frame = 0; frame < 3; ++frame) {
@@ -64,7 +65,7 @@ class CalibrationCli : public testing::ProgramTest {
     fs::remove(folder_ / "drive/calibration.yaml");
     if (!calibration.empty()) Write("drive/calibration.yaml", calibration);
   }
-  /// A config of the tracks, with `root` at its root and `keys` of its sensor.
+  /// Writes a config that reads the tracks, with `root` at its root and `keys` of its sensor.
   void WriteSlam(const std::string& root, const std::string& keys) const {
     Write("slam.yaml", R"(alidade: 1
 state:
@@ -116,7 +117,7 @@ TEST_F(CalibrationCli, ATableOfAnotherCameraIsRefused) {
                        "the data, 400 in "))
       << other.err;
   EXPECT_TRUE(Contains(other.err, "table.csv:1:15" + kRemedy)) << other.err;
-  // Another last digit is the same camera; 2e-6 is not.
+  // A relative difference of 1e-6 is the same camera; 2e-6 is not.
   EXPECT_EQ(Run("depth.yaml", "sensors.stereo.focal_px=400.0003").code, 0);
   EXPECT_EQ(Run("depth.yaml", "sensors.stereo.focal_px=400.0008").code, 78);
   const std::string ignoring = Estimates("depth.yaml", "source.calibration=ignore");

@@ -89,12 +89,12 @@ source:
 
 class BundleTracksCli : public BundleCli {
  protected:
-  /// `data/` as `simulate` writes it, of kScene.
+  /// Writes the folder `data/` of kScene with `simulate`.
   void SetUp() override {
     BundleCli::SetUp();
     Simulate("");
   }
-  /// `stereo`: lines of the source.
+  /// Simulates kScene; `stereo`: lines of the source.
   void Simulate(const std::string& stereo, const Arguments& more = {}) const {
     std::string scene = kScene;
     Write("scene.yaml", scene.replace(scene.find("  STEREO\n"), 9, stereo));
@@ -109,7 +109,7 @@ class BundleTracksCli : public BundleCli {
     all.insert(all.end(), more.begin(), more.end());
     return Call(all);
   }
-  /// The poses of `data/truth.tum` up to `count`, their times and x moved.
+  /// Returns the first `count` poses of `data/truth.tum` with shifted times and x.
   std::string Start(int count, double dt_s, double dx_m) const {
     std::istringstream truth(Read("data/truth.tum"));
     std::string text, line;
@@ -125,8 +125,8 @@ class BundleTracksCli : public BundleCli {
   }
 };
 
-/// sqrt(2 (1 - unknowns / residuals)) px is left of the noise of 1 px in u and v; its standard
-/// deviation is 2 % of that, for there are 1000 residuals more than unknowns.
+/// Noise of 1 px in u and v leaves residuals of sqrt(2 (1 - unknowns / residuals)) px. Their
+/// standard deviation is 2 % of that, because there are 1000 residuals more than unknowns.
 TEST_F(BundleTracksCli, AdjustsTracks) {
   Write("start.tum", Start(15, 0.0, 0.05));
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
@@ -142,8 +142,8 @@ TEST_F(BundleTracksCli, AdjustsTracks) {
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 15);
 }
 
-/// A pair of 0.2 m sees points 30 to 45 m away, by a disparity of 2 to 4 px with a noise of 1.4 px;
-/// rays from 5 m of path tell their depth to about 1.5 %.
+/// A pair with a baseline of 0.2 m sees points 30 to 45 m away: a disparity of 2 to 4 px with a
+/// noise of 1.4 px. Rays over 5 m of path determine their depth to about 1.5 %.
 TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
   Simulate("  measures: stereo\n",
            {"--set", "camera.baseline_m=0.2", "--set",
@@ -173,7 +173,8 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
             Json("start/bundle.json").root().At("rms_after_px").Number());
 }
 
-/// The corner is beyond what this lens distorts a ray to; two rays place the point all the same.
+/// The corner is beyond the radius up to which this lens distorts a ray. Two rays still place the
+/// point.
 TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
   Write("data/calibration.yaml",
         "camera: {model: radtan, width: 640, height: 480, fx: 300, fy: 300, cx: 320, cy: 240, "
@@ -208,8 +209,8 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   EXPECT_TRUE(Contains(none.err, "start.tum: no pose has the time of a frame")) << none.err;
 }
 
-/// Without timestamps the k-th pose is that of frame k, whatever its time; so from standard input
-/// too, whatever lies in the working folder.
+/// Without timestamps the k-th pose belongs to frame k, whatever its time. The same holds for
+/// standard input, whatever files the working folder has.
 TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoTimestamps) {
   Write("start.tum", Start(5, 100.0, 0.0));
   Write("tracks.csv", Read("data/tracks.csv"));
@@ -260,8 +261,8 @@ TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
 }
 
-/// A point in the plane of its only camera; one so far away that its pixels are no numbers; nothing
-/// at all.
+/// Three problems: a point in the plane of its only camera; a point so far away that its pixels are
+/// not finite; an empty problem.
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :
@@ -276,7 +277,7 @@ TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   }
 }
 
-/// One observation in four is of a point behind its camera; the formula of BAL says what they cost.
+/// One observation in four is of a point behind its camera. The formula of BAL defines their cost.
 TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   BundleFile file = testing::BundleOnBothSides();
   testing::Disturb(file.problem);
@@ -295,7 +296,7 @@ TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   EXPECT_LT(number("rms_after_px"), std::sqrt(0.5)) << "the noise";
 }
 
-/// A second point lies in the plane of the camera: it has no pixel, and is counted.
+/// A second point lies in the plane of the camera: it has no pixel and is counted.
 TEST_F(BundleCli, CountsWhatIsLeftOut) {
   Write("p.txt", "1 2 2\n0 0 1 1\n0 1 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n0.1\n0.1\n-3\n1\n1\n0\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
@@ -335,7 +336,7 @@ TEST_F(BundleCli, HoldsTheScale) {
   EXPECT_NEAR(Json("out/bundle.json").root().At("extent_after").Number() / before, 1.0, 1e-12);
 }
 
-/// The derivative of this pixel by k2 is beyond all numbers. Ceres writes half a page of it.
+/// The derivative of this pixel with respect to k2 overflows. Ceres reports it in half a page.
 TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   Write("p.txt", "1 1 1\n0 0 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n1e80\n0.1\n-1\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
@@ -344,7 +345,7 @@ TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   EXPECT_FALSE(Exists("out"));
 }
 
-/// On the way more than five steps in a row cannot be computed; a smaller trust region mends that.
+/// Along the way more than five consecutive steps cannot be computed; a smaller trust region helps.
 TEST_F(BundleCli, GoesOnAfterStepsThatCannotBeComputed) {
   for (const int points : {28, 36}) {
     BundleFile file = testing::BundleOnBothSides(3, points);

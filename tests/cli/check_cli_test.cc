@@ -41,7 +41,7 @@ TEST_F(CheckProgram, SaysWhichJacobiansAreAnalytic) {
 }
 
 TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
-  // Time enough for nothing: the first call is too late.
+  // The timeout is so short that the first call exceeds it.
   const Outcome outcome = Call(With(kStereo, {"--states", "100000", "--timeout", "0.01"}));
   EXPECT_EQ(outcome.code, 1) << outcome.out;
   EXPECT_TRUE(Contains(outcome.out, "\n  FAIL ")) << outcome.out;

@@ -77,7 +77,7 @@ TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
                   "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})
                 .code,
             0);
-  // Values stay as they are, and so does the line that the record shows.
+  // Values stay unchanged, and so does the command line in the record.
   EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
                   "--set=source.sigma_disparity_px=0"})
                 .code,
@@ -85,7 +85,7 @@ TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
   EXPECT_TRUE(Exists("b_c/run.json"));
   EXPECT_TRUE(Contains(Read("b_c/config.resolved.yaml"), "sigma_disparity_px: 0"));
   EXPECT_TRUE(Contains(Read("b_c/timing.json"), "--no_figures"));
-  // What follows `--` is no option.
+  // Arguments after `--` are not options.
   Write("--my_config.yaml", testing::kDepthConfig);
   EXPECT_EQ(Call({"run", "-o", "d", "--no-figures", "--", "--my_config.yaml"}).code, 0);
 }
@@ -101,7 +101,7 @@ TEST_F(Cli, RunPrintsTheComparisonAndWhereItWrote) {
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_TRUE(Contains(run.out, "rmse target.depth [mm]")) << run.out;
   EXPECT_TRUE(Contains(run.out, "wrote runs/config\n")) << run.out;
-  // No terminal: no progress, no colour.
+  // Without a terminal the program prints neither progress nor colour.
   EXPECT_EQ(run.err, "");
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet", "--no-figures"}).out, "");
@@ -120,7 +120,7 @@ TEST_F(Cli, SetAndSeedReplaceKeysOfTheConfig) {
   EXPECT_EQ(rmse({"--seed", "1"}), base);
   EXPECT_NE(rmse({"--seed", "2"}), base);
   EXPECT_EQ(rmse({"--set", "source.seed=2"}), rmse({"--seed", "2"}));
-  // Without noise the depth is better.
+  // Without noise the depth is more accurate.
   EXPECT_LT(rmse({"--set", "source.sigma_disparity_px=0", "--set=source.sigma_edge_px=0"}), base);
   EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "sigma_disparity_px: 0"));
 }
@@ -162,7 +162,7 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
   EXPECT_EQ(run.code, 77) << run.err;
   EXPECT_TRUE(Contains(run.err, plugin.string())) << run.err;
   EXPECT_EQ(Call({"plugins", "list", "--plugin-path", plugin.string()}).code, 77);
-  // These tell of it and of the rest.
+  // These commands report the refused plugin and continue with the others.
   const Outcome where = Call({"plugins", "where", "--plugin-path", "alidade_constant.so"});
   EXPECT_EQ(where.code, 0) << where.err;
   EXPECT_TRUE(Contains(where.out, plugin.string() + " (given): 0 found, 1 refused\n")) << where.out;
@@ -206,7 +206,7 @@ TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   EXPECT_EQ(Call({"--version"}, "/dev/full").code, 74);
 }
 
-/// A run fed by a pipe, and the test at its other end.
+/// A run that reads a pipe, and the test at the other end of the pipe.
 class PipedRun : public testing::ProgramTest {
  protected:
   void SetUp() override {
@@ -231,7 +231,7 @@ class PipedRun : public testing::ProgramTest {
 // FAULTS 90
 TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   ::kill(run_, SIGINT);
-  Feed("0.3,83\n");  // a signal just before it waits for data is seen with the next row
+  Feed("0.3,83\n");  // a signal just before the run waits for data is handled at the next row
   const Outcome run = Wait(run_);
   EXPECT_EQ(run.code, 75) << run.err;
   const Config record = Json("out/run.json");
@@ -257,7 +257,7 @@ TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
 TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
   const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
-  // It handles SIGINT, the second signal of the mask, and sleeps: in opening the pipe.
+  // The run handles SIGINT (bit 1 of the mask) and sleeps in opening the pipe.
   const auto waits = [&] {
     const std::string status = testing::ReadText("/proc/" + std::to_string(run) + "/status");
     const std::size_t caught = status.find("SigCgt:\t");
@@ -303,7 +303,7 @@ TEST_F(Cli, TimingHasTheWholeCommand) {
 }
 
 TEST_F(Cli, StopsBetweenFramesAtASignal) {
-  // 300000 frames: seconds of work.
+  // 300000 frames take seconds.
   const pid_t run = Start(
       {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
   ASSERT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
@@ -314,7 +314,7 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
-// As under nohup. A second signal would end it at once.
+// The same as under nohup. A second signal would end the run at once.
 TEST_F(Cli, AHangUpThatIsIgnoredStopsNothing) {
   before_ = "trap '' HUP";
   const pid_t run = Start(
@@ -378,7 +378,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
 }
 
 TEST_F(Cli, PluginsPrintsJson) {
-  // JSON is YAML too.
+  // JSON is also YAML.
   const auto parse = [](const std::string& json) {
     return Config::FromText("list:\n  " + json, "json");
   };

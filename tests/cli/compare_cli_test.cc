@@ -23,7 +23,7 @@ TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
   EXPECT_FALSE(Contains(Call({"compare", "out"}).out, "not finite"));
   std::istringstream rows(Read("out/ekf/estimates.csv"));
   std::string text;
-  int count = -1;  // behind the header
+  int count = -1;  // after the header
   for (std::string row; std::getline(rows, row); ++count) {
     const std::size_t first = row.find(','), second = row.find(',', first + 1);
     if (count == 3 || count == 7) row.replace(first + 1, second - first - 1, "nan");
@@ -43,12 +43,12 @@ class CompareCli : public testing::ProgramTest {
     ProgramTest::SetUp();
     if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) GTEST_SKIP() << "no batch";
   }
-  /// A comparison as JSON, without the clocks.
+  /// Returns a comparison as JSON, without its times.
   static std::string WithoutClock(const std::string& json) {
     const std::regex clock(R"=(\n *"(time_us|cpu_us|cpu_us.start)": (\{[^}]*\},?|[^\n]*))=");
     return std::regex_replace(json, clock, "");
   }
-  /// Disparities of a target at 0.3 m, at 1 to 20 tenths of a second.
+  /// Writes disparities of a target at 0.3 m, from 0.1 s to 2 s in steps of 0.1 s.
   void WriteTable(const std::string& name, const std::string& fifth = "86.5") const {
     std::string text = "t_s,d\n";
     for (int k = 1; k <= 20; ++k) {
@@ -87,7 +87,7 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
 }
 
-// Neither errors from truth nor an end: the run is kept, and says why.
+// The run has neither errors from the truth nor an end: it is kept and reports why.
 TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   const auto compare = [&](const std::string& rows, const std::string& folder) {
     Write("bad.csv", "t_s,d,z\n" + rows);
@@ -104,7 +104,7 @@ TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   EXPECT_TRUE(Contains(Read("blind/run.json"), "\"ok\""));
 }
 
-// What a run shows of itself while it runs, its folder tells later: covariances too.
+// A run and its folder show the same comparison, covariances included.
 TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "out", "--quiet"}).code, 0);
   const Outcome compared = Call({"compare", "out", "--json"});
@@ -157,7 +157,7 @@ TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   EXPECT_TRUE(Contains(damaged.err, "b: has other measurements than 'a'")) << damaged.err;
 }
 
-// FAULTS 86: the same numbers in another text are the same data.
+// FAULTS 86: the same numbers in a different notation are the same data.
 TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   WriteTable("one.csv");
   WriteTable("other.csv", "+865e-1");
@@ -166,7 +166,7 @@ TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   EXPECT_EQ(Call({"compare", "a", "b", "--reference", "a/ekf"}).code, 0);
 }
 
-// FAULTS 86: a run that saw less.
+// FAULTS 86: a run that processed fewer data.
 TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
   WriteTable("one.csv");
   Write("other.csv", Read("one.csv").substr(0, Read("one.csv").find("1.500000")));
@@ -196,7 +196,7 @@ TEST_F(CompareCli, WarnsOfSettingsAndTruthsThatDiffer) {
 
 TEST_F(CompareCli, CovariancesOfARunAreWrittenWhereAskedFor) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures", "--covariances"}).code, 0);
-  // 152 frames, the lower triangle of 3 x 3.
+  // 152 frames with the lower triangle of a 3 x 3 matrix.
   EXPECT_EQ(Read("a/ekf/covariance.bin").size(), 152u * 6u * 8u);
   const Outcome compared = Call({"compare", "a", "--reference", "ekf"});
   EXPECT_EQ(compared.code, 0) << compared.err;
@@ -221,21 +221,22 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   EXPECT_TRUE(Contains(compared.err, "error: " + words)) << compared.err;
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
-  // Errors from truth need no batch, but what is compared with it is withheld.
+  // Errors from the truth need no batch, but the comparison with the batch is withheld.
   const Outcome truth =
       Call({"compare", "config.yaml", "-o", "two", "--no-decomposition", "--set", failing});
   EXPECT_EQ(truth.code, 1);
   EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
-  // Without a gate that of what the filter accepted is of all measurements too, and stands in.
+  // Without a gate the batch of the accepted measurements uses all measurements, so it replaces the
+  // failed one.
   const Outcome added = Call({"compare", "config.yaml", "-o", "three", "--set", failing});
   EXPECT_EQ(added.code, 79) << "that of the run";
   EXPECT_FALSE(Contains(added.out, words)) << added.out;
   EXPECT_TRUE(Contains(added.out, "to batch_accepted")) << added.out;
-  // A finished folder says the same.
+  // A finished folder gives the same exit code.
   EXPECT_EQ(Call({"compare", "out", "--reference", "batch"}).code, 1);
 }
 
-// FAULTS 85: of several folders one batch is enough, whichever comes first.
+// FAULTS 85: with several folders one batch is enough, in whichever folder.
 TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   const auto run = [this](const std::string& folder, const std::string& batch) {
     return Call({"run", "config.yaml", "-o", folder, "--no-figures", "--quiet", "--covariances",
@@ -251,7 +252,7 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   }
 }
 
-// A window linearises again, and its later data end with it.
+// A fixed-lag smoother relinearises, and its data end with its window.
 TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
   const std::string window = "estimators.window={type: fixed_lag, lag_s: 0.5";
   const Outcome smoothed =
@@ -282,7 +283,7 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   EXPECT_FALSE(Exists("two"));
 }
 
-// Of a run that its data ended, what was there until then is compared.
+// If the data end a run, the comparison uses the frames up to that time.
 TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
   WriteTable("table.csv", "no_number");
   const Outcome compared = Call({"compare", "table.yaml", "-o", "out"});
@@ -293,7 +294,7 @@ TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
   EXPECT_EQ(Call({"compare", "out"}).code, 1) << "no batch came to its end";
 }
 
-// A run tells it of itself, and its folder of it.
+// Both the run and its folder report the rejection recovery.
 TEST_F(CompareCli, TellsOfRejectionRecovery) {
   WriteTable("table.csv");
   std::string text = Read("table.csv");
@@ -338,14 +339,14 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
   const Node anees = estimators.At("ekf").At("anees").At("target");
   EXPECT_EQ(anees.At("timestamps").Number(), 61);
   EXPECT_EQ(std::ssize(anees.At("mean").Items()), 61);
-  // Six degrees of freedom: 1.237 and 14.449 of the tables.
+  // Chi-square with six degrees of freedom: tabulated 1.237 and 14.449.
   EXPECT_NEAR(anees.At("low").Items()[0].Number(), 1.237 / 6.0, 1e-3);
   EXPECT_NEAR(anees.At("high").Items()[0].Number(), 14.449 / 6.0, 1e-3);
   ASSERT_EQ(Call(compare("2", "two")).code, 0);
   EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
 }
 
-/// The numbers of a column of a csv file without quotes, empty cells left out.
+/// Returns the numbers of a column of a csv file without quotes, without the empty cells.
 std::vector<double> ColumnOf(const std::string& csv, const std::string& name) {
   std::istringstream rows(csv);
   std::vector<double> numbers;
@@ -365,7 +366,7 @@ std::vector<double> ColumnOf(const std::string& csv, const std::string& name) {
   return numbers;
 }
 
-// What is drawn timestamp by timestamp, taken together, is what the metrics say of whole runs.
+// The values drawn for each timestamp, averaged over time, equal the metrics of whole runs.
 TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
   const Outcome compared = Call({"compare", "config.yaml", "--runs", "3", "--set",
                                  "source.duration_s=2", "--jobs", "1", "-o", "out"});
@@ -373,7 +374,7 @@ TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
   const std::string csv = Read("out/over_time.csv");
   const Config json = Json("out/compare.json");
   const Node ekf = json.root().At("estimators").At("ekf"), values = ekf.At("values");
-  // Of three values a <= b <= c the quantiles are a + 0.1 (b - a), b and b + 0.9 (c - b).
+  // The quantiles of three values a <= b <= c are a + 0.1 (b - a), b and b + 0.9 (c - b).
   const auto of = [&](const char* what) {
     return values.At("rmse:target.depth").At(what).Number();
   };
@@ -405,7 +406,7 @@ TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
     EXPECT_TRUE(Contains(html, std::string("gnuplot figures/") + name + ".gp")) << name;
     EXPECT_TRUE(Contains(files, std::string("figures/") + name + ".svg")) << files;
   }
-  // CPU time of a batch, and of the filter that it starts from.
+  // CPU time of a batch alone, and with the filter that it starts from.
   const std::string csv = Read("out/cost.csv");
   const auto own = ColumnOf(csv, "cpu_us"), all = ColumnOf(csv, "cpu_us.all");
   ASSERT_EQ(own.size(), all.size());
@@ -413,7 +414,7 @@ TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
   EXPECT_FALSE(Contains(Read("out/compare.tex"), "rule"));
 }
 
-// The first run is made whatever the budget.
+// The first run is made, whatever the budget is.
 TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
   const Outcome compared =
       Call({"compare", "config.yaml", "--runs", "5", "--first-seed", "11", "--jobs", "1",

@@ -16,7 +16,7 @@ using testing::Contains;
 using testing::Outcome;
 using Cli = testing::ProgramTest;
 
-/// Poses on a half circle of radius `radius`, a row each 0.1 s from `t0` on.
+/// Returns poses on a half circle of radius `radius`, every 0.1 s from `t0`.
 std::string HalfCircle(double radius, double t0 = 0.0) {
   std::string text = "# t x y z qx qy qz qw\n";
   for (int i = 0; i <= 30; ++i) {
@@ -58,7 +58,7 @@ TEST_F(EvalCli, FlagsOfEvoMeanWhatTheyMeanInEvo) {
   EXPECT_EQ(align({"-s"}), "scale");
   EXPECT_EQ(align({"-as"}), "sim3");
   EXPECT_EQ(align({"--align"}), "se3");
-  EXPECT_EQ(align({"--align"}, true), "se3");  // takes no value
+  EXPECT_EQ(align({"--align"}, true), "se3");  // the option has no value
   EXPECT_EQ(align({"--align", "--correct_scale"}, true), "sim3");
   EXPECT_EQ(align({"--align_origin"}), "origin");
   EXPECT_EQ(align({"--align-origin"}), "origin");
@@ -123,8 +123,8 @@ TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
   EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
 }
 
-/// Worked by hand: t = 0, 1, 2, 3 at x = 0, 1, 2, 3 against t = 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The
-/// pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
+/// Calculated by hand: the reference has t = 0, 1, 2, 3 at x = 0, 1, 2, 3, the estimate t = 0, 1,
+/// 1, 2 at x = 0, 1, 1.5, 2. The pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
 ///
 ///   ATE errors 0, 0, 0.5, 0                                   rmse 0.25
 ///   RPE of steps 1, 0, 1 against 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)
@@ -261,7 +261,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
             "two.tum: 2 poses to align; expected 3 or more");
   EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
   EXPECT_FALSE(evaluations.Items()[1].Find("error"));
-  // Of a single one there is nothing to print.
+  // A single estimate prints nothing.
   const Outcome alone = Call({"eval", "truth.tum", "two.tum", "-a"});
   EXPECT_EQ(alone.code, 65);
   EXPECT_EQ(alone.out, "");
@@ -310,10 +310,10 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
               metrics.At("rmse:cam.orientation").Number(), 1e-9);
   EXPECT_NEAR(one.At("nis").At("pixels").At("mean").Number(),
               metrics.At("nis.mean:pixels").Number(), 1e-12);
-  // The first pose is known exactly, and has none.
+  // The first pose is known exactly, so it has no NEES.
   EXPECT_EQ(one.At("nees_position").At("poses").Integer(0, 1000), 149);
   EXPECT_TRUE(one.At("nees_orientation").Find("mean"));
-  // A run alone is compared with its own truth.
+  // A run without another folder is compared with its own truth.
   const auto text = [&](const Arguments& arguments) {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -328,7 +328,7 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
 }
 
-/// A robot in the plane, whose fixes are wrong by a known amount.
+/// A robot in the plane, with position fixes that have a known error.
 const std::string kPlanarConfig = R"(alidade: 1
 state:
   robot: {model: planar, input: {stream: odometry}, noise: {speed: 0.05, turn_rate: 0.05},
@@ -343,7 +343,7 @@ source:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// On a circle of 5 m at 1 m/s, more than once around.
+/// Returns a table of a drive on a circle of 5 m at 1 m/s, more than one turn.
 std::string PlanarDrive() {
   std::string text = "t_s,v,o,gx,gy,tx,ty,th\n";
   for (int i = 0; i <= 400; ++i) {
@@ -377,7 +377,7 @@ TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
               metrics.At("rmse:robot.heading").Number(), 1e-9);
   EXPECT_TRUE(one.At("nis").Find("gps"));
 
-  // NEES of the files, written out.
+  // NEES of the files, calculated here.
   const Trajectory truth = ReadTrajectory(folder_ / "planar/truth.tum");
   const Trajectory ekf = ReadTrajectory(folder_ / "planar/ekf/trajectory_covariance.tum");
   ASSERT_EQ(truth.size(), ekf.size());
@@ -398,7 +398,7 @@ TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
   EXPECT_NEAR(one.At("nees_orientation").At("mean").Number(), heading / ekf.size(), 1e-9);
   EXPECT_TRUE(Contains(Call({"eval", "planar"}).out, "NEES position (2 dof) "));
 
-  // Simulated data have the true poses too.
+  // Simulated data also contain the true poses.
   ASSERT_EQ(Call({"simulate", "planar.yaml", "-o", "data"}).code, 0);
   EXPECT_EQ(Read("data/truth.tum"), Read("planar/truth.tum"));
 }

@@ -33,7 +33,7 @@ TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
   const Outcome both = Call({"explain", "config.yaml"});
   EXPECT_TRUE(Contains(both.out, "estimated  depth_rate        0 +- 0.5\n")) << both.out;
   EXPECT_FALSE(Contains(both.out, "truth not used")) << both.out;
-  // Stereo alone leaves the template out: its truth is there, but of no use.
+  // Stereo alone omits the template: its truth exists but is not used.
   const Outcome stereo =
       Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
   EXPECT_EQ(stereo.code, 0) << stereo.err;
@@ -85,7 +85,7 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome none = Call({"explain", "config.yaml"});
   EXPECT_FALSE(Contains(none.out, "constant: ")) << none.out;
   EXPECT_FALSE(Contains(none.out, "no effect for")) << none.out;
-  // 3.3 +- 0.5 in the config.
+  // The config has 3.3 +- 0.5.
   const Outcome one =
       Call({"explain", "config.yaml", "--set", "state.template.constant=[inverse_distance]"});
   for (const char* part : {"inverse_distance  3.3, exact\n",
@@ -98,7 +98,7 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome considered =
       Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
   EXPECT_TRUE(Contains(considered.out, "in a row; no effect for stereo\n")) << considered.out;
-  // Stereo sees nothing but a constant block.
+  // Stereo depends only on a constant block.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.constant=[depth, depth_rate]"});
   EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; no effect for stereo\n"))

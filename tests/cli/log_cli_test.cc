@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the program says while it works.
+// Messages of the program while it runs.
 #include "support/program.h"
 
 namespace alidade {
@@ -31,7 +31,7 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
     EXPECT_EQ(Contains(run.err, "info: source: streams disparity, disparity_all, "), info)
         << run.err;
     EXPECT_EQ(Contains(run.err, "debug: plugin loaded: "), debug) << run.err;
-    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // the duration
+    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // the run time
     EXPECT_EQ(run.err.empty(), !info) << run.err;
     EXPECT_FALSE(Contains(run.err, "\033[")) << "colour goes to a terminal alone";
   };
@@ -78,8 +78,8 @@ TEST_F(LogCli, EveryCommandTakesALevel) {
   }
 }
 
-// The folder holds no level below info, no clock and no place: another folder, another terminal
-// level, the same bytes.
+// The file in the folder has no level below info, no clock time and no path. It has the same bytes
+// for another folder and another terminal level.
 TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   const auto into = [&](const std::string& folder, const Arguments& more) {
     Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
@@ -99,7 +99,7 @@ TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   EXPECT_TRUE(Contains(Read("one/files.txt"), "log.txt\n"));
 }
 
-// A divergence is a warning as it happens; where it ends the run it is the error alone.
+// A divergence is a warning when it happens. If it ends the run, only the error is printed.
 TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   const Outcome reported = Call(Diverging(Run({})));
   EXPECT_EQ(reported.code, 0) << reported.err;
@@ -111,7 +111,7 @@ TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   EXPECT_EQ(Call(Diverging(Run({"--quiet"}))).err, "");
 }
 
-// Each run of a sweep is named, and none of them warns.
+// Each message names the run of the sweep, and none of the runs warns.
 TEST_F(LogCli, ASweepNamesTheRunOfAMessage) {
   const Outcome quiet = Call(Diverging({"sweep", "config.yaml", "--runs", "2", "-o", "a"}));
   EXPECT_FALSE(Contains(quiet.err, "warning: ")) << quiet.err;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Where the program writes, and how it says what is wrong.
+// The output folders of the program, and its error messages.
 #include <cmath>
 
 #include "alidade/config/config.h"
@@ -15,7 +15,7 @@ using testing::Contains;
 using testing::Outcome;
 using OutputCli = testing::ProgramTest;
 
-// However it is named, one file goes to one folder.
+// All spellings of a config's path lead to the same output folder.
 TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
   fs::create_directory(folder_ / "05_depth");
   const fs::path folder = fs::absolute(folder_ / "05_depth");
@@ -117,7 +117,7 @@ TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
   EXPECT_TRUE(raw.err.starts_with("error: ??.yaml: ")) << raw.err;
 }
 
-/// The number in `column` (from 0) of the row that starts with `start`.
+/// Returns the number in `column` (from 0) of the row that starts with `start`.
 double Cell(const std::string& csv, const std::string& start, int column) {
   std::istringstream row(csv.substr(csv.find('\n' + start) + 1));
   std::string cell;
@@ -145,7 +145,7 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   EXPECT_TRUE(Contains(figure, "'expected.csv'")) << figure;
 }
 
-// Without -o no run is lost and none is refused.
+// Without -o no run is lost and no run is refused.
 TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
   const Arguments run = {"run", "config.yaml", "--no-figures"};
   const Outcome first = Call(run), second = Call(run);
@@ -165,7 +165,7 @@ TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
-  // One that is not complete has its name too.
+  // The name of an incomplete run is taken, too.
   fs::create_directory(folder_ / "runs/left.partial");
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=left"}).err,
             "runs/left.partial exists: the output is runs/left-2 (--force replaces "
@@ -188,14 +188,14 @@ TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
   }
 }
 
-// The first turn takes five of the eight rows, the second three: it ends before the second sensor's
-// `accepted`.
+// Of the first eight rows, the first round selects five and the second three: it ends before the
+// `accepted` of the second sensor.
 TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
   const auto labels = [](const std::string& out) {
     std::vector<std::string> found;
     std::istringstream lines(out);
     std::string line;
-    std::getline(lines, line);  // the names of the columns
+    std::getline(lines, line);  // the column names
     while (std::getline(lines, line) && !line.empty()) {
       found.push_back(line.substr(0, line.find("  ")));
     }

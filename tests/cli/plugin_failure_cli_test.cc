@@ -46,7 +46,7 @@ estimators: {ekf: {type: ekf}}
        "--set", "sensors.bad.roles={x: s.position}", "--set", "sensors.bad.time_offset_s=0.01"});
   ASSERT_EQ(shifted.code, 0) << shifted.err;
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
-  // Two in one frame, which are asked for their words once both have thrown.
+  // Two models throw in one frame. The program asks for their messages only after both have thrown.
   const std::string two = "{model: throws_in_valid, stream: z, roles: {x: s.value}}";
   ASSERT_EQ(run("sensors", "{bad: " + two + ", worse: " + two + '}').code, 0);
   for (const std::string sensor : {"bad", "worse"}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade replay` makes a run folder again, or names what is not as it was.
+// `alidade replay` repeats the run of a run folder, or reports each difference.
 #include "support/run_files.h"
 
 namespace alidade::testing {
@@ -66,7 +66,7 @@ TEST_F(ReplayCli, MakesASweepAgain) {
   ExpectEqual();
 }
 
-// Whatever its config is called.
+// The name of the config does not matter.
 TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   for (const char* name : {"again", "config", "made"}) {
     Write(name, Read("config.yaml"));
@@ -75,7 +75,8 @@ TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   }
 }
 
-// What is refused in a folder of the environment is no error, then or now.
+// A plugin that is refused in a folder of the environment is not an error, neither in the run nor
+// in the replay.
 TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   fs::create_directory(folder_ / "own");
   fs::permissions(folder_ / "own", fs::perms::owner_all);
@@ -90,7 +91,7 @@ TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   ExpectEqual();
 }
 
-// A run that fails on its data does so again.
+// A run that fails on its data fails again in the replay.
 TEST_F(ReplayCli, MakesAFailureAgain) {
   WriteTable("none");
   ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--no-figures"}).code, 65);

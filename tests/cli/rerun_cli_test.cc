@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The config that a run or sweep leaves in its folder does the same again, wherever it is called.
+// The config that a run or sweep leaves in its folder repeats it from any working folder.
 #include "support/program.h"
 
 namespace alidade {
@@ -14,7 +14,7 @@ const fs::path kExample = fs::path(ALIDADE_SOURCE_DIR) / "examples/07_depth_pair
 
 class Rerun : public testing::ProgramTest {
  protected:
-  /// The example with its table next to it, in a folder `made` below the current one.
+  /// Copies the example and its table to a folder `made` below the current one.
   void SetUp() override {
     ProgramTest::SetUp();
     fs::create_directories(folder_ / "made");
@@ -27,7 +27,7 @@ class Rerun : public testing::ProgramTest {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
   }
-  /// Runs `config` in another folder, and compares the estimates.
+  /// Runs `config` in another folder and compares the estimates.
   void ExpectSameFrom(const std::string& config, const std::string& first) {
     const fs::path before = folder_;
     fs::create_directory(folder_ / "elsewhere");

@@ -26,14 +26,14 @@ TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   }
 }
 
-// But for the wall clock, which is one entry of compare.json and one row of its tables.
+// The times differ: one entry of compare.json and one row of its tables.
 TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
   const auto files = [&](const std::string& jobs) {
     const Outcome comparison = Call({"compare", "config.yaml", "--runs", "4", "--no-decomposition",
                                      "--jobs", jobs, "-o", "jobs" + jobs});
     EXPECT_EQ(comparison.code, 0) << comparison.err;
     auto all = testing::RunFiles(folder_ / ("jobs" + jobs));
-    // What tells how long it took.
+    // Removes the times.
     std::string& json = all["compare.json"];
     for (const char* key : {"\"cpu_us\"", "\"time_us\""}) {
       const std::size_t clock = json.find(key);
@@ -75,7 +75,7 @@ TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
 }
 
 TEST_F(SweepCli, SharesMakeTheWhole) {
-  // Without a gate all shares count the same outcomes, so that they have the same columns.
+  // Without a gate all shards count the same outcomes, so they have the same columns.
   const auto rows = [&](const std::string& folder, const std::string& shard) {
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "5", "-o", folder, "--shard",
                                 shard, "--set", "estimators.ekf.gate=none"});
@@ -87,7 +87,7 @@ TEST_F(SweepCli, SharesMakeTheWhole) {
 }
 
 TEST_F(SweepCli, RefusesWhatIsNoShare) {
-  // 4294967297 is 1 in 32 bits.
+  // 4294967297 becomes 1 in 32 bits.
   for (const std::string shard :
        {"4294967297/4294967297", "1/99999999999999999999", "01/1", "1/01", "1/", "/2", "1", "",
         "0/2", "3/2", "1/2/3", "1/2x", " 1/2", "-1/2"}) {
@@ -117,7 +117,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
                                 std::string("source.path=") + once, "-o", "out"});
     EXPECT_EQ(sweep.code, 78) << sweep.err;
     EXPECT_TRUE(sweep.err.starts_with("error: --set source.path: '")) << sweep.err;
-    // With --vary too, before it is read.
+    // With --vary, too, before the source is read.
     const Outcome varied =
         Call({"sweep", "table.yaml", "--runs", "2", "--vary", "sensors.stereo.sigma_px=1,2",
               "--set", std::string("source.path=") + once, "-o", "out"});
@@ -125,7 +125,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
     EXPECT_TRUE(Contains(varied.err, "can be read only once")) << varied.err;
   }
   EXPECT_FALSE(Exists("out"));
-  // A key that the source does not know stays unknown.
+  // A key that the source does not have stays an unknown key.
   const Outcome unknown = Call({"sweep", "config.yaml", "--runs", "2", "--set", "source.path=a"});
   EXPECT_EQ(unknown.code, 78);
   EXPECT_TRUE(Contains(unknown.err, "source.path: unknown key")) << unknown.err;
@@ -134,7 +134,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
 TEST_F(SweepCli, GoesOnWithTheThreadsThereAre) {
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_STACK, &before), 0);
-  // The stack of a thread is to be as large as this, half of the address space.
+  // The stack size of a thread: half of the address space.
   const rlimit huge{std::min<rlim_t>(rlim_t{1} << 46, before.rlim_max), before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_STACK, &huge), 0);
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "6", "--jobs", "6", "-o", "out"});
@@ -154,7 +154,7 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
   EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
 }
 
-// Of a filter that believes in a hundredth of the noise.
+// The filter assumes a hundredth of the true noise.
 TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   const Arguments too_sure = {"--set", "sensors.stereo.sigma_px=0.01",
                               "--set", "sensors.scale.sigma_px=0.01",
@@ -198,7 +198,7 @@ TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
 }
 
 TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
-  // Without a gate all values count the same outcomes, so that they have the same columns.
+  // Without a gate all values count the same outcomes, so they have the same columns.
   const std::string no_gate = "estimators.ekf.gate=none";
   const Outcome varied =
       Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", "varied", "--vary",
@@ -280,7 +280,7 @@ TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) 
     int frame = 0;
     for (std::string line; std::getline(lines, line);) {
       if (!Contains(line, ",pixels,")) continue;
-      // The first frame has no landmark before it.
+      // In the first frame no landmark has been initialised yet.
       if (frame == 0) rows += value + ",ekf,pixels,1,0,\n", frame = 1;
       rows += value + ",ekf,pixels," + std::to_string(++frame) + ",1," +
               line.substr(line.rfind(',') + 1) + '\n';
@@ -320,7 +320,7 @@ TEST_F(SweepCli, ValuesAreReadWithoutTheBlanksAroundThem) {
   EXPECT_TRUE(Contains(twice.err, "has the value '1' twice")) << twice.err;
 }
 
-// A table has the same rows for every seed: its runs would be one run over and over.
+// A table has the same rows for every seed, so all runs would be equal.
 TEST_F(SweepCli, RefusesSeveralRunsOverDataThatNoSeedChanges) {
   Write("table.csv", "t_s,d\n0,80\n0.1,81\n");
   const Arguments several = {"sweep", "table.yaml", "--runs", "3", "-o", "out"};
@@ -421,7 +421,7 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
         << text;
     EXPECT_TRUE(Contains(text, "; withheld in 1 of 1 runs")) << text;
   }
-  // One for all values is named once.
+  // An input that all values share is listed once.
   arguments[7] = "sensors.stereo.sigma_px=1,2";
   arguments[5] = "one";
   arguments.insert(arguments.end(), {"--set", "reference=ekf"});
@@ -430,7 +430,7 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
   EXPECT_TRUE(Contains(one.out, "\nerrors are differences from estimator 'ekf'")) << one.out;
 }
 
-// The inputs are those of all values, and of what the source alone is made with.
+// The recorded inputs are those of all values, and those that only the source reads.
 TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
   for (const char* name : {"a.csv", "b.csv"}) Write(name, "t_s,d\n0,80\n0.1,79\n");
   const Outcome data = Call(

@@ -3,8 +3,8 @@
 #
 # tests/cluster/mpi_test.sh PROGRAM
 #
-# scripts/cluster/mpi_shard.sh under mpirun: the shards of all ranks, merged, are the bytes of one
-# process. Exit code 77: there is no mpirun.
+# Runs scripts/cluster/mpi_shard.sh under mpirun: the merged shards of all ranks have the same bytes
+# as a sweep in one process. Exit code 77: mpirun is not installed.
 set -euo pipefail
 ALIDADE=$(realpath "$1")
 export ALIDADE
@@ -20,7 +20,7 @@ mpirun --oversubscribe -n 3 scripts/cluster/mpi_shard.sh "$work/mpi" "$config" -
 "$ALIDADE" merge "$work/mpi.shards"/* -o "$work/mpi" --quiet
 diff -r "$work/whole" "$work/mpi"
 
-# Runs that fail do not end the other ranks.
+# Failing runs do not end the other ranks.
 printf 't_s,d\n0,80\n0.1,none\n' >"$work/table.csv"
 cat >"$work/table.yaml" <<'YAML'
 alidade: 1

@@ -3,9 +3,9 @@
 #
 # tests/cluster/slurm_test.sh PROGRAM
 #
-# scripts/cluster/slurm_array.sh on a Slurm of this machine alone, which lives in a temporary folder
-# and ends with the test: the merged shards are the bytes of one process, a task that is cancelled
-# leaves a shard that the same submission finishes. Exit code 77: there is no Slurm.
+# Runs scripts/cluster/slurm_array.sh with a temporary Slurm on this machine only. The merged shards
+# have the same bytes as a sweep in one process. If a task is cancelled, the same submission
+# finishes its shard. Exit code 77: Slurm is not installed.
 set -euo pipefail
 ALIDADE=$(realpath "$1")
 export ALIDADE
@@ -30,7 +30,7 @@ fail() {
   tail -n 20 "$work"/*.log "$work"/*.shards/*.log >&2 || true
   exit 1
 }
-# Waits until a command holds, at most five minutes.
+# Waits until a command succeeds, at most five minutes.
 eventually() {
   for ((i = 0; i < 3000; ++i)); do
     "$@" >/dev/null 2>&1 && return
@@ -83,7 +83,7 @@ daemons+=($!)
 is_up() { [[ $(sinfo --noheader --format=%T) == idle ]]; }
 eventually is_up
 
-# ---- the script
+# ---- the script under test
 
 has_ended() { [[ -z $(squeue --noheader) ]]; }
 config=examples/05_depth_principled/config.yaml
@@ -95,7 +95,7 @@ eventually test -e "$work/first"
 eventually has_ended
 diff -r "$work/first_whole" "$work/first" || fail "the merged shards are others"
 
-# Cancelled while both shards are running: what is finished is kept, nothing is merged.
+# Cancelled while both shards are running: finished runs are kept, and nothing is merged.
 runs=(--runs 800 --set source.duration_s=60)
 scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
 has_begun() { test -s "$work/second.shards/$1.partial/finished_runs.jsonl"; }

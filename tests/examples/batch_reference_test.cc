@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What docs/is_batch_the_truth.md says of the batch as a reference, on examples/10_slam_scene.
+// Checks the claims of docs/is_batch_the_truth.md on the batch as a reference, with
+// examples/10_slam_scene.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -17,7 +18,7 @@ const std::pair<std::string, std::string> kWrongPrior = {"landmarks.prior",
 const Settings kNoKnownDepth = {{"estimators.ekf.sensors", "[pixels]"},
                                 {"estimators.batch.sensors", "[pixels]"}};
 
-/// EkfAndBatch of the filter and the batch over seeds 1001 and 1002.
+/// Summaries of the filter and of the batch over seeds 1001 and 1002.
 struct EkfAndBatch {
   SweepSummary ekf, batch;
 
@@ -46,8 +47,8 @@ bool HasCeres() {
 #endif
 }
 
-// Where depth is known, the batch is right: scale 1, and a covariance that holds its errors. The
-// whole path is smoothed, so it compares with no filter's; the last frame does.
+// With known depth the batch is right: its scale is 1 and its covariance agrees with its errors. It
+// smooths the whole trajectory, so only its last frame is comparable with a filter's.
 TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
   const EkfAndBatch means("batch.yaml", {});
@@ -61,8 +62,8 @@ TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   EXPECT_LE(last, 1.25);
 }
 
-// 40 priors whose mean is 1 / 0.8 of the truth, and nothing else that tells scale: the batch is
-// farther off than the filter, and but for NEES all looks well.
+// 40 priors with a mean of 1 / 0.8 of the truth are the only information on scale. The batch has a
+// larger error than the filter, and only NEES shows it.
 TEST(BatchReference, IsWrongWhereScaleIsVotedByPriors) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
   Settings settings = kNoKnownDepth;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch on trajectory and map, and the filter: examples/10_slam_scene and
+// Trajectory and map of the batch, compared with the filter: examples/10_slam_scene and
 // 13_slam_odometry_tracks.
 #include <filesystem>
 
@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Means of the filter and of the batch over seeds 1001 to 1008 of an example 10.
+/// Summaries of the filter and of the batch over seeds 1001 to 1008 of a config of example 10.
 struct Pair {
   SweepSummary ekf, batch;
   double Ratio(const char* key) const {
@@ -31,7 +31,8 @@ Pair Eight(const char* name) {
   return {summaries.at(0), summaries.at(1)};
 }
 
-// The path is drawn from the model, so that the batch is honest; NEES is that of the whole path.
+// The model generates the trajectory, so the batch is consistent. NEES is that of the whole
+// trajectory.
 TEST(CeresBatchSlam, IsHonestOnAPathDrawnFromTheModelAndItsMapIsLittleBetterThanTheFilters) {
   const Pair pair = Eight("batch.yaml");
   EXPECT_NEAR(pair.batch.metrics.at("nees.mean:cam").mean, 1.0, 0.25);
@@ -39,7 +40,7 @@ TEST(CeresBatchSlam, IsHonestOnAPathDrawnFromTheModelAndItsMapIsLittleBetterThan
   EXPECT_LE(pair.Ratio("map.sim3.rmse"), 1.10);
   EXPECT_GE(pair.Ratio("map.sim3.rmse"), 1.0);
   EXPECT_GE(pair.Ratio("final_error:cam.position"), 1.0);
-  EXPECT_GE(pair.Ratio("rmse:cam.position"), 1.5);  // of a smoothed path
+  EXPECT_GE(pair.Ratio("rmse:cam.position"), 1.5);  // the trajectory is smoothed
 }
 
 TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
@@ -51,7 +52,7 @@ TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
 
 class CeresBatchSlamDrives : public testing::DrivesTest {};
 
-// RMS errors of the position over the first frames, m, as an independent batch reached them.
+// RMS errors of the position over the first frames in m, as reached by an independent batch.
 TEST_F(CeresBatchSlamDrives, StaysWithinThePublishedErrorsWithARobustLoss) {
   const struct {
     const char* name;

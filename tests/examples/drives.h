@@ -13,7 +13,7 @@
 
 namespace alidade::testing {
 
-/// Tests of an example on real drives, skipped where ALIDADE_DATA has none.
+/// Base class for tests of an example on real drives; skips if ALIDADE_DATA does not have them.
 class DrivesTest : public ::testing::Test {
  protected:
   using Settings = std::vector<std::pair<std::string, std::string>>;
@@ -25,7 +25,7 @@ class DrivesTest : public ::testing::Test {
       GTEST_SKIP() << "ALIDADE_DATA has no kitti-stereo-tracks";
     }
   }
-  /// The example's config on the first `frames` frames of a drive.
+  /// Returns the example's config for the first `frames` frames of a drive.
   Config ConfigOf(const std::string& example, const std::string& drive, int frames,
                   const Settings& settings) const {
     Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples" /

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shipped examples, run as they are, compared with the figures that docs/experiments.md states.
+// Runs the shipped examples unchanged and compares them with the numbers in docs/experiments.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ constexpr bool kHasCeres = true;
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-/// The plugins of the build, looked at once for all runs: no example names others.
+/// Returns the plugins of the build, loaded once for all runs: no example names other plugins.
 const PluginHost& Host() {
   static const PluginHost host(std::vector<std::filesystem::path>{});
   return host;
@@ -40,10 +40,10 @@ RunResult RunExample(const std::string& name, const Settings& settings) {
   return Run(experiment, {});
 }
 
-/// Means over the reporting seeds 1001-1200 of the runs that did not diverge.
+/// Means over those of the seeds 1001-1200 whose run did not diverge.
 struct Means {
-  int diverged = 0;      ///< others
-  int inconsistent = 0;  ///< of those that count
+  int diverged = 0;      ///< the number of other seeds
+  int inconsistent = 0;  ///< among the seeds that are included
   std::map<std::string, double> metrics;
   double operator[](const std::string& key) const { return metrics.at(key); }
 };
@@ -83,9 +83,11 @@ TEST(Examples, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
     if (!std::filesystem::exists(entry.path() / "config.yaml")) continue;
     if (!kHasCeres && entry.path().filename() == "08_depth_all_estimators") continue;
-    // Their drives are not in this tree: SlamOdometryTracks, SlamStereoTracks.
+    // The recorded drives are not in this repository; SlamOdometryTracks and SlamStereoTracks test
+    // them.
     if (entry.path().filename().string().ends_with("_tracks")) continue;
-    if (entry.path().filename().string().ends_with("_images")) continue;  // they are drawn first
+    // these need rendered images
+    if (entry.path().filename().string().ends_with("_images")) continue;
     ++count;
     const RunResult run = RunExample(entry.path().filename(), {});
     EXPECT_EQ(run.status, RunStatus::kOk) << entry.path();
@@ -95,7 +97,8 @@ TEST(Examples, EveryExampleRuns) {
   EXPECT_GE(count, 7);
 }
 
-// Experiment 4.1: the prediction crosses Z = 0 in about half of the runs, which is reported.
+// Experiment 4.1: the prediction crosses Z = 0 in about half of the runs, and the filter reports
+// it.
 TEST(Examples, StereoOnlyReportsItsDivergence) {
   int diverged = 0;
   for (int seed = 1001; seed <= 1200; ++seed) {
@@ -114,7 +117,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
   EXPECT_LT(diverged, 140);
 }
 
-// Experiment 4.2: only the product lambda Z is seen.
+// Experiment 4.2: only the product lambda Z is observable.
 TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   const RunResult run = RunExample("02_depth_scale_only", {});
   EXPECT_EQ(run.code, ExitCode::kOk);
@@ -125,7 +128,7 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   EXPECT_TRUE(HasEvent(ekf, EventKind::kUnobservable));
 }
 
-// Experiment 4.3: lag against noise.
+// Experiment 4.3: the trade-off between lag and noise.
 TEST(Examples, ScaleHeldTradesLagForNoise) {
   const auto means = Sweep("03_depth_scale_known");
   const Means &slow = means.at("R2_5"), &fast = means.at("R2_0_0005");
@@ -140,7 +143,7 @@ TEST(Examples, ScaleHeldTradesLagForNoise) {
   EXPECT_LT(fast["lag_ms:target.depth"], 8.0);
 }
 
-// Experiment 5, and the principled filter on the same seeds.
+// Experiment 5, compared with the principled filter on the same seeds.
 TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   const Means fused = Sweep("04_depth_fused_2017").at("ekf");
   EXPECT_EQ(fused.diverged + fused.inconsistent, 0);
@@ -162,7 +165,7 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   }
 }
 
-// A start that is off by 5 cm, and by 10 % in lambda, under priors that say so.
+// The initial estimate is off by 5 cm and by 10 % in lambda, and the priors are as uncertain.
 TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   const auto means = Sweep("06_depth_poor_initial");
   const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
@@ -175,7 +178,7 @@ TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   }
 }
 
-/// rms over the series of the difference of two estimates of a block.
+/// Returns the RMS difference of two estimates of a block over the series.
 double RmsApart(const std::string& name, int seed, const std::string& block) {
   Config config = Config::FromFile(kExamples / name / "config.yaml");
   config.Set("source.seed", std::to_string(seed), "--set");
@@ -194,7 +197,8 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
   return std::sqrt(squares / count);
 }
 
-// Experiment 5, "the order probably does not matter". A prototype: 0.026 mm rms apart.
+// Experiment 5, "the order probably does not matter". A prototype had an RMS difference of 0.026
+// mm.
 TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   const auto means = Sweep("17_depth_update_order");
   const Means &stereo = means.at("stereo_first"), &scale = means.at("scale_first");
@@ -212,11 +216,11 @@ TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   EXPECT_GE(apart, 1e-5) << "the second update is linearised at what the first one left";
 }
 
-/// sigma of the depth of example 18 after `updates`, by the scalar form of the Riccati equation:
-/// x' = A x + G a, z = Z / Z0 + n, from P = 100 I.
+/// Returns sigma of the depth of example 18 after `updates`, by the scalar form of the Riccati
+/// equation for x' = A x + G a, z = Z / Z0 + n, starting from P = 100 I.
 double RiccatiSigma(double r, int updates) {
   const double t = 0.033, h = 1.0 / 0.3;
-  double p = 100.0, c = 0.0, v = 100.0;  // var Z, cov(Z, rate), var rate
+  double p = 100.0, c = 0.0, v = 100.0;  // var(Z), cov(Z, rate), var(rate)
   for (int k = 0; k < updates; ++k) {
     if (k > 0) {
       p += 2.0 * t * c + t * t * v + std::pow(t, 4) / 4.0;
@@ -231,12 +235,12 @@ double RiccatiSigma(double r, int updates) {
   return std::sqrt(p);
 }
 
-/// The standard deviation of a variance.
+/// Returns the standard deviation that belongs to a variance, as text.
 std::string RootText(const char* variance) {
   return internal::NumberText(std::sqrt(std::strtod(variance, nullptr)));
 }
 
-// Experiment 4.3 over decades of R2: lag against noise, and both ends fail.
+// Experiment 4.3 over decades of R2: lag against noise. The filter fails at both ends.
 TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
   const auto with = [](const char* r) {
     return Sweep("18_depth_noise_lag", {{"sensors.scale.sigma_inverse_scale", RootText(r)}})
@@ -257,9 +261,9 @@ TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
     EXPECT_GT(ekf["lag_ms:target.depth"], 1.4 * lag) << r;
     lag = ekf["lag_ms:target.depth"];
   }
-  // Believed a thousand times too much: errors beyond 10 sigma without end.
+  // R is a thousand times too small: errors stay beyond 10 sigma.
   EXPECT_EQ(with("5e-9").inconsistent, 200);
-  // Worse than to say 0.3 m all the time, 0.1 m / sqrt(2) rms.
+  // The RMSE is larger than that of a constant estimate of 0.3 m, which is 0.1 m / sqrt(2).
   EXPECT_GT(with("5000")["rmse:target.depth"], 0.0707);
 }
 
@@ -280,7 +284,7 @@ TEST(Examples, TheGainSettlesWithinTheSeriesUpToR50) {
   }
 }
 
-/// Every second series, from the second on: the noise was chosen on the others.
+/// Returns the 2nd, 4th, ... series: the noise was tuned on the others.
 std::vector<std::filesystem::path> ReportingSeries() {
   const char* data = std::getenv("ALIDADE_DATA");
   const std::filesystem::path folder =
@@ -332,7 +336,7 @@ const Settings kPoorStart = {{"state.target.initial.depth", "{mean: 0.35, sigma:
                              {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"},
                              {"state.template.initial.inverse_distance", "{mean: 3, sigma: 1.5}"}};
 
-// A prototype's smoother, and its batch over the same data: 1.03 mm, 11.7 mm/s, 99 %.
+// A prototype's smoother and its batch over the same data: 1.03 mm, 11.7 mm/s, 99 %.
 TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
   if (!kHasCeres) GTEST_SKIP() << "built without Ceres";
   const auto means = Sweep("08_depth_all_estimators");
@@ -377,7 +381,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   }
 }
 
-// What `simulate` writes, a row for each satellite, `csv` reads back as frames of six.
+// `simulate` writes a row for each satellite; `csv` reads them back as frames of six.
 TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
   const testing::TemporaryFolder folder;
   const std::string example = "23_satellites";
@@ -394,7 +398,8 @@ TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
     EXPECT_EQ(read.estimators[i].counts, straight.estimators[i].counts);
     EXPECT_GT(read.estimators[i].counts.at("accepted:gnss"), 300);
     for (const auto& [key, value] : read.estimators[i].metrics) {
-      EXPECT_EQ(value, straight.estimators[i].metrics.at(key)) << key;  // those without a truth
+      // the metrics that need no truth
+      EXPECT_EQ(value, straight.estimators[i].metrics.at(key)) << key;
     }
   }
 }

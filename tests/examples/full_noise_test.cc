@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A whole R, as docs/noise_models.md has it: by config, in a model of one's own, and with each
-// measurement.
+// A full matrix R, as in docs/noise_models.md: from the config, in a user's own model, and with
+// each measurement.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   }
 };
 
-/// Example 12 with R by `covariance` in place of `sigma_px`.
+/// Returns example 12 with R given by `covariance` instead of `sigma_px`.
 Config WithCovariance(const std::string& covariance) {
   const std::string path = ALIDADE_SOURCE_DIR "/examples/12_slam_parameters/config.yaml";
   std::ifstream file(path);

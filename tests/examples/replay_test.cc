@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What every estimator makes of the examples, number by number: a change of the engine that is not
-// meant to change an estimate leaves these figures alone. replay/NAME.csv has them.
+// Compares all estimates of the examples with the recorded numbers in replay/NAME.csv. A change of
+// the engine that is not meant to change an estimate must not change these numbers.
 //
 //   ALIDADE_REPLAY_WRITE=1 test_examples --gtest_filter=*Replay*
 //
-// writes the files anew; say in the commit why they changed.
+// rewrites the files; the commit must give the reason for the change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,19 +29,23 @@ namespace alidade {
 namespace {
 
 using ReplaySettings = std::vector<std::pair<std::string, std::string>>;
-/// Names of a row and its numbers.
+/// Row names and the numbers of each row.
 using Figures = std::map<std::string, std::vector<double>>;
 
 const std::filesystem::path kShipped = std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples";
 const std::filesystem::path kReplay =
     std::filesystem::path(ALIDADE_SOURCE_DIR) / "tests/examples/replay";
 
-/// Relative: libraries of another machine round sin and cos otherwise, and a filter carries that
-/// on.
+/// Relative tolerance: on other machines sin and cos are rounded differently, and a filter
+/// propagates the difference.
 constexpr double kTolerance = 1e-7;
 
-/// Takes every n-th estimate: values of the problem's blocks, |x|^2, tr P and |P|^2 with the
-/// landmarks, and how many measurements ended with each outcome since the last one taken.
+/// Records every n-th estimate: values of the problem's blocks,
+/// x
+/// ^2, tr P and
+/// P
+/// ^2 with the landmarks. Also records how many measurements had each outcome since the previous
+/// record.
 class Recording : public RunObserver {
  public:
   explicit Recording(int every) : every_(every) {}
@@ -125,17 +129,18 @@ void Compare(const Figures& found, const std::string& name) {
     ASSERT_EQ(now.size(), values.size()) << row;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (now[i] == values[i]) continue;
-      // Digits of a value near 0 are those of others of 1, from which it was a difference.
+      // A value near 0 may be the difference of values near 1, so its digits are those of such a
+      // difference.
       if (std::abs(now[i] - values[i]) <= kTolerance * std::max(std::abs(values[i]), 1e-3))
         continue;
       ADD_FAILURE() << row << ", number " << i + 1 << ": " << now[i] << ", was " << values[i];
-      if (++wrong == 5) return;  // the first ones show where it begins
+      if (++wrong == 5) return;  // the first differences show the place of the change
     }
   }
 }
 
 struct Replayed {
-  std::string name, config;  ///< of the file of figures, of the config under examples/
+  std::string name, config;  ///< names of the recorded file and of the config under examples/
   int every;
   ReplaySettings settings;
 };
@@ -182,7 +187,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& instance) { return instance.param.name; });
 #endif
 
-/// Of recordings no figures are kept but metrics.
+/// For recorded drives only the metrics are stored.
 class ReplayOfDrives : public testing::DrivesTest {};
 
 TEST_F(ReplayOfDrives, GivesTheMetricsOfBefore) {

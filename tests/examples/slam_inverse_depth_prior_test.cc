@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/27_slam_inverse_depth_prior: a prior of 1 is right about 1 m away, and a wrong scale
-// elsewhere.
+// examples/27_slam_inverse_depth_prior: a prior of 1 is right for points about 1 m away; at other
+// distances it gives a wrong scale.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Seeds 1001 to 1008.
+/// Returns the summary of seeds 1001 to 1008.
 SweepSummary EightWithPrior(const std::string& file, const std::string& prior) {
   Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                    "examples/27_slam_inverse_depth_prior" / file);
@@ -37,7 +37,8 @@ TEST(SlamInverseDepthPrior, OneIsRightAboutOneMetreAway) {
   EXPECT_LE(near.metrics.at("nees.mean:cam").mean, 2.0);
 }
 
-// The pixels of both scenes are the same, 1 / 0.39 apart in size: so are the estimates.
+// The two scenes differ in size by 1 / 0.39 but have the same pixels, so the estimates are the
+// same.
 TEST(SlamInverseDepthPrior, TheSameFilterMakesTheSameMapOfALargerScene) {
   const double larger = 1.0 / 0.39;
   const SweepSummary near = EightWithPrior("config.yaml", kOne);

@@ -8,8 +8,8 @@
 namespace alidade {
 namespace {
 
-/// A drive over so many frames; RMS errors of position in m: of dead reckoning and of a sliding
-/// window over 10 frames, both as published, and the most allowed here.
+/// A drive, its number of frames, and RMS errors of the position in m: the published ones of dead
+/// reckoning and of a sliding window over 10 frames, and the limit of this test.
 struct Drive {
   const char* name;
   int frames;
@@ -21,7 +21,7 @@ constexpr Drive kDrives[] = {{"drive_0001", 98, 1.357, 0.618, 0.50},
 
 class SlamOdometryTracks : public testing::DrivesTest {
  protected:
-  /// The RMS error of the position, m.
+  /// Returns the RMS error of the position in m.
   double Error(const Drive& drive, const Settings& settings = {}) const {
     return Ekf(drive, settings).metrics.at("rmse:cam.position");
   }
@@ -47,8 +47,9 @@ TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
   EXPECT_LE(std::exp(log_ratio), 0.90);
 }
 
-// Truth that jitters by 0.035 m makes no filter inconsistent. Odometry whose speed is 1.6 % off, as
-// that of 0095, does, for no noise of this filter says so.
+// A truth that jitters by 0.035 m makes no filter inconsistent. In drive 0095 the speed of the
+// odometry is 1.6 % off: this makes the filter inconsistent, because it does not model such an
+// error.
 TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
   for (const Drive& drive : kDrives) {
     const EstimatorResult ekf = Ekf(drive);

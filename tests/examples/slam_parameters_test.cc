@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/12_slam_parameters: what its README says that parameters do.
+// examples/12_slam_parameters: checks its README's claims on the parameters.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Ten seeds from 1001 on with one key changed.
+/// Returns the summary of ten seeds from 1001, with one key changed.
 SweepSummary Ten(const std::string& key, const std::string& value) {
   Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                    "examples/12_slam_parameters/config.yaml");
@@ -34,7 +34,7 @@ TEST(SlamParameters, VagueInitialVelocitiesCostLittle) {
   }
 }
 
-// Too little of a noise is worse than ten times too much of it.
+// A noise that is too small does more harm than a noise that is ten times too large.
 TEST(SlamParameters, TooLittleNoiseMakesTheFilterOverconfident) {
   const auto nees = [](const char* key, const char* value) {
     return Mean(Ten(key, value), "nees.mean:cam");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/16_slam_room: the shape of a room from a straight path through it.
+// examples/16_slam_room: the shape of a room, estimated on a straight path through it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Mean of a coordinate over those landmarks of a wall that are known to 0.1 m.
+/// Mean of a coordinate over the landmarks of a wall with a sigma of at most 0.1 m.
 class Wall {
  public:
   Wall(int axis, double at) : axis_(axis), at_(at) {}
@@ -61,7 +61,7 @@ TEST(SlamRoom, ItsShapeIsRecovered) {
       ++count;
     }
     for (const Wall* wall : {&left, &right, &ceiling, &floor, &ahead}) EXPECT_GE(wall->count(), 2);
-    // Each run: to 3 % of the room.
+    // Each run reaches an accuracy of 3 % of the room.
     EXPECT_NEAR(right.place() - left.place(), 3.0, 0.09);
     EXPECT_NEAR(floor.place() - ceiling.place(), 2.4, 0.07);
     EXPECT_NEAR(ahead.place(), 4.0, 0.12);

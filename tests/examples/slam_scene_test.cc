@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/10_slam_scene, compared with the figures that its README states.
+// examples/10_slam_scene, compared with the numbers in its README.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +15,7 @@ const std::filesystem::path kFolder =
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-/// Seeds 1001 to 1020.
+/// Returns the summary of seeds 1001 to 1020.
 SweepSummary Twenty(const std::string& name, const Settings& settings = {}) {
   Config config = Config::FromFile(kFolder / name);
   for (const auto& [key, value] : settings) config.Set(key, value, "--set");
@@ -28,7 +28,7 @@ SweepSummary Twenty(const std::string& name, const Settings& settings = {}) {
   return Summarise(result).at(0);
 }
 
-/// What is asked of a filter on these scenes: it is honest.
+/// Checks that a filter is consistent on these scenes.
 void ExpectHonest(const SweepSummary& ekf) {
   EXPECT_EQ(ekf.diverged + ekf.inconsistent, 0);
   EXPECT_EQ(ekf.used, 20);
@@ -74,7 +74,7 @@ TEST(SlamScene, WithoutNoiseTheMapIsExactButForLinearisation) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 0.05);
 }
 
-// docs/why_filters_fail.md: 3 of these 20 are inconsistent where landmarks do not wait.
+// docs/why_filters_fail.md: without delayed initialisation, 3 of these 20 runs are inconsistent.
 TEST(SlamScene, WhoseMotionIsSlowKeepsItsDepthWhereLandmarksWaitForTheMotion) {
   const SweepSummary waits = Twenty("slow_sweep.yaml");
   EXPECT_EQ(waits.diverged + waits.inconsistent, 0);
@@ -83,7 +83,7 @@ TEST(SlamScene, WhoseMotionIsSlowKeepsItsDepthWhereLandmarksWaitForTheMotion) {
   EXPECT_GE(Twenty("slow_sweep.yaml", {{"landmarks.prior.min_observations", "1"}}).inconsistent, 1);
 }
 
-// A prior that is 1.25 times the truth, of 36 points: NIS does not tell, NEES does.
+// Wrong priors of 36 points, 1.25 times the truth, show in NEES but not in NIS.
 TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"landmarks.prior", "{inverse_distance: 0.49, sigma: 0.11}"}});
@@ -92,8 +92,8 @@ TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
 }
 
-// Without known depth the same prior makes trajectory and map as much too small, and the map keeps
-// its shape.
+// Without known depth the same prior makes the trajectory and the map too small by the same factor.
+// The map keeps its shape.
 TEST(SlamScene, ScaleIsThePriorsWhereNoDepthIsKnown) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"estimators.ekf.sensors", "[pixels]"},

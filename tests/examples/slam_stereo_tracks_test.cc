@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/14_slam_stereo_tracks on real drives: the error at the end as a share of the path.
+// examples/14_slam_stereo_tracks on real drives: the final error as a share of the path length.
 #include <cmath>
 #include <tuple>
 
@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-/// A drive over so many frames, from the example's first one on, and the length of its true path.
+/// A drive, its number of frames from the example's first one, and the length of its true path.
 struct Drive {
   const char* name;
   int frames;
@@ -17,11 +17,11 @@ struct Drive {
 };
 constexpr Drive kDrives[] = {
     {"drive_0001", 90, 90.7}, {"drive_0036", 232, 165.8}, {"drive_0095", 132, 121.1}};
-constexpr double kMost = 0.03;  // of the path: a prototype had 0.013 to 0.019
+constexpr double kMost = 0.03;  // share of the path length; a prototype had 0.013 to 0.019
 
 class SlamStereoTracks : public testing::DrivesTest {
  protected:
-  /// That the camera ends within kMost of the path of where it is, on each drive.
+  /// Checks for each drive that the final position error is at most kMost of the path length.
   void ExpectExact(const Settings& settings) const {
     for (const Drive& drive : kDrives) {
       const Config config = ConfigOf("14_slam_stereo_tracks", drive.name, drive.frames, settings);

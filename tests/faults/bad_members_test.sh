@@ -3,8 +3,8 @@
 #
 # tests/faults/bad_members_test.sh COMPILER INCLUDE...
 #
-# Compiles tests/faults/plugins/bad_member.cc with every value of BAD_MEMBER: a member of a model
-# that cannot be called must be refused, in words that name the member, the call and the model.
+# Compiles tests/faults/plugins/bad_member.cc with every value of BAD_MEMBER: if a member of a model
+# cannot be called, the compiler error must name the member, the call and the model.
 set -euo pipefail
 compiler=$1
 shift

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Configs with one fault each: a base config of tests/faults/configs with a line or two changed,
-// and the expected exit code, line and words of the message.
+// and the exit code, line and words of the expected message.
 #include <gtest/gtest.h>
 
 #include "support/program.h"
@@ -13,7 +13,7 @@ using namespace std::string_literals;  // NOLINT(google-build-using-namespace): 
 
 const fs::path kBases = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/configs";
 
-/// Replaces `from`, which the base has once, by `to`.
+/// Replaces `from`, which occurs once in the base, by `to`.
 struct Change {
   std::string from, to;
 };
@@ -25,9 +25,9 @@ Change After(const std::string& text, const std::string& lines) {
 
 struct Fault {
   std::string name;  ///< begins with the number in the table of README.md, if it has one
-  std::string base;  ///< empty: an empty text
+  std::string base;  ///< empty: an empty config
   std::vector<Change> changes;
-  int line = 0;  ///< 0: the message names the file alone
+  int line = 0;  ///< 0: the message names the file only
   std::string words;
   int code = 78;
 };
@@ -39,13 +39,13 @@ Fault MakeFault(std::string name, std::string base, std::vector<Change> changes,
 
 void PrintTo(const Fault& fault, std::ostream* stream) { *stream << fault.name; }
 
-// Texts of the bases that several faults change.
+// Texts of the base configs that several faults change.
 const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, seed: 1}",
                   kStereoRoles = "{depth: target.depth}", kStereoSigma = "    sigma_px: 1.0",
                   kTemplateBlock = "template.inverse_distance",
                   kTemplateBlocks = "{value: inverse_distance}",
                   kPrior = "prior: {inverse_distance: 0.5, sigma: 0.25}";
-/// A table as the source, in place of the simulated target.
+/// A table as the source, instead of the simulated target.
 std::string Rows(const std::string& keys) {
   return "{type: csv, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
 }
@@ -359,7 +359,7 @@ const Fault kLandmarkFaults[] = {
 
 class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<Fault> {
  protected:
-  /// The base with the changes.
+  /// Returns the base config with the changes.
   static std::string Text(const Fault& fault) {
     std::string text = fault.base.empty() ? "" : ReadText(kBases / (fault.base + ".yaml"));
     for (const auto& [from, to] : fault.changes) {

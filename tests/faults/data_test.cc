@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Data with a fault, through the whole program. The number of each fault is in the comment above
-// its test; what the readers of files say of a fault is in tests/plugins/*/*_faults_test.cc.
+// Faulty data, processed by the whole program. The comment above each test has the number of its
+// fault. The tests of the file readers are in tests/plugins/*/*_faults_test.cc.
 #include <cmath>
 
 #include "support/program.h"
@@ -12,7 +12,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-/// A camera that stands at the origin, or walks along x, and tracks of landmarks before it.
+/// A camera at rest at the origin, or moving along x, and tracks of landmarks in front of it.
 constexpr const char* kMapConfig = R"(alidade: 1
 camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 state:
@@ -38,7 +38,7 @@ class DataFault : public testing::ProgramTest {
     ProgramTest::SetUp();
     Write("map.yaml", kMapConfig);
   }
-  /// Runs a config into `out`; it ends with `code`.
+  /// Runs a config into `out` and expects exit code `code`.
   Outcome Run(const std::string& config, testing::Arguments more = {}, int code = 0) {
     testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -66,7 +66,7 @@ std::vector<std::string> Cells(const std::string& table) {
   return cells;
 }
 
-/// The cells of two tables: the same words, numbers up to `tolerance`.
+/// Expects equal cells in two tables: the same words, and numbers within `tolerance`.
 void ExpectNear(const std::string& table, const std::string& expected, double tolerance) {
   const std::vector<std::string> a = Cells(table), b = Cells(expected);
   ASSERT_EQ(a.size(), b.size());
@@ -81,7 +81,7 @@ std::string Row(int frame, int feature, int dim, double value) {
          std::to_string(value) + '\n';
 }
 
-/// Features 0 to 5 of a plane 4 m ahead, as a camera at x sees them.
+/// Rows of features 0 to 5 on a plane 4 m ahead, as seen by a camera at x.
 std::string Plane(int frame, double x) {
   std::string rows;
   for (int i = 0; i < 6; ++i) {
@@ -93,7 +93,7 @@ std::string Plane(int frame, double x) {
 
 // FAULTS 39
 TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
-  // Feature 7 ends with frame 2; 30 frames later its id is given to another.
+  // The track of feature 7 ends with frame 2; 30 frames later another point has its id.
   std::string rows;
   for (int frame = 0; frame < 40; ++frame) {
     rows += Plane(frame, 0.02 * frame);
@@ -110,7 +110,7 @@ TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
 
 // FAULTS 40
 TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
-  // The same walk twice, once as if at infinity.
+  // The same motion twice, the second time with landmarks as if at infinity.
   for (const bool moves : {true, false}) {
     std::string rows;
     for (int frame = 0; frame < 60; ++frame) rows += Plane(frame, moves ? 0.03 * frame : 0.0);
@@ -138,7 +138,7 @@ TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   Write("tracks.csv", rows);
   Run("map.yaml", {"--set", "landmarks.known=[{id: 9, position: [0, 0, -2], sigma: 0}]"});
   EXPECT_EQ(Count("out_of_domain:pixels"), 4);
-  // A depth of no use: not above zero, dim 2.
+  // A depth that is not positive (dim 2).
   rows.clear();
   for (int frame = 0; frame < 4; ++frame) {
     rows += Row(frame, 9, 0, 320) + Row(frame, 9, 1, 240) + Row(frame, 9, 2, frame < 3 ? 2.0 : 0.0);
@@ -164,7 +164,7 @@ TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   EXPECT_EQ(Count("accepted:pixels"), 6);
 }
 
-// FAULTS 27, 43: what the program makes of an error of a reader.
+// FAULTS 27, 43: the program's handling of a reader's error.
 TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
   for (const char* config : {"table.yaml", "map.yaml"}) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
@@ -182,7 +182,7 @@ TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
 
 // FAULTS 45
 TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
-  // The image reaches from -0.5 to 639.5 and 479.5.
+  // The image reaches from -0.5 px to 639.5 px and 479.5 px.
   const std::vector<std::pair<double, double>> outside = {
       {-0.6, 100}, {639.6, 100}, {100, -0.6}, {100, 479.6}, {1e9, -1e9}};
   std::string rows;
@@ -207,7 +207,7 @@ TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
 
 // FAULTS 46
 TEST_F(DataFault, AnotherUnitIsAWarning) {
-  // Disparities of a target at 0.325 m: in px as said, then 1000 times that.
+  // Disparities of a target at 0.325 m: in px as configured, then 1000 times larger.
   const auto table = [](double unit) {
     std::string rows = "t_s,d\n";
     for (int k = 0; k < 15; ++k) {
@@ -246,8 +246,8 @@ TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
   }
 }
 
-/// Truth of 20 frames that turn about y by up to 4 rad; signs of every third quaternion, or of all
-/// but those, are turned.
+/// Returns the truth of 20 frames with rotations about y up to 4 rad. Every third quaternion is
+/// negated, or all others are.
 std::string Turning(bool turned, double length = 1.0) {
   std::ostringstream rows;
   rows.precision(17);
@@ -283,7 +283,7 @@ TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
                                     .Text()));
   }
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(files[i], files[i + 4]);
-  // Continuous: at 2 rad w is below 0.
+  // The signs are continuous: at 2 rad w is below 0.
   EXPECT_TRUE(Contains(files[2], ",0,0,0,-0.3")) << files[2];
 }
 
@@ -300,11 +300,12 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   Run("map.yaml");
   const Config run = Json("out/run.json");
   EXPECT_EQ(run.root().At("normalised").At("cam.orientation").Number(), 20);
-  ExpectNear(Read("out/truth.csv"), truth, 1e-12);  // some roundings of elements of 1 at most
+  // elements of at most 1, with a few rounding errors
+  ExpectNear(Read("out/truth.csv"), truth, 1e-12);
   Write("truth.tum", Turning(false, 1.0011));
   const Outcome tum = Run("map.yaml", {}, 65);
   EXPECT_TRUE(Contains(tum.err, "truth.tum:1: quaternion of length 1.0011")) << tum.err;
-  // Columns of a table.
+  // The quaternion is read from the columns of a table.
   const testing::Arguments columns = {"--set",
                                       "source={type: csv, path: turn.csv, streams: {tracks: [w, "
                                       "x]}, truth: {orientation: [w, x, y, z]}}"};
@@ -333,7 +334,7 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));
 }
 
-// Which of q and -q is written is chosen in the order of the timestamps, not of arrival.
+// The choice between q and -q depends on the order of the timestamps, not of arrival.
 TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   Write("tracks.csv", Plane(0, 0.0));
   const testing::Arguments sorted = {
@@ -368,7 +369,7 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
   const char* const observed = "every direction of the state can be observed";
-  // Depth tells it, and so do landmarks that are known.
+  // Measured depths make the scale observable, and so do known landmarks.
   const Outcome depth =
       Call({"explain", "map.yaml", "--set", "sensors.pixels.model=depth_feature", "--set",
             "sensors.pixels.sigma_depth_m=0.02", "--set", "source.measures=depth"});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The covariance of a filter goes wrong. The number of each fault is in the comment above its test.
+// The covariance of a filter becomes invalid. The comment above each test has the number of its
+// fault.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -33,7 +34,7 @@ struct Difference : Sensor<Vec<1>, Vec<2>> {
   }
 };
 
-/// Two elements x with the covariance P, and their difference measured.
+/// Two elements x with the covariance P, and a measurement of their difference.
 Problem TwoElements(const Eigen::Matrix2d& p, double sigma) {
   Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
@@ -62,7 +63,8 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
     EXPECT_TRUE(HasEvent(report, EventKind::kRepaired));
     EXPECT_EQ(filter->state().values(), (std::vector<double>{1.0, 2.0}));
-    // The nearest that its factors give: l = 1.1, pivots 1 and -0.21, which counts as zero.
+    // The repaired matrix that has the same factors: l = 1.1 and pivots 1 and -0.21, which becomes
+    // zero.
     const Eigen::MatrixXd p = filter->state().covariance().Dense();
     const Eigen::Matrix2d expected = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.21).finished();
     EXPECT_TRUE(p.isApprox(expected, 1e-12)) << p;
@@ -75,13 +77,13 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   }
 }
 
-/// Its P can be spoilt.
+/// An EKF whose P the test can overwrite.
 struct Open : Ekf {
   using Ekf::Ekf;
   using Ekf::engine;
 };
 
-// FAULTS 75: the budget.
+// FAULTS 75: the limit on the number of repairs.
 TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -91,12 +93,12 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(HasEvent(report, EventKind::kRepaired), k < options.max_covariance_repairs) << k;
     EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
-    // Spoilt again, from where it is.
+    // Makes P indefinite again.
     ekf.engine().f.state.covariance().SetBlock(0, 0, Indefinite());
   }
 }
 
-// FAULTS 75: a repair that is taken back, as for a late frame, does not count.
+// FAULTS 75: a repair that a rollback undoes, as for a late frame, does not count.
 TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -110,7 +112,7 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   }
 }
 
-// FAULTS 75: the exit code, and the others go on.
+// FAULTS 75: the exit code; the other estimators continue.
 TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec named;
@@ -134,7 +136,7 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   EXPECT_FALSE(result.estimators.front().diverged);
 }
 
-// FAULTS 79: S = H P H' + R = 0, though P is as it should be.
+// FAULTS 79: S = H P H' + R = 0, although P is valid.
 TEST(SingularInnovation, IsReportedAndChangesNothing) {
   const Eigen::Matrix2d ones = Eigen::Matrix2d::Ones();  // x0 - x1 is known exactly
   const Problem problem = TwoElements(ones, 0.0);
@@ -151,7 +153,7 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
   EXPECT_FALSE(ekf.diverged());
 }
 
-// FAULTS 79: the same measurement twice without noise; one by one each S is as it should be.
+// FAULTS 79: the same noiseless measurement twice. Each S alone is regular.
 TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});

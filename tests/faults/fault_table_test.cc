@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The tests that tests/faults/README.md names exist.
+// The tests that tests/faults/README.md lists exist.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -13,7 +13,8 @@ namespace {
 
 const fs::path kTests = fs::path(ALIDADE_SOURCE_DIR) / "tests";
 
-/// `Suite.Name` of every test in the sources, and `ConfigFault.NN_*` of every number of a config.
+/// Returns `Suite.Name` of every test in the sources and `ConfigFault.NN_*` of every config's
+/// number.
 std::set<std::string> TestsInSources() {
   std::set<std::string> tests;
   const std::regex test(R"(\nTEST(?:_F|_P)?\((\w+),\s+(\w+)\))"), config(R"re("(\d\d_))re");

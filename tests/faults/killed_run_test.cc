@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 91: what a killed run leaves, and how a killed sweep goes on.
+// FAULTS 91: the files of a killed run, and how a killed sweep is resumed.
 #include <algorithm>
 
 #include "support/run_files.h"
@@ -18,7 +18,7 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
   };
   feed("t_s,d\n0,80\n");
   const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
-  // Rows reach the file once a second, with the row that comes then.
+  // Rows are written to the file once a second, when the next row arrives.
   int row = 0;
   ASSERT_TRUE(Eventually([&] {
     feed(std::to_string(++row) + ",80\n");

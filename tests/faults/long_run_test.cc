@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a run holds in memory does not grow with its length. The configs are those of
-// bench/long_run.
+// The memory of a run does not grow with its length. The configs are those of bench/long_run.
 #include <algorithm>
 
 #include "support/program.h"
@@ -16,7 +15,7 @@ const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
 
 class LongRun : public testing::ProgramTest {
  protected:
-  /// KiB that a run of a config was resident in at most.
+  /// Returns the peak resident memory of a run in KiB.
   long PeakOf(const std::string& config, testing::Arguments settings) {
     testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
     for (std::string& setting : settings) {
@@ -24,7 +23,7 @@ class LongRun : public testing::ProgramTest {
     }
     const pid_t pid = Start(arguments);
     const std::string status = "/proc/" + std::to_string(pid) + "/status";
-    // Not of rusage, whose peak begins with that of this process.
+    // rusage cannot be used, because its peak includes that of this process.
     long peak = 0;
     siginfo_t ended{};
     while (::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
@@ -48,20 +47,20 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
     std::ofstream rows(file);
     for (int k = 0; k < frames; ++k) {
       for (int i = 0; i < 100; ++i) {
-        const int id = i + 100 * ((k + i) / 50);  // each is seen in 50 frames
+        const int id = i + 100 * ((k + i) / 50);  // each id appears in 50 frames
         rows << k << ',' << id << ",0," << 6 * i << ".25\n" << k << ',' << id << ",1,20.5\n";
       }
     }
     rows.close();
     return PeakOf(kBench + "stream.yaml", {"source.path=" + file});
   };
-  // 3 and 30 MB. Where measurements are kept, each takes 100 bytes or more, and there are 900 000.
+  // 3 and 30 MB. Storing the 900 000 measurements would take 100 bytes or more for each.
   const long shorter = peak(1'000), longer = peak(10'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
   EXPECT_LT(longer, 100 * 1'024);
 }
 
-// FAULTS 47: a table with truth, of which errors and the lag are taken.
+// FAULTS 47: a table with truth, so that errors and the lag are computed.
 TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   const auto peak = [&](int count) {
@@ -72,7 +71,7 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
     rows.close();
     return PeakOf("table.yaml", {"source.truth={depth: depth}"});
   };
-  // Estimate and truth of every row would take 16 bytes each, 6 MB.
+  // Storing estimate and truth of every row would take 16 bytes a row, 6 MB.
   const long shorter = peak(120'000), longer = peak(520'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
 }
@@ -83,7 +82,7 @@ TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
     return PeakOf(kBench + "walk.yaml", {"source.max_frames=" + std::to_string(frames),
                                          "source.max_features_per_frame=20"});
   };
-  // The path of the scene is drawn beforehand: 104 bytes a frame, 0.3 MB. Landmarks that stayed
+  // The path of the scene is generated in advance: 104 bytes a frame, 0.3 MB. Storing all landmarks
   // would take 12 MB.
   const long shorter = peak(1'000), longer = peak(4'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
@@ -92,7 +91,7 @@ TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
   EXPECT_GT(counts.At("landmarks.deleted").Number(), 50);
 }
 
-// A frame is taken once the first row of the next has come, whether or not the pipe goes on.
+// A frame is processed once the first row of the next frame arrives, even if the pipe then stalls.
 TEST_F(LongRun, APipeIsTakenAsItGrows) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   const int pipe = ::open((folder_ / "pipe").c_str(), O_RDWR | O_CLOEXEC);
@@ -113,7 +112,7 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     }));
   }
   ::kill(run, SIGINT);
-  feed(kFrames + 1);  // a signal just before it waits for data is seen with the next row
+  feed(kFrames + 1);  // a signal just before the run waits for data is handled at the next row
   const testing::Outcome stopped = Wait(run);
   EXPECT_EQ(stopped.code, 75) << stopped.err;
   EXPECT_GE(Json("out/run.json").root().At("frames").Number(), kFrames);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several runs, and plugins, in one process.
+// Several runs and plugins in one process.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -13,7 +13,7 @@ namespace {
 
 using testing::kDepthConfig;
 
-/// The last state of every estimator, and all their metrics.
+/// Returns the last state of every estimator and all metrics.
 struct Result {
   std::vector<double> values, covariance;
   std::map<std::string, double> metrics;
@@ -42,7 +42,7 @@ Experiment Build(const PluginHost& host, const std::string& text = kDepthConfig)
 TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
   const PluginHost host(std::vector<std::filesystem::path>{});
   Experiment first = Build(host);
-  Experiment waiting = Build(host);  // made now, run last
+  Experiment waiting = Build(host);  // created now, run last
   const Result expected = Finish(first);
   EXPECT_FALSE(expected.metrics.empty());
   std::string other = kDepthConfig;
@@ -57,7 +57,7 @@ TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
   EXPECT_EQ(Finish(waiting), expected);
 }
 
-// Models, sources and estimators outlive the host that made them, in any order.
+// Models, sources and estimators may be destroyed after the host that created them, in any order.
 TEST(OneProcess, WhatAHostMadeOutlivesIt) {
   std::optional<PluginHost> host(std::in_place, std::vector<std::filesystem::path>{});
   Experiment kept = Build(*host);

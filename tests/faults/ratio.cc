@@ -6,7 +6,7 @@
 
 namespace {
 
-/// Two blocks that can each be started from the other: the makings of a cycle.
+/// Two blocks, each of which can be initialised from the other: they can form a cycle.
 struct Ratio : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>, alidade::Vec<1>> {
   static constexpr std::array kRoles{alidade::Quantity{"numerator"},
                                      alidade::Quantity{"denominator"}};
@@ -35,7 +35,7 @@ void Emplace(double sigma, AlidadeInstance* instance) {
   alidade::detail::PublishSensor(std::make_unique<Holder>(Model(sigma)), instance);
 }
 
-/// Pixels of a landmark, in the representation that `landmarks.representation` says.
+/// Pixels of a landmark in the representation that `landmarks.representation` selects.
 void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
   using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
   const int representation =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What surrounds a run fails: disk, signals, memory. The number of each fault is in the comment
-// above its test. These are tested elsewhere:
+// Faults of a run's environment: disk, signals, memory. The comment above each test has the number
+// of its fault. These faults are tested elsewhere:
 //   87  Recorder.AFullDiskKeepsTheRows, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
 //   93  OutputFolder.AFolderThatCannotBeWrittenToIsRefused
@@ -19,7 +19,7 @@ namespace {
 
 class RunSafety : public ProgramTest {
  protected:
-  /// Nothing but what every test has, and `names`.
+  /// Expects no files other than the fixture's and `names`.
   void ExpectOnly(std::vector<std::string> names) const {
     names.insert(names.end(), {"config.yaml", "table.yaml", "stdout", "stderr"});
     for (const auto& entry : fs::directory_iterator(folder_)) {
@@ -27,7 +27,7 @@ class RunSafety : public ProgramTest {
       EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
     }
   }
-  /// Either there is no folder `out`, or one that says why the run failed.
+  /// Expects either no folder `out` or one whose record has the reason of the failure.
   void ExpectRecordOfFailure(const std::string& reason) const {
     ExpectOnly({"out"});
     if (!Exists("out")) return;
@@ -35,15 +35,15 @@ class RunSafety : public ProgramTest {
     EXPECT_EQ(record.root().At("status").Text(), "failed");
     EXPECT_TRUE(Contains(record.root().At("reason").Text(), reason)) << Read("out/run.json");
   }
-  /// Whether a run that could not be finished left `out.partial`; removes it.
+  /// Removes the `out.partial` of an unfinished run; returns whether it existed.
   bool LeftPartial() const { return fs::remove_all(folder_ / "out.partial") > 0; }
-  /// Whether there is enough for the program to start. With less, the C++ runtime has none left to
-  /// throw with, and ends.
+  /// Returns whether the memory suffices to start the program. With less, the C++ runtime cannot
+  /// even throw and aborts.
   bool Starts() const { return Call({"--version"}).code == 0; }
   std::string Estimates(const std::string& run) const { return Read(run + "/ekf/estimates.csv"); }
 };
 
-// 88
+// FAULTS 88
 TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);
   std::uintmax_t largest = 0;
@@ -53,7 +53,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   fs::remove_all(folder_ / "whole");
   int refused = 0, kept = 0;
   for (std::uintmax_t blocks = 0; blocks <= largest / 512 + 1; blocks += 1 + blocks / 3) {
-    // The shell counts in 512 bytes..
+    // The shell counts blocks of 512 bytes.
     before_ = "ulimit -f " + std::to_string(blocks) + "; exec 2>/dev/null >/dev/null";
     const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
     EXPECT_EQ(run.signal, 0) << blocks;
@@ -77,7 +77,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   EXPECT_TRUE(LeftPartial());
 }
 
-// 89
+// FAULTS 89
 TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
   for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out", "--no-figures"},
                                    {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
@@ -85,7 +85,7 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
                                    {"plugins", "list"},
                                    {"doctor"},
                                    {"--help"}}) {
-    // The shell's reader of this pipe has ended before the program starts.
+    // The shell closes the reading end of this pipe before the program starts.
     ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
     before_ = "exec 3<>pipe 1>pipe 3<&-";
     const Outcome outcome = Call(command);
@@ -95,12 +95,12 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
         << command[0] << outcome.err;
     fs::remove(folder_ / "pipe");
   }
-  // What the commands were to write is whole.
+  // The output of the commands is complete.
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Json("sweep/sweep.json").root().At("runs_used").Number(), 1);
 }
 
-// 92
+// FAULTS 92
 TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   const Arguments run = {"run", "config.yaml", "-o", "out", "--no-figures"};
   ASSERT_EQ(Call(run).code, 0);
@@ -116,7 +116,7 @@ TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   EXPECT_NE(Estimates("out"), before);
 }
 
-// 92: one run inside the folder of another is not lost with it.
+// FAULTS 92: --force does not delete runs inside a run's folder.
 TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base", "--no-figures"}).code, 0);
@@ -136,7 +136,7 @@ TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   EXPECT_TRUE(Exists("out/ekf/sweep/sweep.json"));
 }
 
-// 94
+// FAULTS 94
 TEST_F(RunSafety, TheClockIsInTimingAlone) {
   const auto record = [&](const std::string& output) {
     const Outcome run = Call({"run", "config.yaml", "-o", output, "--quiet"});
@@ -160,7 +160,7 @@ TEST_F(RunSafety, TheClockIsInTimingAlone) {
   EXPECT_GT(same, 12);
 }
 
-// 96
+// FAULTS 96
 TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
   int failed = 0, recorded = 0;
@@ -172,9 +172,9 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
         {"run", "config.yaml", "-o", "out", "--no-figures", "--set", "source.duration_s=2000"});
     EXPECT_EQ(run.signal, 0) << kib << " KiB: " << run.err;
     if (run.code == 0) break;
-    if (run.code == 127) continue;  // the loader had not enough
+    if (run.code == 127) continue;  // the loader ran out of memory
     if (run.code == 69) {
-      // What a plugin takes to load was not there, or what its folder takes to be read.
+      // Loading a plugin or reading its folder ran out of memory.
       EXPECT_TRUE(Contains(run.err, "cannot be loaded") ||
                   Contains(run.err, "plugins: Cannot allocate memory"))
           << kib << " KiB: " << run.err;
@@ -191,7 +191,7 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
   EXPECT_GT(recorded, 0);
 }
 
-// 96: in the threads of a sweep.
+// FAULTS 96: in the threads of a sweep.
 TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
   int failed = 0;
@@ -203,7 +203,7 @@ TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
                                 "--set", "source.duration_s=500"});
     EXPECT_EQ(sweep.signal, 0) << kib << " KiB: " << sweep.err;
     if (sweep.code == 0) break;
-    if (sweep.code == 69 || sweep.code == 127) continue;  // not enough to load with
+    if (sweep.code == 69 || sweep.code == 127) continue;  // not enough memory to load
     EXPECT_TRUE(sweep.code == 1 || sweep.code == 70) << kib << " KiB: " << sweep.err;
     EXPECT_TRUE(Contains(sweep.err, "out of memory")) << kib << " KiB: " << sweep.err;
     EXPECT_EQ(Exists("out/failures.csv"), sweep.code == 1) << kib << " KiB";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A bundle adjustment problem of any format: what is read is read again from its BundleText.
+// A bundle adjustment problem of any format: reading its BundleText gives the same problem.
 #include "alidade/bundle/bundle_file.h"
 #include "fuzz.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calibration of a camera, as this project, OpenCV, ROS, Kalibr or EuRoC write it.
+// A camera calibration in the format of this project, OpenCV, ROS, Kalibr or EuRoC.
 #include "fuzz.h"
 #include "plugins/common/calibration_file.h"
 

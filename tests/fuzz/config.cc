@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A config, `key=value` as of --set, and overrides: what is read is read again from its ToYaml.
+// A config, `key=value` as of --set, and overrides: reading its ToYaml gives the same tree.
 #include "alidade/config/config.h"
 
 #include "alidade/config/read_covariance.h"
@@ -39,7 +39,7 @@ void ExpectSame(const Node& a, const Node& b) {
 }
 
 void ExpectReadAgain(const Config& config) {
-  constexpr std::size_t kMost = 1 << 20;  // of a file; aliases are expanded
+  constexpr std::size_t kMost = 1 << 20;  // bytes of a file; aliases are expanded
   const std::string yaml = config.ToYaml();
   if (yaml.size() > kMost) return;
   const Config again = Config::FromText(yaml, "again");

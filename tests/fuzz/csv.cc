@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The config of source csv, and its table.
+// The config of the source csv, and its table.
 #include "plugins/csv/csv.h"
 
 #include "fuzz.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stands in for libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
+// Replaces libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
 //
-// Runs each seed once, and then so many mutations of the seeds in the folder, the same in every
-// run. An input that ends the program is kept as crash-PROCESS in the working folder. Exit code
-// 2: a seed or the folder cannot be read.
+// Runs each seed once, and then the given number of mutations of the seeds in the folder, the same
+// in every run. An input that ends the program is kept as crash-PROCESS in the working folder. Exit
+// code 2: a seed or the folder cannot be read.
 #include <fcntl.h>
 #include <signal.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string g_input;  // the one that is run, for Keep
+std::string g_input;  // the current input, which Keep writes
 
 extern "C" void Keep(int signal) {
   char name[32];
@@ -51,7 +51,7 @@ std::string Read(const fs::path& file) {
   return text.str();
 }
 
-/// The files in a folder, by name.
+/// Returns the files of a folder in order of name.
 std::vector<fs::path> FilesIn(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -63,7 +63,7 @@ std::vector<fs::path> FilesIn(const fs::path& folder) {
   return files;
 }
 
-/// Changes a few places of a text.
+/// Makes a few random changes to a text.
 class Mutator {
  public:
   explicit Mutator(std::vector<std::string> seeds) : seeds_(std::move(seeds)) {}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Numbers and timestamps as text, compared with those of the C library and of 128-bit integers.
+// Numbers and timestamps as text, compared with the results of the C library and of 128-bit
+// integers.
 #include <cmath>
 #include <cstring>
 
@@ -37,11 +38,11 @@ bool IsDecimal(std::string_view text) {
   return skip(kDigits) > 0 && text.empty();
 }
 
-/// To the nearest, of two as near the one further from zero, of a decimal without exponent.
+/// Rounds a decimal without exponent to the nearest integer, halves away from zero.
 Wide Exact(std::string_view text, std::size_t digits) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
-  Wide ten_times = 0;  // of the value
+  Wide ten_times = 0;  // ten times the value
   const std::size_t point = std::min(text.find('.'), text.size());
   for (std::size_t i = 0; i < point; ++i) ten_times = 10 * ten_times + (text[i] - '0');
   for (std::size_t i = 0; i <= digits; ++i) {

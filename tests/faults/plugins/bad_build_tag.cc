@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A build tag of another ABI, of another processor or with another C++ ABI number, as
-// BAD_BUILD_TAG says.
+// A build tag of another ABI, of another processor or with another C++ ABI number, selected by
+// BAD_BUILD_TAG.
 #include "alidade/model/plugin.h"
 #include "probe.h"
 

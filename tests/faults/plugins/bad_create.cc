@@ -20,21 +20,21 @@ struct Misfit : Probe {
   }
 };
 
-/// With a text.
+/// A model with text parameters.
 struct Titled : Probe {
   explicit Titled(alidade::Params& p) : Probe(p) {
     const std::string title = p.Text("title", "what it is called", "nameless");
     const std::string needed = p.Text("needed", "what it cannot do without");
-    p.Fail("", (title + '|' + needed).c_str());  // for the test to see
+    p.Fail("", (title + '|' + needed).c_str());  // shown to the test
   }
 };
-/// Would write an error of its own into the messages.
+/// Tries to insert a line of its own into the messages.
 struct Forges : Probe {
   explicit Forges(alidade::Params& p) : Probe(p) {
     p.Fail("forged\nerror: key", "one\nerror: two \033[31m\xff \u03bb");
   }
 };
-/// One more parameter than there may be, or for each of so many the same.
+/// Reads one parameter more than the maximum, or the same parameter as often.
 struct AsksMuch : Probe {
   explicit AsksMuch(alidade::Params& p) : Probe(p) {
     const bool distinct = p.Flag("distinct", "");
@@ -112,7 +112,8 @@ constexpr AlidadeParam kAnyChoices = Declared(ALIDADE_PARAM_CHOICE, -1, nullptr,
 constexpr AlidadeParam kDefaultBeyond =
     Declared(ALIDADE_PARAM_CHOICE, 1, &kBeyond, ALIDADE_PARAM_HAS_DEFAULT);
 
-/// A model that reads `kParam` without the help of alidade::Params, which always gives a whole one.
+/// A model that reads `kParam` directly, without alidade::Params, which always passes a complete
+/// one.
 template <const AlidadeParam& kParam>
 constexpr AlidadeEntry Reading(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models with a member that is missing or cannot be called, one for each value of BAD_MEMBER; 0: a
-// model without one. Each must be refused in words: see bad_members_test.sh.
+// model without this fault. The compiler must refuse each with a message: see bad_members_test.sh.
 #include "alidade/model/plugin.h"
 
 using alidade::MatrixRef;
@@ -54,14 +54,14 @@ struct Seen : Base {
 #elif BAD_MEMBER == 3
   template <class T>
   void Jacobian(const T*, const T*, T*, T*) const {}
-  void Jacobian(double) const {}  // neither of the two
+  void Jacobian(double) const {}  // matches neither signature
 #elif BAD_MEMBER == 4
  private:
   void Jacobian(const double*, const double*, MatrixRef, MatrixRef) const {}
 #elif BAD_MEMBER == 5
   bool Valid(double) const { return true; }
 #elif BAD_MEMBER == 6
-  void Valid(const double*) const {}  // no answer
+  void Valid(const double*) const {}  // does not return a value
 #elif BAD_MEMBER == 7
   template <class T>
   bool Initialise(const T*, const T*, T*) const {
@@ -144,7 +144,7 @@ struct Moved : MotionBase {
 #elif BAD_MEMBER == 18
   static constexpr double kStepOrder = 2.0;
 #elif BAD_MEMBER == 19
-  int kStepOrder = 2;  // not of the type
+  int kStepOrder = 2;  // not the declared type
 #elif BAD_MEMBER == 24
   bool noise_kind() const { return true; }
 #endif

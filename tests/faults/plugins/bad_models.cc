@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One fault each, for tests/plugins/host/check_test.cc; and five models without fault.
+// Models with one fault each, for tests/plugins/host/check_test.cc, and five models without a
+// fault.
 #include <unistd.h>
 
 #include <cfenv>
@@ -24,8 +25,8 @@ using alidade::Vec;
 
 namespace {
 
-volatile int g_calls = 0;  // of the models with a state of their own
-// Keep the compiler from knowing better.
+volatile int g_calls = 0;  // for the models with hidden state
+// volatile: prevents the compiler from evaluating the faults at compile time.
 volatile double g_zero = 0.0;
 volatile int g_first = 0;
 
@@ -48,7 +49,7 @@ struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
 };
 
-/// z = x + b where a bias b is bound.
+/// z = x + b if a bias b is bound, else z = x.
 struct MayHaveBias : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"},
                                      Quantity{"bias", "m", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -74,7 +75,7 @@ struct WrongJacobian : Right {
   }
 };
 
-/// The value of dual numbers is another one.
+/// Returns different values for double and for dual numbers.
 struct TwoValues : Right {
   using Right::Right;
   template <class T>
@@ -96,14 +97,15 @@ struct NotDeterministic : Right {
   }
 };
 
-/// Mixes what it was given last into what it gives.
+/// Mixes the previous argument into the result.
 struct HiddenState : Right {
   using Right::Right;
   mutable double last = 0.0;
   template <class T>
   bool Predict(const T* x, const T* y, T* z) const {
     if (!Right::Predict(x, y, z)) return false;
-    const double now = *reinterpret_cast<const double*>(x);  // the value, also of a dual number
+    // the value part, also of a dual number
+    const double now = *reinterpret_cast<const double*>(x);
     if (now != last) {
       before = last;
       last = now;
@@ -125,7 +127,7 @@ struct Unwritten : Right {
   }
 };
 
-/// Not a number at x = 0.
+/// Returns NaN at x = 0.
 struct NanOutput : Right {
   using Right::Right;
   template <class T>
@@ -160,7 +162,7 @@ struct NoNoise : Right {
   }
 };
 
-/// x from z, but for a factor.
+/// Computes x from z with a wrong factor.
 struct WrongInverse : Right {
   using Right::Right;
   static constexpr int kInitialises = 0;
@@ -206,7 +208,7 @@ struct ThrowsInCreate : Right {
   explicit ThrowsInCreate(Params&) { throw std::runtime_error("the dog ate it"); }
 };
 
-/// What Predict does instead of predicting.
+/// Does not predict; kWhat selects the misbehaviour.
 template <int kWhat>
 struct Misbehaves : Right {
   using Right::Right;
@@ -256,7 +258,7 @@ struct LosesItself : Right {
 using Seen = AlidadeObservation;
 using Eval = decltype(AlidadeSensor::eval);
 
-/// Right, with a function of another for Predict.
+/// The correct model with another evaluation function.
 template <Eval kEval>
 void MakeRaw(Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Right>::kCalls;
@@ -281,7 +283,7 @@ std::int32_t WritesItsInput(const void*, const Seen*, const double* const* x, do
   const_cast<double*>(x[1])[0] += 1.0;
   return code;
 }
-/// Takes the rows of a Jacobian to lie one behind the other.
+/// Ignores the strides and writes the rows of a Jacobian one after the other.
 std::int32_t IgnoresStrides(const void*, const Seen*, const double* const* x, double* z,
                             double* const* j, const std::int32_t*) {
   const std::int32_t dense[] = {1, 1};
@@ -296,15 +298,15 @@ std::int32_t StrangeStatus(const void*, const Seen*, const double* const*, doubl
                            const std::int32_t*) {
   return 77;
 }
-/// No noise, z or Jacobian comes of it anywhere.
+/// Returns ALIDADE_OUT_OF_DOMAIN for every argument.
 std::int32_t NowhereDefined(const void*, const Seen*, const double* const*, double*, double* const*,
                             const std::int32_t*) {
   return ALIDADE_OUT_OF_DOMAIN;
 }
 
-// ---- of landmarks ------------------------------------------------------------------------------
+// ---- landmarks --------------------------------------------------------------------------------
 
-/// z = bearing + rho x; z does not tell rho. kWhat names a fault of the inverse.
+/// z = bearing + rho x; z does not determine rho. kWhat selects a fault of the inverse model.
 template <int kWhat>
 struct Landmark : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"},
@@ -372,7 +374,7 @@ struct Gravity : alidade::Sensor<alidade::UnitVector, UnitQuaternion> {
   }
 };
 
-/// Takes q and -q for two rotations.
+/// Treats q and -q as different rotations.
 struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"orientation"}};
   static constexpr Quantity kMeasurement{"x"};
@@ -388,7 +390,7 @@ struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
   }
 };
 
-/// z = (x, q); of a measured -q, which is q, it implies another x.
+/// z = (x, q). From a measured -q, which is the same rotation, the inverse computes a different x.
 struct TwoCoversOfAPart
     : alidade::Sensor<alidade::Product<Vec<1>, UnitQuaternion>, Vec<1>, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"orientation"}};
@@ -414,7 +416,7 @@ struct TwoCoversOfAPart
   }
 };
 
-/// A turning body with a control input; kWhat names a fault.
+/// A rotating body with a control input; kWhat selects a fault.
 template <int kWhat>
 struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"distance", "m"}, Quantity{"orientation"}};
@@ -424,7 +426,7 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   template <class T>
   void Step(const T* s, const T* q, const T* u, const T* w, double dt_s, T* s1, T* q1) const {
     s1[0] = s[0] + u[0] * (kWhat == 1 ? 0.1 : dt_s) + w[0];
-    if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // Euler's step of s' = u - 0.3 s
+    if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // Euler step of s' = u - 0.3 s
     if (kWhat == 3) s1[0] = s1[0] + T(1e-3);
     const T d[3] = {w[1], w[2] + 0.4 * dt_s, w[3]};
     UnitQuaternion::Plus(q, d, q1);
@@ -434,14 +436,14 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   }
 };
 
-/// The step of Euler's method, with the order that it declares.
+/// An Euler step that declares the order kOrder.
 template <int kOrder>
 struct Declared : Turning<2> {
   using Turning<2>::Turning;
   static constexpr int kStepOrder = kOrder;
 };
 
-/// A point whose noise is of one kind and declared as another, as kWhat says.
+/// A point with noise; kWhat selects the kind of the noise and the kind that it declares.
 enum class Noise { kHeld, kHeldUndeclared, kAddsUpUndeclared, kOfEachStep };
 template <Noise kWhat>
 struct Noisy : alidade::Motion<1, Vec<1>, Vec<1>> {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table spoiled in the way that BAD_TABLE names.
+// A plugin table with the fault that BAD_TABLE selects.
 #include <stdexcept>
 
 #include "alidade/model/plugin.h"

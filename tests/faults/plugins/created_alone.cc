@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model that sees whether another one is created while it is.
+// A model that detects concurrent creation of another instance.
 #include <atomic>
 #include <chrono>
 #include <stdexcept>
@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Fails where a second one comes.
+/// Fails if a second instance is being created at the same time.
 struct Alone : Probe {
   explicit Alone(alidade::Params& p) : Probe(p) {
     static std::atomic<int> inside{0};

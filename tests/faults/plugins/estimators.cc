@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// C++ plugin: an estimator that throws while its options are read, and one without a maker.
+// C++ plugin with an estimator that throws while its options are read, and one without a factory.
 #include <stdexcept>
 
 #include "alidade/experiment/estimator_plugin.h"

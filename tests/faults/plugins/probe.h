@@ -3,7 +3,7 @@
 
 #include "alidade/model/model.h"
 
-/// z = PROBE_GAIN x: the model of the plugins that are spoiled on purpose.
+/// z = PROBE_GAIN x: the base model of the deliberately faulty plugins.
 #ifndef PROBE_GAIN
 #define PROBE_GAIN 2.0
 #endif

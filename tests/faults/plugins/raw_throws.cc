@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models written against the plugin ABI in C++, whose functions throw, which none may.
+// Models for the plugin ABI whose functions throw, although the ABI forbids exceptions.
 #include <stdexcept>
 
 #include "alidade/model/plugin.h"
@@ -32,7 +32,7 @@ struct Walk : alidade::Motion<1, alidade::Vec<1>> {
   void SqrtQ(double dt_s, alidade::MatrixRef l) const { l(0, 0) = std::sqrt(dt_s); }
 };
 
-/// Inverse, one function of which is spoiled.
+/// The model Inverse with one faulty function.
 template <void (*kSpoil)(AlidadeSensor&)>
 void MakeSensor(alidade::Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Inverse>::kCalls;
@@ -95,7 +95,7 @@ void ThrowInSqrtQ(AlidadeMotion& calls) {
                     std::int32_t) -> std::int32_t { Throw(); };
 }
 
-/// An entry whose `create` is not guarded.
+/// An entry whose `create` does not catch exceptions.
 template <int kWhat>
 constexpr AlidadeEntry ThrowingCreate(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// C++ plugin: sources that work and one that throws.
+// C++ plugin with working sources and one that throws.
 #include <stdexcept>
 
 #include "alidade/experiment/source_plugin.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Live use of a filter: measurements pushed by name, predictions that commit nothing, copies.
+// Online use of a filter: measurements pushed by name, predictions that do not change the filter,
+// copies.
 #include "alidade/estimation/filter.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +32,8 @@ Type MakeLive() {
   }
 }
 
-/// Of a target that swings between 0.2 and 0.4 m; some frames are empty, some have one stream.
+/// Returns frames of a target that oscillates between 0.2 and 0.4 m. Some frames are empty, some
+/// have one stream.
 std::vector<Frame> Swinging(int count, std::uint64_t seed) {
   Random random(seed);
   std::vector<Frame> frames;
@@ -52,7 +54,7 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
-/// The distance to a beacon whose place comes with the measurement.
+/// Distance to a beacon whose position is supplied with the measurement.
 struct Beacon : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -109,10 +111,10 @@ TYPED_TEST(Live, AtIsWhereAFrameWithoutMeasurementsLeads) {
     ExpectSame(at, run.state());
     EXPECT_NE(at.covariance().Dense(), before.covariance().Dense());
   }
-  ExpectSame(filter.At(0), filter.state());  // the past is not to be had
+  ExpectSame(filter.At(0), filter.state());  // for a time in the past, At returns the current state
 }
 
-// 250 of each type.
+// Runs 250 random sequences per filter type.
 TYPED_TEST(Live, WhateverIsAskedBetweenTheFramesTheRunIsTheStraightOne) {
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
     const std::vector<Frame> frames = Swinging(12, seed);
@@ -130,7 +132,7 @@ TYPED_TEST(Live, WhateverIsAskedBetweenTheFramesTheRunIsTheStraightOne) {
         } else if (dice < 0.6) {
           filter.Expect("disparity", frame.timestamp + later);
         } else {
-          const auto other = filter.Clone();  // goes its own way
+          const auto other = filter.Clone();  // a copy that is updated independently
           other->Process(FrameAt(Seconds(frame.timestamp + later), {{0, 70.0}}));
         }
       }
@@ -178,7 +180,8 @@ TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
   EXPECT_THROW(filter.ExpectEach("stereo", later, {-1}), Error);
 }
 
-// As seen from where the camera then is. One that is not in the map has none.
+// The expected pixels are those of the camera at its predicted position. A landmark that is not in
+// the map has none.
 TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), WithPrior()));
   ekf.Process(FrameOf(0.0, {{3, {0.1, 0.2}}, {8, {-0.3, 0.0}}, {5, {0.0, -0.1}}}));
@@ -293,7 +296,7 @@ TEST(Live, AnEndedFilterExpectsNothing) {
   EXPECT_FALSE(ekf.Expect("disparity", ekf.timestamp()));
 }
 
-// H is taken at what z implies for the depth: S is that of the z which is expected.
+// H is evaluated at the depth that the expected z implies, so S is that of the expected z.
 TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
   Problem problem = DepthFilter();
   problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
@@ -305,7 +308,7 @@ TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
   EXPECT_NEAR(expected->s(0, 0), report.measurements()[0].s[0], 1e-9 * expected->s(0, 0));
 }
 
-// Bit by bit, with covariances and landmarks.
+// Results are identical bit for bit, with covariances and landmarks.
 TEST(Live, PushIsProcess) {
   Ekf pushed(MapSystem(Offset(0.1), {}, 0.3), {}, {{"tracks", 3}});
   Ekf processed = pushed;
@@ -343,13 +346,14 @@ TEST(Live, ExpectsALandmarkByItsId) {
   const auto seen = ekf.Expect("tracks", 0, 7);
   ASSERT_TRUE(seen);
   EXPECT_NEAR(seen->z[2], 1.0, 1e-12);
-  // The landmark came from a measurement by the same noise: S = 2 R, whatever the camera's P.
+  // The landmark was initialised from a measurement with the same noise: S = 2 R, whatever P of the
+  // camera is.
   EXPECT_NEAR(seen->s(0, 0), 2.0 * 0.1 * 0.1, 1e-12);
   EXPECT_FALSE(ekf.Expect("tracks", 0, 8));
   EXPECT_FALSE(ekf.Expect("tracks", 0));
 }
 
-// Run it with the thread sanitizer.
+// This test is meant for the thread sanitizer.
 TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   Ekf ekf = MakeLive<Ekf>();
   const std::vector<Frame> frames = Swinging(30, 5);

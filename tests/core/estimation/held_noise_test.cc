@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A gap is a gap: how the time between two updates is split does not change what follows.
+// Discrete process noise is constant between two updates: splitting the time between them must not
+// change the result.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -25,7 +26,7 @@ struct Options {
   double gate = 1.0;
 };
 
-/// A filter of each type.
+/// Makes a filter of the given type.
 template <class Filter>
 std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
                              const std::vector<StreamInfo>& streams) {
@@ -41,7 +42,8 @@ std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
   }
 }
 
-/// Largest difference of values and of covariances, these relative to the standard deviations.
+/// Returns the largest difference of values and of covariances, the latter relative to the standard
+/// deviations.
 double Apart(const State& a, const State& b) {
   double most = 0.0;
   for (std::size_t i = 0; i < a.values().size(); ++i) {
@@ -57,7 +59,7 @@ double Apart(const State& a, const State& b) {
   return most;
 }
 
-/// 60 frames of the depth filter, 30 a second; every third without disparity.
+/// Returns 60 frames of the depth filter, 30 per second; every third has no disparity.
 std::vector<Frame> DepthFrames() {
   std::vector<Frame> frames;
   Random random(11);
@@ -72,7 +74,7 @@ std::vector<Frame> DepthFrames() {
   return frames;
 }
 
-/// The frames, `parts` - 1 frames without measurements before each but the first.
+/// Inserts `parts` - 1 frames without measurements before each frame but the first.
 std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) {
   std::vector<Frame> all;
   for (const Frame& frame : frames) {
@@ -85,7 +87,8 @@ std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) 
   return all;
 }
 
-/// The states after the frames that have a measurement; of a smoother, the smoothed ones.
+/// Returns the states after the frames that have a measurement; for a smoother, the smoothed
+/// states.
 std::vector<State> StatesOf(Estimator& filter, const std::vector<Frame>& frames) {
   std::vector<State> states;
   for (const Frame& frame : frames) {
@@ -114,8 +117,8 @@ class HeldNoise : public ::testing::Test {
                                 const Options& options = {}) {
     return StatesOf(*Make<Filter>(problem, options, StreamsOf(problem)), frames);
   }
-  /// Rounding; that of sigma points goes with eps / alpha^2, alpha = 0.01, that of the smoother
-  /// with P / P_s, up to 1e4 here.
+  /// Rounding error. For sigma points it grows with eps / alpha^2, alpha = 0.01; for the smoother
+  /// with P / P_s, here up to 1e4.
   static constexpr bool kCancels =
       std::is_same_v<Filter, Ukf> || std::is_same_v<Filter, RtsSmoother>;
   static constexpr double kTolerance = kCancels ? 1e-9 : 1e-11;
@@ -124,7 +127,7 @@ class HeldNoise : public ::testing::Test {
 using Filters = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf, RtsSmoother>;
 TYPED_TEST_SUITE(HeldNoise, Filters);
 
-// The motion is linear, so that nothing is left but rounding.
+// The motion is linear, so only rounding errors remain.
 TYPED_TEST(HeldNoise, StepsInPartsAreTheStep) {
   const auto whole = this->Run(DepthFilter(), DepthFrames());
   for (const double max_dt_s : {0.02, 0.002}) {
@@ -140,7 +143,7 @@ TYPED_TEST(HeldNoise, FramesWithoutMeasurementsChangeNothing) {
   EXPECT_LT(MostApart(whole, this->Run(DepthFilter(), more, {0.001})), this->kTolerance);
 }
 
-// What comes after rejected measurements is what comes without them.
+// The estimates after rejected measurements equal those without these measurements.
 TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   const Problem problem = DepthFilter();
   std::vector<Frame> frames = DepthFrames(), wild;
@@ -157,7 +160,8 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   EXPECT_LT(MostApart(this->Run(problem, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
 }
 
-// A second model whose noise adds up, next to the one that holds it.
+// The problem also contains a model with independent noise per step, in addition to the model with
+// discrete noise.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
   Problem problem = DepthFilter();
   problem.motions[1].model = testing::ConstantMotion(1, 0.3);
@@ -176,7 +180,7 @@ TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
   EXPECT_LT(MostApart(whole, this->Run(problem, more)), this->kTolerance);
 }
 
-/// Moves with constant velocity next to a control input that has no effect.
+/// Constant velocity, with a control input that has no effect.
 struct Pushed : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"depth", "m"}, Quantity{"depth_rate", "m/s"}};
   using Input = Vec<1>;
@@ -195,7 +199,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   const auto whole = this->Run(DepthFilter(), DepthFrames());
   Problem problem = DepthFilter();
   problem.motions[0].model = MakeMotion(Pushed(), "pushed");
-  problem.motions[0].input = {"push", 0.004};  // and ends after 4 ms
+  problem.motions[0].input = {"push", 0.004};  // times out after 4 ms
   std::vector<StreamInfo> streams = StreamsOf(problem);
   streams.push_back({"push", 1});
   std::vector<Frame> frames;
@@ -209,7 +213,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   EXPECT_LT(MostApart(whole, states), this->kTolerance);
 }
 
-// The first block is known: it has no error, and no part in M.
+// The first block is constant: it has no error and no part in M.
 TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
   const auto problem = [](BlockStatus position) {
     Problem made;
@@ -238,7 +242,7 @@ class HeldNoiseSnapshot : public ::testing::Test {};
 using Recursive = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf>;
 TYPED_TEST_SUITE(HeldNoiseSnapshot, Recursive);
 
-// Saved inside a gap, after one part and after several.
+// The copy is made inside a gap, after one part and after several.
 TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
   const Problem problem = DepthFilter();
   for (const int parts : {1, 3}) {
@@ -258,7 +262,7 @@ TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
   }
 }
 
-// Var(v) after a second of frames without measurements: one interval, sigma^2 T^2.
+// Var(v) after one second of frames without measurements: one interval, sigma^2 T^2.
 TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
   const Problem problem = HeldPoint(1.0);
   const auto filter = Make<TypeParam>(problem, {}, {});
@@ -267,8 +271,7 @@ TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
   EXPECT_NEAR(CovarianceOf(filter->state(), "p.x", "p.x"), 4.0 + 9.0 + 0.25, 1e-9);
 }
 
-// x_k = Phi_k x_0 + sum Gamma w with one w from each measured frame to the next, by least squares.
-// What gives a block its first value ends the interval, as an update that tells nothing does.
+// The initialisation of a block ends the noise interval, as does an update without information.
 TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   Problem waits = DepthFilter();
   waits.priors[2] = {2, {}, {}, "inverse_scale"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The iterated filter with landmarks.
+// Iterated EKF with landmarks.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -39,7 +39,8 @@ TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
   EXPECT_EQ(iekf.landmarks().size(), 5u);
 }
 
-/// c(dx) = dx' P^-1 dx + |z - h(x (+) dx)|^2 / sigma^2 of one landmark, written out.
+/// Cost of an update with one landmark, in closed form: c(dx) = dx' P^-1 dx + |z - h(x (+) dx)|^2 /
+/// sigma^2.
 struct Cost {
   const State& prior;
   SharedSensor sensor;
@@ -75,7 +76,8 @@ struct Cost {
   }
 };
 
-// A direction on the sphere: H at an iterate is taken from there to the tangent of the prediction.
+// The landmark contains a direction on the sphere: H at an iterate is transported to the tangent
+// space at the prediction.
 TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   constexpr double kSigma = 0.05;
   const AnchoredPixels<0> pixels(kSigma);

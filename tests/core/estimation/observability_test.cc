@@ -80,7 +80,8 @@ TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
 }
 
-// FAULTS 78: one camera that nothing else moves or measures cannot tell how large the world is.
+// FAULTS 78: one camera without other motion or sensor information cannot determine the scale of
+// the world.
 TEST(UnobservableDirections, OneCameraCannotTellScale) {
   const auto problem = [](const LandmarkOptions& options) {
     return testing::MapSystem(testing::InverseDepthPixels(0.01), options);
@@ -89,15 +90,15 @@ TEST(UnobservableDirections, OneCameraCannotTellScale) {
   const auto anchored =
       testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), testing::WithPrior());
   EXPECT_EQ(UnobservableDirections(anchored), (std::vector<Names>{{"scale"}}));
-  // One landmark whose place is known is a scale.
+  // One landmark with a known position determines the scale.
   LandmarkOptions known = testing::WithPrior();
   known.known = {{1, {0.0, 0.0, 2.0}, 0.01}};
   EXPECT_TRUE(UnobservableDirections(problem(known)).empty());
-  // So is any offset in metres.
+  // So does any offset in metres.
   EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
 }
 
-// FAULTS 78: where the camera starts is not known either: the whole world may be elsewhere.
+// FAULTS 78: the initial position of the camera is unknown, too, so the whole world may be shifted.
 TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
   const Problem problem =
       testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.5);
@@ -109,7 +110,8 @@ TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
   }
 }
 
-/// Adds a block that starts at `mean`, each element of its tangent known to `sigma`.
+/// Adds a block with the prior mean `mean` and the standard deviation `sigma` of each tangent
+/// element.
 BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
                  const std::vector<double>& mean, double sigma) {
   const BlockId id = problem.layout.Declare(name, name.substr(0, name.find('.')), space);
@@ -118,7 +120,7 @@ BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
   return id;
 }
 
-/// A body `b` driven by its accelerometer, and a sensor of its position or velocity.
+/// Returns a body `b` driven by its accelerometer, and a sensor of its position or velocity.
 Problem Accelerated(const std::string& measured) {
   Problem problem;
   const SharedMotion model = MakeMotion(testing::Accelerated(), "accelerated");
@@ -130,12 +132,12 @@ Problem Accelerated(const std::string& measured) {
   return problem;
 }
 
-// A rotation about the acceleration shows once the acceleration has another direction.
+// A rotation about the acceleration becomes observable once the acceleration changes its direction.
 TEST(UnobservableDirections, AnAccelerometerThatChangesAndAPositionTellTheOrientation) {
   EXPECT_EQ(UnobservableDirections(Accelerated("b.position")), std::vector<Names>{});
 }
 
-// R u alone is seen: one of three rotations is not.
+// Only R u is observable: one of the three rotations is not.
 TEST(UnobservableDirections, AConstantAccelerometerLeavesARotation) {
   using internal::Excitation;
   const Problem problem = Accelerated("b.position");
@@ -148,7 +150,7 @@ TEST(UnobservableDirections, WhatNoInputExcitesIsReported) {
             (std::vector<Names>{{"b.position.x"}, {"b.position.y"}, {"b.position.z"}}));
 }
 
-/// A vehicle `car` driven by its odometry, and a receiver of satellites on a mast.
+/// Returns a vehicle `car` driven by its odometry, with a satellite receiver on a mast.
 Problem CarWithMast() {
   Problem problem;
   const SharedMotion model = MakeMotion(testing::Unicycle(), "unicycle");
@@ -161,12 +163,12 @@ Problem CarWithMast() {
   return problem;
 }
 
-// On a circle any circle about the same centre does: 4 numbers for 5 unknowns.
+// On a circle, any circle with the same centre explains the data: 4 numbers for 5 unknowns.
 TEST(UnobservableDirections, OdometryThatChangesTellsALeverArm) {
   EXPECT_EQ(UnobservableDirections(CarWithMast()), std::vector<Names>{});
 }
 
-/// Each block is the rate of the one before.
+/// Each block is the derivative of the previous one.
 struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}, Quantity{"v"}, Quantity{"a"}, Quantity{"j"}};
   template <class T>
@@ -180,8 +182,8 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-// Three steps of 0.02 s move x by j (0.02 s)^3: 8e-8 sigma where a jerk is known to 0.01 m/s^3
-// next to a position known to 1 m. It is small, but no rounding.
+// Three steps of 0.02 s move x by j (0.02 s)^3: 8e-8 sigma if the jerk has sigma 0.01 m/s^3 and the
+// position sigma 1 m. This is small, but above rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Chain(), "chain"),

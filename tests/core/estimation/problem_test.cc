@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Problems that are built in code are those of a config, and what does not fit is refused in words.
+// Problems built in code equal those of a config; invalid ones are rejected with a message.
 #include <gtest/gtest.h>
 
 #include "alidade/base/error.h"
@@ -17,7 +17,7 @@ namespace {
 
 using Point = ConstantVelocity<1, false>;
 
-/// What the call throws.
+/// Returns the message of the error that `call` throws.
 template <class Call>
 std::string RefusalOf(const Call& call) {
   try {
@@ -29,7 +29,7 @@ std::string RefusalOf(const Call& call) {
   return "nothing";
 }
 
-/// What is thrown when `add` is called with a problem that has the state `target`.
+/// Returns the message of the error if `add` is called with a problem that has the state `target`.
 template <class Add>
 std::string Refusal(const Add& add) {
   Problem problem;

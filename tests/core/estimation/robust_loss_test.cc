@@ -39,7 +39,7 @@ TEST(RobustLoss, HasTheTextbookValues) {
   EXPECT_EQ(Weight(kHuber, 1.345), 1.0);
 }
 
-/// x ~ N(0, 4), measured with R = 1 under the loss.
+/// x ~ N(0, 4), measured with R = 1 and the given loss.
 Problem Measured(const RobustLoss& loss) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 2.0}});
@@ -48,7 +48,7 @@ Problem Measured(const RobustLoss& loss) {
   return problem;
 }
 
-/// One measurement z of it.
+/// Processes one measurement z of the problem Measured.
 template <class Filter>
 UpdateReport Measure(const RobustLoss& loss, double z, State& state) {
   const Problem problem = Measured(loss);
@@ -79,7 +79,7 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
   }
 }
 
-// R / w is beyond any number: the measurement is left out, and the good one next to it is used.
+// R / w overflows: the measurement is not used, but the valid one in the same frame is.
 TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   for (const RobustLoss& loss : {kCauchy, kHuber}) {
     Problem problem = Measured({});
@@ -93,7 +93,7 @@ TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
       EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 1.6, 1e-12) << far;
       EXPECT_NEAR(CovarianceOf(filter.state(), "p.x", "p.x"), 0.8, 1e-12) << far;
     }
-    TypeParam filter(problem, {}, StreamsOf(problem));  // w is a number here, and R / w too
+    TypeParam filter(problem, {}, StreamsOf(problem));  // here w and R / w are finite
     const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2.0}, {1, 1e150}}));
     EXPECT_EQ(report.measurements()[1].outcome, Outcome::kAccepted);
     const double pull = loss.kind == LossKind::kHuber ? 0.8 * 1.345 * std::sqrt(5.0) : 0.0;
@@ -128,7 +128,7 @@ EkfOptions& Common(UkfOptions& options) { return options.filter; }
 struct Normal {
   Eigen::Vector2d x;
   Eigen::Matrix2d p;
-  /// The Kalman update with R / w(d), d^2 = r' S^-1 r.
+  /// Kalman update with R / w(d), d^2 = r' S^-1 r.
   void Take(const Eigen::Vector2d& z, const Eigen::Matrix2d& r, const RobustLoss& loss) {
     const Eigen::Vector2d innovation = z - x;
     const double d = std::sqrt(innovation.dot((p + r).inverse() * innovation));
@@ -138,8 +138,8 @@ struct Normal {
   }
 };
 
-// One weight for both elements, R correlated and of the measurement itself. `fuse: per_*` takes d
-// of the second after the first; a gate sees S before the loss.
+// Both elements have one weight; R is correlated and comes with the measurement. `fuse: per_*`
+// computes d of the second measurement after the first update. A gate uses S without the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   Problem problem;
   const SharedMotion still = testing::ConstantMotion(2);
@@ -186,7 +186,7 @@ TEST(RobustLoss, HuberLeavesAnInlierAsItIs) {
   EXPECT_EQ(robust.covariance().Dense(), plain.covariance().Dense());
 }
 
-// x does not move: every smoothed estimate is that of all measurements, 1 / P = 1/4 + w + 1.
+// x is constant: every smoothed estimate uses all measurements, 1 / P = 1/4 + w + 1.
 TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   const Problem problem = Measured(kHuber);
   RtsSmoother rts(problem, {}, StreamsOf(problem));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Late measurements: a filter that goes back gives the bits of the same frames in order.
+// Late measurements: rollback produces the same bits as the frames in order.
 #include "alidade/estimation/rollback.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,8 @@ namespace {
 
 constexpr double kWindow_s = 0.2;
 
-/// Of a target that swings between 0.2 and 0.4 m; the disparities are wild now and then.
+/// Returns frames of a target that oscillates between 0.2 and 0.4 m. Every tenth disparity is an
+/// outlier.
 std::vector<Frame> Swinging(int count) {
   Random random(1);
   std::vector<Frame> frames;
@@ -36,7 +37,7 @@ std::vector<Frame> Swinging(int count) {
   return frames;
 }
 
-/// Each late by up to most_s, in the order in which they come.
+/// Delays each frame by at most `most_s` and returns them in order of arrival.
 std::vector<Frame> Delayed(const std::vector<Frame>& frames, double most_s) {
   Random random(2);
   std::multimap<double, Frame> arrivals;
@@ -48,7 +49,7 @@ std::vector<Frame> Delayed(const std::vector<Frame>& frames, double most_s) {
   return delayed;
 }
 
-/// All that a report says, exactly.
+/// Returns the full content of a report, exactly.
 std::string Text(const UpdateReport& report) {
   std::string text = report.stale ? "stale" : "";
   for (const MeasurementReport& m : report.measurements()) {
@@ -72,7 +73,7 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
-/// In order and with delays.
+/// Compares a run with delayed frames with the run in order.
 template <class Type, class Options>
 void ExpectTheBitsOfTheInOrderRun(const Options& options) {
   const Problem problem = DepthFilter();
@@ -90,7 +91,7 @@ void ExpectTheBitsOfTheInOrderRun(const Options& options) {
     }
   }
   EXPECT_EQ(found, expected);
-  EXPECT_GT(processed, frames.size() + 40);  // it went back indeed
+  EXPECT_GT(processed, frames.size() + 40);  // rollbacks occurred
   ExpectSame(late.filter().state(), in_order.state());
   const Timestamp soon = in_order.timestamp() + TimestampFromSeconds(0.05);
   ExpectSame(late.filter().At(soon), in_order.At(soon));
@@ -99,7 +100,7 @@ void ExpectTheBitsOfTheInOrderRun(const Options& options) {
 TEST(Rollback, GivesTheBitsOfTheInOrderRun) {
   EkfOptions options;
   options.gate = 0.99;
-  options.rejection_recovery_after = 2;  // of which a copy counts its own
+  options.rejection_recovery_after = 2;  // each copy has its own counter
   ExpectTheBitsOfTheInOrderRun<Ekf>(options);
   ExpectTheBitsOfTheInOrderRun<SquareRootEkf>(options);
   ExpectTheBitsOfTheInOrderRun<Iekf>(IekfOptions{options});
@@ -121,8 +122,9 @@ TEST(Rollback, AFrameGivesItsReportAndThoseOfTheLaterOnes) {
   EXPECT_EQ(timestamps(1.5), Times{1.5});
   EXPECT_EQ(timestamps(2.0), Times{2.0});
   EXPECT_EQ(timestamps(1.25), (Times{1.25, 1.5, 2.0}));
-  EXPECT_EQ(timestamps(2.0), Times{2.0});                         // behind the one that came first
-  EXPECT_EQ(timestamps(1.0), (Times{1.0, 1.25, 1.5, 2.0, 2.0}));  // as old as the window is long
+  EXPECT_EQ(timestamps(2.0), Times{2.0});  // after the frame that arrived first
+  EXPECT_EQ(timestamps(1.0),
+            (Times{1.0, 1.25, 1.5, 2.0, 2.0}));  // exactly at the edge of the window
   EXPECT_EQ(timestamps(2.125), Times{2.125});
 }
 
@@ -157,11 +159,11 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
             "the frame at 1.250000 s is 0.750000 s older than the newest, beyond the window of "
             "0.500000 s: its measurements are not used");
   ExpectSame(late.filter().state(), in_order.state());
-  late.Process(FrameAt(1.75, {{0, 81.0}}));  // inside
+  late.Process(FrameAt(1.75, {{0, 81.0}}));  // within the window
   EXPECT_FALSE(late.filter().state().values() == in_order.state().values());
 }
 
-// The distance of 10^9 s and of its opposite to now does not fit into a Timestamp.
+// The difference of the two timestamps does not fit into a Timestamp.
 TEST(Rollback, TimesFarApartAreBeyondEveryWindow) {
   const Problem problem = DepthFilter();
   Rollback late(Ekf(problem, {}, StreamsOf(problem)), 9.1e9);
@@ -188,7 +190,7 @@ TEST(Rollback, AWindowThatIsNoneIsMisuse) {
   EXPECT_THROW(Rollback(ekf, std::nan("")), ContractViolation);
 }
 
-/// Throws at a value of 7; its state is the sum of the values.
+/// Throws if the value is 7; its state is the sum of the values.
 class Sum : public Estimator {
  public:
   void Start(Timestamp) override {}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The smoother on the sphere, across the seam of the tangent's basis, against a batch of its own.
+// Smoother on the sphere, across the discontinuity of the tangent basis, compared with a batch
+// solution.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -16,7 +17,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// A direction that wanders: n' = n (+) w.
+/// A direction that walks at random: n' = n (+) w.
 struct Wander : Motion<2, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   double sigma;
@@ -45,27 +46,28 @@ struct Direction : Sensor<UnitVector, UnitVector> {
   }
 };
 
-/// The rotation that takes a to b, as a vector in space: no basis, so no seam.
+/// Returns the rotation from a to b as a vector in space. It needs no basis, so it has no
+/// discontinuity.
 Eigen::Vector3d Turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const Eigen::Vector3d across = b - a.dot(b) * a;
   const double sine = across.norm();
   return sine > 0.0 ? Eigen::Vector3d(across * (std::atan2(sine, a.dot(b)) / sine)) : across;
 }
 
-/// The basis of the tangent plane at n, 3 x 2.
+/// Returns the basis of the tangent plane at n, 3 x 2.
 Eigen::Matrix<double, 3, 2> BasisAt(const double* n) {
   double basis[6];
   UnitVector::Basis(n, basis);
   return Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(basis);
 }
 
-/// Gauss-Newton over all directions, by differences.
+/// Gauss-Newton over all directions, with numeric derivatives.
 struct DirectionBatch {
   Prior prior;
-  double sigma;                             ///< of a step, and of a measurement
-  std::vector<Eigen::Vector3d> n = {};      ///< the solution so far
-  std::vector<std::vector<double>> z = {};  ///< by frame; empty: none
-  Eigen::MatrixXd covariance = {};          ///< of all, in the tangent planes at n
+  double sigma;                             ///< noise of a step and of a measurement
+  std::vector<Eigen::Vector3d> n = {};      ///< current solution
+  std::vector<std::vector<double>> z = {};  ///< per frame; empty if not measured
+  Eigen::MatrixXd covariance = {};          ///< joint covariance, in the tangent planes at n
 
   std::vector<Eigen::Vector3d> Moved(const Eigen::VectorXd& d) const {
     std::vector<Eigen::Vector3d> to(n.size());
@@ -106,13 +108,13 @@ struct DirectionBatch {
   }
 };
 
-/// How far smoother and batch are apart, at most: in standard deviations, and of P relatively.
+/// Largest difference of smoother and batch: of estimates in standard deviations, of P as a ratio.
 struct SeamDistance {
   double estimate = 0.0, covariance = 0.0;
 };
 
-/// Follows a direction that crosses z = 0, where the basis turns over, again and again. All angles
-/// are `sigma` times the same numbers.
+/// Filters a direction that crosses z = 0 several times, at which the basis changes
+/// discontinuously. All angles scale with `sigma`.
 SeamDistance Follow(double sigma) {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Wander(sigma), "wander"), {}};
@@ -158,10 +160,11 @@ SeamDistance Follow(double sigma) {
   return most;
 }
 
-// The smoother is linearised where the filter was, the batch at its solution. The sphere is curved,
-// its plane is not: in units of sigma what is left out is of second order in the angles, so a
-// quarter of all angles leaves a sixteenth. A first order would leave a quarter; 8 lies halfway, on
-// a scale of factors. What goes wrong at the seam does not become less.
+// The smoother is linearised at the filter's estimates, the batch at its solution. In units of
+// sigma, the difference is of second order in the angles because of the curvature of the sphere. A
+// quarter of the angles therefore leaves a sixteenth of it; a first-order error would leave a
+// quarter. The factor 8 is halfway on a logarithmic scale. An error at the discontinuity would not
+// decrease.
 TEST(RtsSmoother, FollowsADirectionAcrossTheSeamOfItsBasisAsTheBatchDoes) {
   const SeamDistance wide = Follow(2e-3), narrow = Follow(0.5e-3);
   EXPECT_GT(wide.estimate, 8.0 * narrow.estimate) << wide.estimate << ' ' << narrow.estimate;

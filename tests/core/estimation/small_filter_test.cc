@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter of few states, whose kernels are unrolled, against the same one among states of no
-// sensor's, of so many that its kernels are those of vectors.
+// Compares a filter of few states, with unrolled kernels, with the same filter plus unobserved
+// states. The additional states are so many that the vector kernels are used.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -21,7 +21,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Two numbers from one state entry of two, with correlated noise.
+/// Two elements measured from one block of two, with correlated noise.
 struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -39,7 +39,7 @@ struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
-/// The same problem, with nine states of no sensor's behind its own.
+/// Returns the problem with nine additional states that no sensor uses.
 Problem AmongOthers(Problem problem) {
   for (int i = 0; i < 9; ++i) {
     AddMotion(problem, "aside" + std::to_string(i), ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -58,7 +58,7 @@ void ExpectEqual(std::span<const double> a, std::span<const double> b) {
   }
 }
 
-/// The leading `rows` of each column of a gain.
+/// Returns the leading `rows` of each column of a gain.
 std::vector<double> Leading(std::span<const double> gain, int columns, std::size_t rows) {
   std::vector<double> leading;
   const std::size_t all = gain.size() / static_cast<std::size_t>(columns);
@@ -68,7 +68,7 @@ std::vector<double> Leading(std::span<const double> gain, int columns, std::size
   return leading;
 }
 
-/// Both filters over the same frames; counts how often each outcome and kind of event was seen.
+/// Runs both filters on the same frames and returns the number of each outcome and kind of event.
 std::map<std::string, int> Compare(const Problem& problem, const EkfOptions& options,
                                    const std::vector<Frame>& frames) {
   const Problem other = AmongOthers(problem);
@@ -135,7 +135,8 @@ TEST(SmallEkf, DoesWhatALargeOneDoes) {
         frames.push_back(FrameAt(t, {}));
         break;
       case 4:
-        frames.push_back(FrameAt(t, {{1, s}, {0, d}, {0, d + 0.5}}));  // two of one sensor
+        frames.push_back(
+            FrameAt(t, {{1, s}, {0, d}, {0, d + 0.5}}));  // two measurements of one sensor
         break;
       case 5:
         frames.push_back(FrameAt(t, {{1, k % 3 == 0 ? std::nan("") : s}, {0, d}}));
@@ -153,7 +154,8 @@ TEST(SmallEkf, DoesWhatALargeOneDoes) {
   }
 }
 
-/// Frames 0.1 s apart with a disparity that fits a depth of 0.3 m, but in [first, last).
+/// Returns frames 0.01 s apart. The disparity fits a depth of 0.3 m, except in frames [first,
+/// last).
 std::vector<Frame> WildFrom(int first, int last, int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -163,16 +165,16 @@ std::vector<Frame> WildFrom(int first, int last, int count) {
   return frames;
 }
 
-// Every reset leaves each block where it was, whichever it resets.
+// A reset changes only its own block.
 TEST(SmallEkf, IsResetAsALargeOne) {
   EkfOptions options;
   options.gate = 0.999;
   options.rejection_recovery_after = 3;
   auto seen = Compare(DepthFilter(), options, WildFrom(20, 30, 80));
-  EXPECT_GE(seen["rejection_recovery"], 2);  // to the wild depth and back
+  EXPECT_GE(seen["rejection_recovery"], 2);  // to the wrong depth and back
 }
 
-// The block that waits lies before others that have a prior.
+// The block without a value precedes blocks that have a prior.
 TEST(SmallEkf, StartsABlockFromAMeasurementAsALargeOne) {
   Problem problem = DepthFilter();
   problem.priors[0] = {0, {}, {}, "disparity"};
@@ -181,7 +183,8 @@ TEST(SmallEkf, StartsABlockFromAMeasurementAsALargeOne) {
   EXPECT_EQ(seen["accepted"], 19);
 }
 
-// An acceptance in between ends the first run of rejections: the second inflates anew.
+// An accepted measurement ends the first sequence of rejections: the second sequence inflates P
+// again.
 TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
   EkfOptions options;
   options.gate = 0.999;
@@ -222,7 +225,7 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   EXPECT_GT(seen.count("gated"), 0u);
 }
 
-/// The same pair, by a model that believes in another noise.
+/// CorrelatedPair with a model of much larger noise.
 struct LoudPair : CorrelatedPair {
   template <class T>
   void SqrtNoise(const T*, T* l) const {
@@ -302,7 +305,7 @@ TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
   }
 }
 
-/// K times the same number.
+/// Measures the same number K times.
 template <int K>
 struct Repeated : Sensor<Vec<K>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
@@ -318,7 +321,8 @@ struct Repeated : Sensor<Vec<K>, Vec<1>> {
   }
 };
 
-// A gain of 3 rows for the 2 states that had a value then has as many numbers as one of 2 for 3.
+// A gain of 3 rows for the 2 states initialised by then has the same number of elements as one of 2
+// rows for 3 states.
 TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
   Problem problem = DepthFilter();
   problem.priors[2] = {2, {}, {}, "inverse_scale"};
@@ -333,7 +337,7 @@ TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
 
 // ---- every number of states ---------------------------------------------------------------------
 
-/// Two numbers of two blocks, with correlated noise.
+/// Two elements measured from two blocks, with correlated noise.
 struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -366,7 +370,7 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
   }
 };
 
-/// Adds a block of three that walk, `t.x`, with correlated priors.
+/// Adds a block `t.x` of three elements that walk at random, with correlated priors.
 void AddTriple(Problem& problem) {
   const SharedMotion walk = testing::ConstantMotion(3, 0.2);
   const BlockId id = problem.layout.Declare("t.x", "t", walk->blocks()[0]);
@@ -375,8 +379,9 @@ void AddTriple(Problem& problem) {
   problem.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
 }
 
-/// `n` states: from 4 on three that walk together, of the rest as many as can in pairs of position
-/// and velocity. All motions have noise; sensors tie the first scalar to the others.
+/// Returns a problem with `n` states. From n = 4 on, it has a block of three; the remaining states
+/// form as many pairs of position and velocity as possible. All motions have noise; sensors relate
+/// the first scalar to the others.
 Problem OfSize(int n) {
   Problem problem;
   const bool triple = n >= 4;
@@ -404,7 +409,7 @@ Problem OfSize(int n) {
 
 class SmallEkfOfSize : public ::testing::TestWithParam<int> {};
 
-// Frames with one measurement, with two, and with all: updates of 1 to 6 rows.
+// The frames have one measurement, two, or all: updates of 1 to 6 rows.
 TEST_P(SmallEkfOfSize, DoesWhatALargeOneDoes) {
   const Problem problem = OfSize(GetParam());
   ASSERT_EQ(problem.InitialState().covariance().size(), GetParam());

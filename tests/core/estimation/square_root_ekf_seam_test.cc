@@ -29,7 +29,7 @@ struct MeasuredDirection : Sensor<UnitVector, UnitVector> {
   }
 };
 
-/// A direction that stays.
+/// A constant direction.
 struct Fixture : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   template <class T>
@@ -39,8 +39,8 @@ struct Fixture : Motion<0, UnitVector> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// A direction at z = 0.05 that the measurement takes across z = 0, where the basis of
-/// its tangent plane turns over.
+/// A direction at z = 0.05 that the measurement moves across z = 0, at which the basis of its
+/// tangent plane changes discontinuously.
 Problem DirectionNearTheSeam() {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};
@@ -55,7 +55,7 @@ Problem DirectionNearTheSeam() {
   return problem;
 }
 
-/// P of a direction as a covariance of the vector: B P B'.
+/// Returns P of a direction as a covariance of the vector: B P B'.
 Eigen::Matrix3d InSpace(const State& state) {
   double basis[6];
   UnitVector::Basis(state.value(0), basis);
@@ -64,8 +64,8 @@ Eigen::Matrix3d InSpace(const State& state) {
   return b * state.covariance().Dense() * b.transpose();
 }
 
-// In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with
-// the direction, by the smallest rotation.
+// In the tangent plane at the prior, h is the identity: 1/P+ = 1/P + 1/R. The update then rotates P
+// with the direction, by the smallest rotation.
 TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  // FAULTS 84
   const Problem problem = DirectionNearTheSeam();
   SquareRootEkf filter(problem, {}, StreamsOf(problem));

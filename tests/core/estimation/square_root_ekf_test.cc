@@ -31,7 +31,7 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Kalman filter of MovingPoint(0.7) with one direct measurement, the inverse of S written out.
+/// Kalman filter of MovingPoint(0.7) with one direct measurement and the explicit inverse of S.
 struct DirectTextbook {
   Eigen::Vector2d x{1.0, -0.5};
   Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();
@@ -100,8 +100,8 @@ TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
   }
 }
 
-// Two vague constants, x + y measured to 1e-7 and then x + (1 + 1e-3) y: the smallest variance is
-// 1e-16 of the largest prior one and less, below the rounding of P.
+// Two constants with wide priors, then x + y measured to 1e-7 and x + (1 + 1e-3) y. The smallest
+// variance is at most 1e-16 of the largest prior variance, below the rounding of P.
 TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot) {
   constexpr double kPrior = 1e3, kSigma = 1e-7;
   Problem problem;

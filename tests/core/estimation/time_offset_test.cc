@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A sensor whose clock is off: worked numbers, its Jacobians against differences, and data that are
-// late in truth.
+// A sensor with a clock offset: worked numbers, Jacobians compared with numeric ones, and data that
+// are really late.
 #include "alidade/estimation/time_offset.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,8 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   }
 }
 
-// A camera that turns and moves sees a landmark: rotations, a landmark's roles, an inverse.
+// A camera that rotates and moves sees a landmark: rotations, landmark roles and an inverse
+// measurement model.
 TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   const Camera camera(640, 480, 400, 400, 320, 240);
   for (const bool anchored : {false, true}) {
@@ -115,13 +116,13 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     } else {
       roles[5] = {0.4, 0.3, 3.0};
     }
-    // df/ddelta is by differences itself: 1e-12 of the values over 1 ms.
+    // df/ddelta is itself a numeric derivative: 1e-12 of the values over 1 ms.
     ExpectSame(SensorJacobian(sensor.model, roles), NumericSensorJacobian(sensor.model, roles),
                1e-7);
   }
 }
 
-/// A point that moves as long as its speed is not that of light.
+/// Constant velocity that throws for speeds above that of light.
 struct Refusing : ConstantVelocity<1, false> {
   using ConstantVelocity<1, false>::ConstantVelocity;
   template <class T>
@@ -131,7 +132,7 @@ struct Refusing : ConstantVelocity<1, false> {
   }
 };
 
-// What fails is the motion model, and its words are those that are heard.
+// The motion model fails, so the error text is that of the motion model.
 TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Refusing(1.0), "refusing"),
@@ -161,8 +162,8 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
             std::string::npos);
 }
 
-// A point swings; one sensor is on time, the other one stamps 20 ms late what it saw: it saw at
-// t - 0.02. The truth is a sine, no motion model.
+// A point oscillates. One sensor is on time; the timestamps of the other are 20 ms late: its
+// measurements are from t - 0.02. The truth is a sine, not a motion model.
 TEST(TimeOffset, IsFoundInDataThatAreLate) {
   Problem problem = testing::MovingPoint(2.0);
   AddSensor(problem, "good", LinearSensor(1.0, 0.01), {"p.x"});

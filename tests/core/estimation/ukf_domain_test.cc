@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Points of the unscented filter where a model is not defined.
+// Sigma points outside the domain of a model.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,15 +28,15 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   EXPECT_TRUE(HasEvent(first, EventKind::kGuarded));
   EXPECT_FALSE(ukf.diverged());
   EXPECT_GT(ValueOf(ukf.state(), "target.depth"), 0.0);
-  // Narrow enough now: nothing to say.
+  // The points are now close enough: no event.
   for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), EventKind::kGuarded));
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
-  // Three seconds later it may be metres away: said anew.
+  // Three seconds later the uncertainty is metres: the event is reported again.
   EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), EventKind::kGuarded));
 }
 
-/// Stays at 1, and throws elsewhere.
+/// Constant at 1; throws for any other value.
 struct Stubborn : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -59,7 +59,7 @@ TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
       << report.events.back().text;
 }
 
-/// z = x + 5 + n, linear, but defined for x > 0 alone.
+/// z = x + 5 + n: linear, but defined for x > 0 only.
 struct Near : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -82,8 +82,9 @@ Problem NearZero(double x) {
   return problem;
 }
 
-// Points 1e-3 sigma from an estimate 1e-3 sigma from the end of the domain. The moments of a linear
-// h are those of the EKF at any spread, but for eps 5 / (2 c^2) = 6e-10 at the narrowest.
+// The estimate is as little as 1e-3 sigma from the edge of the domain, so the points are 1e-3 sigma
+// from it. For a linear h, the moments equal those of the EKF at any spread, up to eps 5 / (2 c^2)
+// = 6e-10 for the narrowest.
 TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
     const Problem problem = NearZero(x);
@@ -102,7 +103,7 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   }
 }
 
-// Points that near would tell nothing but rounding.
+// Points that close would only measure rounding errors.
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
     const Problem problem = NearZero(x);
@@ -117,7 +118,7 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
               "be narrowed no further; their spread is divided by 64");
     EXPECT_FALSE(ukf.diverged());
     EXPECT_EQ(ValueOf(ukf.state(), "p.x"), x);
-    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());  // once
+    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());  // reported once
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The unscented filter on blocks of every geometry, and on a state that has no covariance.
+// Unscented filter on blocks of every geometry, and on a state without a covariance.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -32,7 +32,8 @@ struct Wandering : Motion<G::kTangent, G> {
   }
 };
 
-/// `n` tangent elements in blocks of the geometry G, each with its own sensor.
+/// Returns a problem with `n` tangent elements in blocks of the geometry G, each with its own
+/// sensor.
 template <class G>
 Problem Wanderers(int n) {
   Problem problem;
@@ -60,7 +61,7 @@ Problem WanderersOf(std::uint32_t geometry, int n) {
   return problem;
 }
 
-/// x (+) n with n ~ N(0, sigma^2 I).
+/// Returns x (+) n with n ~ N(0, sigma^2 I).
 std::vector<double> Disturbed(const Geometry& geometry, const std::vector<double>& x, double sigma,
                               Random& random) {
   std::vector<double> d(static_cast<std::size_t>(geometry.tangent)), moved(x.size());
@@ -72,9 +73,10 @@ std::vector<double> Disturbed(const Geometry& geometry, const std::vector<double
 using GeometryAlphaSize = std::tuple<std::uint32_t, double, int>;
 class UkfOf : public ::testing::TestWithParam<GeometryAlphaSize> {};
 
-// Isotropic covariances: every step adds Q, and the one block that is measured has 1/P+ = 1/P +
-// 1/R. The points lie c sigma from the estimate, c^2 <= 60, and bend moments by c^2 sigma^2 / 12 <=
-// 2e-3 of themselves; the estimates, by that part of an innovation of 0.04 at each correction.
+// The covariances are isotropic: every step adds Q, and the measured block has 1/P+ = 1/P + 1/R.
+// The points are c sigma from the estimate, c^2 <= 60, which changes moments by a fraction c^2
+// sigma^2 / 12 <= 2e-3. The estimates change by that fraction of an innovation of 0.04 at each
+// correction.
 TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
   const auto [number, alpha, n] = GetParam();
   const Problem problem = WanderersOf(number, n);
@@ -123,7 +125,7 @@ std::string NameOf(const ::testing::TestParamInfo<GeometryAlphaSize>& one) {
          std::to_string(std::lround(-std::log10(std::get<1>(one.param)))) + "_n" +
          std::to_string(std::get<2>(one.param));
 }
-/// The numbers of all geometries of a state.
+/// Returns the numbers of all geometries of a state.
 std::vector<std::uint32_t> GeometriesOfStates() {
   std::vector<std::uint32_t> numbers;
   for (const GeometryRow* row : detail::kGeometryRows) {
@@ -142,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Many, UkfOf,
                                             ::testing::Values(30)),
                          NameOf);
 
-/// v' = v - dt k |v| v + w: dv'/dv is not a number at rest, where v' is 0.
+/// v' = v - dt k |v| v + w. The derivative dv'/dv is NaN at v = 0, for which v' is 0.
 struct Dragged : Motion<2, Vec<2>> {
   static constexpr std::array kBlocks{Quantity{"v", "m/s", "", "x,y"}};
   template <class T>
@@ -154,7 +156,8 @@ struct Dragged : Motion<2, Vec<2>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 0.1; }
 };
 
-// N = 4, so c = 2: the points of v lie at 2 sigma and are slowed by 1 - 0.3 dt 2 sigma.
+// N = 4, so c = 2: the points of v are at 2 sigma, and the step multiplies them by 1 - 0.3 dt 2
+// sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   Problem problem;
   const SharedMotion model = MakeMotion(Dragged(), "dragged");
@@ -178,7 +181,7 @@ TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   EXPECT_NEAR(ukf.state().value(v)[0], 0.0, 1e-15);
 }
 
-/// v' is not a number, or Qw is not, beyond 1 s.
+/// Either v' or Qw is NaN for steps beyond 1 s.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"v"}};
   bool in_noise = false;
@@ -234,7 +237,7 @@ void ExpectReportsOfTheEkf() {
     EXPECT_EQ(a.h, b.h);
     EXPECT_EQ(a.innovation, b.innovation);
     EXPECT_EQ(a.s, b.s);
-    EXPECT_NEAR(a.nis, b.nis, 1e-14 * a.nis);  // by factors of S in another order
+    EXPECT_NEAR(a.nis, b.nis, 1e-14 * a.nis);  // S is factored in another order
     EXPECT_EQ(std::vector<double>(ukf.state().value(0), ukf.state().value(0) + G::kAmbient),
               prior.mean);
   }

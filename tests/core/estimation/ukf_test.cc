@@ -15,7 +15,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-// P starts singular (v known exactly), Q has rank 1, w of the points is not small.
+// P is singular at first (v is known exactly), Q has rank 1, and the noise of the points is not
+// small.
 TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
   Problem problem = MovingPoint(0.7);
   problem.priors[1].covariance.setZero();
@@ -90,7 +91,7 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.x", "p.x"), v - k * k * s, 1e-13);
 }
 
-/// An orientation that turns by w, w ~ N(0, sigma^2 I): q' = q Exp(w).
+/// An orientation with a random rotation w ~ N(0, sigma^2 I) per step: q' = q Exp(w).
 struct TurningOrientation : Motion<3, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"}};
   double sigma;
@@ -119,7 +120,7 @@ struct Compass : Sensor<UnitQuaternion, UnitQuaternion> {
   }
 };
 
-/// Orientation that starts at (1, 0, 0, 0) +- 0.05 rad.
+/// Returns a problem whose orientation starts at (1, 0, 0, 0) +- 0.05 rad.
 Problem Orientation() {
   Problem problem;
   MotionBinding binding{"body", MakeMotion(TurningOrientation(0.01), "turning"), {}};
@@ -135,8 +136,8 @@ Problem Orientation() {
   return problem;
 }
 
-// Isotropic covariances and an identity measurement: 1/P+ = 1/(P + Q) + 1/R at every orientation,
-// and the estimate lies on the great circle to the measurement, to second order in sigma.
+// Isotropic covariances and an identity measurement: 1/P+ = 1/(P + Q) + 1/R at every orientation.
+// The estimate is on the great circle to the measurement, to second order in sigma.
 TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   const Problem problem = Orientation();
   UkfOptions options;
@@ -164,7 +165,7 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
     ASSERT_NEAR(Eigen::Map<const Eigen::Vector4d>(q).norm(), 1.0, 1e-12);
     double between[3];
     UnitQuaternion::Minus(q, ekf.state().value(0), between);
-    // Points at sqrt(6) sigma bend the moments by sigma^2 / 12 of themselves, here 1e-3 at most.
+    // Points at sqrt(6) sigma change the moments by a fraction of sigma^2 / 12, here at most 1e-3.
     ASSERT_LT(Eigen::Map<const Eigen::Vector3d>(between).norm(), 1e-3) << k;
     ASSERT_LT((ukf.state().covariance().Dense() - p * Eigen::Matrix3d::Identity()).norm(), 0.01 * p)
         << k;
@@ -172,8 +173,8 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   EXPECT_GT(truth.angularDistance(Eigen::Quaterniond::Identity()), 1.0);
 }
 
-// Stereo draws the points of the joint update nearer; the gate has seen those of the other sensor
-// as they were, and so has the report.
+// The disparity sensor requires sigma points closer to the estimate in the joint update. The gate
+// and the report of the other sensor use its points with the full spread.
 TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   Problem problem = DepthFilter();
   problem.priors[0].covariance(0) = 1.0;
@@ -249,7 +250,7 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
   EXPECT_NEAR(report.measurements()[1].s[0], 3.3 * 3.3 * 0.01 + sigma * sigma, 1e-14);
 }
 
-// x' = x + v dt, but x is known.
+// x' = x + v dt, but x is constant.
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);
@@ -265,7 +266,8 @@ TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.v", "p.v"), 4.0 + 0.49 * 0.25, 1e-12);
 }
 
-// A linear system, so all three filters agree; v is known, and neither moved nor corrected.
+// The system is linear, so all three filters agree. Block v is constant: it is neither moved nor
+// corrected.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plugin writes every element of its outputs. What it never writes is not finite in a filter, at
-// the first measurement as at any other: its memory starts as not a number. `alidade check` finds
-// all that it leaves out.
+// A plugin must write every element of its outputs. In a filter, an element that is never written
+// is NaN at every measurement, because the output memory is initialised with NaN. `alidade check`
+// reports all unwritten elements.
 #include <gtest/gtest.h>
 
 #include "alidade/plugin/plugin_models.h"
@@ -13,7 +13,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// The output of which the elements off the diagonal (of L: above it; of h: the last) are left out.
+/// The output whose off-diagonal elements are not written (of L: those above the diagonal; of h:
+/// the last element).
 enum class Left { kNothing, kPrediction, kSensorL, kSensorH, kMotionL, kF, kG };
 
 void WriteDiagonal(double value, bool zeros_too, double* j, int stride) {
@@ -31,7 +32,7 @@ void WriteLower(double value, bool zeros_too, double* l, int stride) {
 }
 bool Leaves(const void* self, Left what) { return *static_cast<const Left*>(self) == what; }
 
-/// Models of two numbers, z = x + n and x' = x + w, written by hand against the C header.
+/// Models of two elements, z = x + n and x' = x + w, implemented directly against the C header.
 struct HandWritten {
   explicit HandWritten(Left left_out) : left(left_out) {
     space.struct_size = sizeof(space);
@@ -94,7 +95,7 @@ struct HandWritten {
   AlidadeMotion motion{};
 };
 
-/// `a.x`, measured by `direct`; `aside`: with a constant block.
+/// Returns a problem of `a.x`, measured by `direct`; with `aside`, it also has a constant block.
 Problem Direct(HandWritten& hand, bool aside) {
   Problem problem;
   const auto model = std::make_shared<PluginMotion>(hand.Make(ALIDADE_KIND_MOTION));

@@ -24,7 +24,7 @@ const MapHost::Values kNoise{{"noise.linear_acceleration", {0.6}},
                              {"noise.angular_acceleration", {0.1, 0.2, 0.3}}};
 
 TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // Half a turn per second about z, 1 s; a = (0, 2, 0) m/s^2: v' = (1, 2, 0), r' = (1, 2, 3)
+  // Half a turn per second about z for 1 s; a = (0, 2, 0) m/s^2: v' = (1, 2, 0), r' = (1, 2, 3)
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[6] = {0, 2, 0, 0, 0, pi / 2};
@@ -45,7 +45,7 @@ TEST(QuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   still[3] = {0, 0, 0};
   testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
   testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
-  // d rotation / d omega = dt at omega = 0, exact
+  // d rotation / d omega = dt at omega = 0, exactly
   const StepResult out = testing::StepWithJacobians(motion, still, nullptr, none.data(), 0.2);
   for (int i = 0; i < 3; ++i) EXPECT_DOUBLE_EQ(out.f[(3 + i) * 12 + 9 + i], 0.2);
 }
@@ -84,7 +84,8 @@ struct Itself : Sensor<G, G> {
   }
 };
 
-/// A body at rest at first, whose position and orientation are measured.
+/// Returns a problem of a body that is at rest at first and whose position and orientation are
+/// measured.
 Problem MeasuredPose(const SharedMotion& model) {
   Problem problem;
   MotionBinding binding{"body", model, {}};
@@ -106,7 +107,8 @@ Problem MeasuredPose(const SharedMotion& model) {
   return problem;
 }
 
-// Velocities of some 0.3 m/s and rad/s: the filters differ by what a step of 0.03 rad bends.
+// Velocities are about 0.3 m/s and rad/s: the filters differ by the nonlinearity of a rotation by
+// 0.03 rad.
 TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
   const auto motion = AbiMotion<QuaternionPose>(kNoise);
   const Problem problem = MeasuredPose(motion);
@@ -155,7 +157,8 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
   }
 }
 
-// One w is held: r' has v', so that half of a sigma_a dt^2 hangs on the parts, and no more.
+// One w is constant over the interval. Because r' uses v', splitting the interval changes r by half
+// of sigma_a dt^2, but nothing else.
 TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
   const auto motion = AbiMotion<QuaternionPose>(kNoise);
   EXPECT_TRUE(motion->discrete_noise());
@@ -165,7 +168,7 @@ TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
 }
 
 TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // A quarter turn per second about z, 1 s, and a quarter turn of w: a half turn.
+  // A quarter turn per second about z for 1 s, and a quarter turn of w: a half turn.
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
@@ -185,7 +188,7 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   const Blocks moving{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
   Blocks still = moving, slow = moving;
   still[3] = {0, 0, 0};
-  slow[3] = {0.02, -0.03, 0.025};  // where the series of the Jacobian ends
+  slow[3] = {0.02, -0.03, 0.025};  // at the limit of the Jacobian's series
   const std::vector<double> none(12);
   testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
   testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
@@ -193,7 +196,8 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.3);
 }
 
-// Per axis sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] of (r, v) and, without turning, of (q, omega).
+// Per axis, the noise is sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] of (r, v) and, without rotation, of (q,
+// omega).
 TEST(ContinuousQuaternionPose, NoiseAddsUp) {
   const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
   EXPECT_FALSE(motion->discrete_noise());

@@ -17,7 +17,8 @@ SharedSensor InverseDepthSensor(const Camera& camera) {
   return MakeSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
 }
 
-/// The landmark that the camera at kPose sees at `pixel`, 4 m away, first seen from kAnchor.
+/// Returns the landmark that the camera at kPose sees at `pixel` from 4 m away; its anchor is
+/// kAnchor.
 template <class Representation>
 Blocks SeenAt(const Camera& camera, const std::vector<double>& pixel) {
   Vec3 h;
@@ -28,7 +29,7 @@ Blocks SeenAt(const Camera& camera, const std::vector<double>& pixel) {
 }
 
 TEST(InverseDepthFeature, PredictsWorkedNumbers) {
-  // The camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m: h = (-1, 0.4, 2)
+  // The camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m: h = (-1, 0.4, 2) m
   // u = 320 + 525 (-1) / 2 = 57.5, v = 240 + 525 0.4 / 2 = 345 px
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
@@ -74,7 +75,7 @@ TEST(InverseDepthFeature, SeesAtInfinityAndBeyond) {
 }
 
 TEST(InverseDepthFeature, SeesNearThePoles) {
-  // phi = 90 deg - 1e-6 rad: the ray is all but along -y, where the camera looks to
+  // phi = 90 deg - 1e-6 rad: the ray is almost along -y, the direction in which the camera looks.
   const double half = std::sqrt(0.5);
   const Blocks pose{{0, 0, 0}, {half, half, 0, 0}};
   const double phi = 1.5707963267948966 - 1e-6;

@@ -23,7 +23,7 @@ SharedSensor MakeRangeBearing() {
   return MakeSensor(RangeBearing<Xyz>(0.1, 0.02, 10.0), "range_bearing");
 }
 
-// A sensor at (1, 0, 0) m that is turned by 90 deg about z; a point at (1, 3, 4) m.
+// A sensor at (1, 0, 0) m, rotated by 90 deg about z, and a point at (1, 3, 4) m.
 const Blocks kRangeBearingRoles{{1, 0, 0}, {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 3, 4}};
 
 TEST(RangeBearing, PredictsWorkedNumbers) {
@@ -56,7 +56,8 @@ TEST(RangeBearing, SeesNothingWhereItStandsNorFurtherThanItsRange) {
   }
 }
 
-// Predict gives back what Initialise was made from, and its Jacobian is that of the inverse.
+// Predict returns the measurement from which Initialise computed the point; their Jacobians are
+// inverses.
 TEST(RangeBearing, TellsThePoint) {
   const SharedSensor sensor = MakeRangeBearing();
   const std::vector<double> z{5.0, 0.6, 0.0, 0.8};

@@ -18,7 +18,7 @@ SharedSensor Made() {
   return MakeSensor(SelfCalibratingFeature<Lens>(0.5), "self_calibrating_feature");
 }
 
-/// A camera that is turned and moved, and a point 5 m before it.
+/// A camera with a general pose, and a point 5 m in front of it.
 const Blocks kRadial{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {500, -0.3, 0.2}, {-2.6, 1.1, 3.5}};
 const std::vector<double> kRadtan{500, 320, 240, -0.3, 0.2, 0.05, 0.01, -0.02};
 
@@ -41,11 +41,12 @@ TEST(SelfCalibratingFeature, MayHaveAnotherNoiseInUThanInV) {
   EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 2.0}));
 }
 
-/// The equation of BAL, whose camera looks along -z with y up: P = R X + t, p = -P / P.z.
+/// The equation of BAL, whose camera looks along -z and has y up: P = R X + t, p = -P / P.z.
 TEST(SelfCalibratingFeature, IsTheCameraOfBalTurnedAboutItsXAxis) {
   const double turn[4] = {0, 1, 0, 0};
   double q[4], back[4], along[3], p[3];
-  UnitQuaternion::Multiply(kRadial[1].data(), turn, q);  // world from the camera of BAL
+  UnitQuaternion::Multiply(kRadial[1].data(), turn,
+                           q);  // world_from_cam for the camera axes of BAL
   for (int i = 0; i < 4; ++i) back[i] = i == 0 ? q[i] : -q[i];
   for (std::size_t i = 0; i < 3; ++i) along[i] = kRadial[3][i] - kRadial[0][i];
   UnitQuaternion::Rotate(back, along, p);
@@ -88,11 +89,12 @@ TEST(SelfCalibratingFeature, SeesNothingBehindIt) {
   }
 }
 
-/// The equation of BAL on the other side of the camera, P_z > 0: the image is the point mirrored.
+/// The equation of BAL for points behind the camera, P_z > 0: the image is that of the mirrored
+/// point.
 TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
   const SharedSensor sensor =
       MakeSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
-  // h = (-0.3, 0.4, -1) m, the mirror image of h in PredictsWorkedNumbers: the same ray, x = h / hz
+  // h = (-0.3, 0.4, -1) m is the opposite of h in PredictsWorkedNumbers: the same line, x = h / hz.
   Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {0.7, 0.4, -1}};
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 140.625, 1e-12);

@@ -17,7 +17,8 @@ SharedSensor MadeStereo() {
 }
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
-  // The left camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m, as mono sees it
+  // The left camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m; the left pixel is
+  // that of one camera.
   // d = 525 0.1 / 2 = 26.25 px: u_right = 57.5 - 26.25
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);
@@ -46,7 +47,7 @@ TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
   });
 }
 
-/// What the right camera sees is what one camera sees from there.
+/// The right pixel equals that of a single camera at the position of the right camera.
 TEST(StereoFeature, TheRightCameraIsBesideTheLeftOne) {
   const Blocks pose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
   const Vec3 right{0.1, 0, 0};

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-/// The cost of a BAL or Bundler file by the formats' own definition, from its text alone:
+/// Cost of a BAL or Bundler file, computed from its text by the definition of the formats:
 ///
 ///   P = R X + t,   p = -P / P_z,   p' = f (1 + k1 |p|^2 + k2 |p|^4) p
 ///
-/// over all observations, whatever the sign of P_z. It shares nothing with the code under test.
+/// over all observations, for either sign of P_z. It shares no code with the code under test.
 namespace alidade::testing {
 
 struct FormulaCost {

@@ -12,13 +12,14 @@
 #include "alidade/model/geometry.h"
 #include "sensors/self_calibrating_feature.h"
 
-/// Bundles that tests make.
+/// Generated bundles, for tests.
 namespace alidade::testing {
 
-/// A sine as noise: the same in every run.
+/// Deterministic noise: a product of sines, the same in every run.
 inline double Wave(int i) { return std::sin(1.7 * i + 0.3) * std::cos(0.9 * i); }
 
-/// The true problem: `cameras` on an arc about `points` in a box 6 m ahead, seen without noise.
+/// Returns the true problem: `cameras` on an arc around `points` in a box 6 m ahead, measured
+/// without noise.
 inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   BundleFile file;
   BundleProblem& problem = file.problem;
@@ -48,8 +49,9 @@ inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   return file;
 }
 
-/// Cameras side by side that have points in front of them and, one in four, behind them: seen with
-/// a noise of about half a pixel, the same in every run. Of BAL, whose camera is projective.
+/// Returns cameras side by side with points in front of them and, for one point in four, behind
+/// them. The noise is about half a pixel and the same in every run. The sensor is the projective
+/// camera of BAL.
 inline BundleFile BundleOnBothSides(int cameras = 8, int points = 60) {
   BundleFile file;
   BundleProblem& problem = file.problem;
@@ -85,13 +87,13 @@ inline BundleFile BundleOnBothSides(int cameras = 8, int points = 60) {
   return file;
 }
 
-/// Every 17th observation 80 px aside.
+/// Shifts every 17th observation by 80 px.
 inline void AddOutliers(BundleProblem& problem) {
   for (std::size_t i = 0; i < problem.observations.size(); i += 17)
     problem.observations[i].z[0] += 80.0;
 }
 
-/// Median distance of the other cameras from the first.
+/// Returns the median distance of the other cameras from the first.
 inline double MedianDistance(const std::vector<std::array<double, 3>>& positions) {
   std::vector<double> distances;
   for (std::size_t i = 1; i < positions.size(); ++i) {
@@ -103,7 +105,8 @@ inline double MedianDistance(const std::vector<std::array<double, 3>>& positions
   return distances[distances.size() / 2];
 }
 
-/// Cameras but the first, and points, moved by about 5 cm, 0.01 rad and 1 % of the focal length.
+/// Moves all cameras but the first, and the points, by about 5 cm and 0.01 rad, and changes the
+/// focal lengths by 1 %.
 inline void Disturb(BundleProblem& problem) {
   int i = 0;
   for (auto& camera : problem.cameras) {

@@ -11,8 +11,8 @@
 
 namespace alidade::testing {
 
-/// While it lives, C and C++ write `1,5` for 1.5. It makes the locale with localedef, so that none
-/// need be installed.
+/// Locale in which C and C++ write `1,5` for 1.5, active during the lifetime of the object. It is
+/// built with localedef, so that it need not be installed.
 class CommaLocale {
  public:
   CommaLocale() : before_(std::setlocale(LC_ALL, nullptr)) {
@@ -34,7 +34,7 @@ class CommaLocale {
   CommaLocale(const CommaLocale&) = delete;
   CommaLocale& operator=(const CommaLocale&) = delete;
 
-  /// False where it could not be made.
+  /// False if the locale could not be built.
   bool active() const { return active_; }
 
  private:

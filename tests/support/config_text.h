@@ -8,12 +8,12 @@
 
 #include "alidade/config/config.h"
 
-/// Configs given as text, for tests.
+/// Configs from text, for tests.
 namespace alidade::testing {
 
 inline Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }
 
-/// The message of the kBadConfig that `call` fails with.
+/// Returns the message of the kBadConfig error that `call` throws.
 template <class Call>
 std::string Message(const Call& call) {
   try {

@@ -8,7 +8,7 @@
 /// Small models with a control input, and sensors for them, for tests.
 namespace alidade::testing {
 
-/// A position on a line, driven by its velocity.
+/// Position on a line, driven by its velocity.
 ///
 ///   model      x' = x + (u + w) dt,   w ~ N(0, sigma^2 / dt):  Var(x') = Var(x) + sigma^2 dt
 ///
@@ -33,7 +33,7 @@ struct Driven : Motion<1, Vec<1>> {
   }
 };
 
-/// A body driven by its accelerometer, its orientation unknown but for a prior.
+/// Body driven by its accelerometer; its orientation is known only by a prior.
 ///
 ///   model      p' = p + v dt,  v' = v + (R(q) u + g) dt,  q' = q Exp(w sqrt(dt))
 ///
@@ -66,7 +66,7 @@ struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
   }
 };
 
-/// A body driven by an inertial unit, whose biases walk: 15 rows of the tangent.
+/// Body driven by an inertial unit, whose biases walk at random: 15 tangent elements.
 ///
 ///   model      p' = p + v dt,   v' = v + (R(q) (f - b_f + w_f) + g) dt
 ///              q' = q Exp((omega - b_omega + w_omega) dt),   b' = b + w_b dt
@@ -123,7 +123,7 @@ struct Position3 : Sensor<Vec<3>, Vec<3>> {
   }
 };
 
-/// A vehicle in the plane driven by its odometry, with a mast on it.
+/// Vehicle in the plane, driven by its odometry, with a mast.
 ///
 ///   model      p' = p + v (cos h, sin h) dt,  h' = h + omega dt + w sqrt(dt),  mast' = mast
 struct Unicycle : Motion<1, Vec<2>, Angle, Vec<2>> {
@@ -144,7 +144,7 @@ struct Unicycle : Motion<1, Vec<2>, Angle, Vec<2>> {
   void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.01 * std::sqrt(dt_s); }
 };
 
-/// z = p + R(h) mast + n: a receiver of satellites on the mast.
+/// z = p + R(h) mast + n: a satellite receiver on the mast.
 struct OnMast : Sensor<Vec<2>, Vec<2>, Angle, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y"},
                                      Quantity{"heading", "rad"}, Quantity{"mast", "m", "", "x,y"}};

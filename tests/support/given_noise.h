@@ -8,10 +8,10 @@
 #include "alidade/model/plugin.h"
 #include "alidade/plugin/plugin_models.h"
 
-/// Models of this process whose noise is given in place of their own, for tests.
+/// Models of this process whose noise is replaced, for tests.
 namespace alidade::testing {
 
-/// `root`, m x m row-major: L of R = L L'.
+/// Returns the sensor with noise L = `root`, m x m row-major: R = L L'.
 template <class Model>
 SharedSensor SensorOfNoise(Model model, std::vector<double> root) {
   AlidadeInstance instance{};
@@ -22,7 +22,7 @@ SharedSensor SensorOfNoise(Model model, std::vector<double> root) {
   return std::make_shared<PluginSensor>(made);
 }
 
-/// `root`, n_w x n_w row-major: L of Qw = L L'.
+/// Returns the motion model with noise L = `root`, n_w x n_w row-major: Qw = L L'.
 template <class Model>
 SharedMotion MotionOfNoise(Model model, std::vector<double> root) {
   AlidadeInstance instance{};

@@ -13,7 +13,8 @@
 /// Small problems with landmarks composed in C++, for tests.
 namespace alidade::testing {
 
-/// Block `cam.position`, known at first to `sigma_0`, and the sensor `tracks`.
+/// Returns a problem with block `cam.position`, whose prior has the standard deviation `sigma_0`,
+/// and sensor `tracks`.
 template <class Model>
 Problem MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
   Problem problem;
@@ -42,12 +43,12 @@ inline LandmarkOptions WithPrior(double inverse_distance = 0.5, double sigma = 0
   return options;
 }
 
-/// A measurement of a landmark.
+/// Measurement of one landmark.
 struct Observation {
   std::int64_t id;
   std::vector<double> z;
 };
-/// A frame of stream 0 with the given landmarks.
+/// Returns a frame of stream 0 with the given landmarks.
 inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   Frame frame;
   frame.timestamp = TimestampFromSeconds(t_s);
@@ -57,18 +58,19 @@ inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   return frame;
 }
 
-/// The filter of a problem whose source has the stream `tracks` alone.
+/// Returns the filter of a problem whose source has only the stream `tracks`.
 inline Ekf EkfOf(const Problem& problem, const EkfOptions& options = {}) {
   return {problem, options, {{"tracks", problem.sensors[0].model->measurement().geometry.ambient}}};
 }
 
-/// What became of the measurement of a landmark; kFailed: there is none.
+/// Returns the outcome of the measurement of a landmark, kFailed if the report has no such
+/// measurement.
 inline Outcome OutcomeFor(const UpdateReport& report, std::int64_t id) {
   const auto found = std::ranges::find(report.measurements(), id, &MeasurementReport::landmark);
   return found == report.measurements().end() ? Outcome::kFailed : found->outcome;
 }
 
-/// The estimate of a landmark; null: there is none.
+/// Returns the estimate of a landmark, null if it does not exist.
 inline const LandmarkEstimate* Find(const std::vector<LandmarkEstimate>& landmarks,
                                     std::int64_t id) {
   const auto found = std::ranges::find(landmarks, id, &LandmarkEstimate::id);

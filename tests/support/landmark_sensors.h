@@ -7,7 +7,7 @@
 #include "alidade/model/model.h"
 #include "alidade/model/plugin_abi.h"
 
-/// A camera that walks at random without turning, and sensors of landmarks in each representation.
+/// Camera that walks at random without rotation, and sensors of landmarks in each representation.
 namespace alidade::testing {
 
 /// r' = r + sigma sqrt(dt) w
@@ -27,7 +27,7 @@ struct Walk : Motion<3, Vec<3>> {
 constexpr Quantity kPosition{"position", "m", "", "x,y,z"};
 constexpr unsigned kOfLandmark = ALIDADE_ROLE_LANDMARK;
 
-/// z = p - r, linear: the Kalman filter is exact.
+/// z = p - r: linear, so the Kalman filter is exact.
 struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{kPosition,
                                      Quantity{"landmark", "m", "", "x,y,z", kOfLandmark}};
@@ -51,7 +51,7 @@ struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>> {
   }
 };
 
-/// z = (hx, hy) / hz, in the camera's axes, which are the world's.
+/// z = (hx, hy) / hz in camera axes, which are parallel to the world axes.
 struct Pinhole {
   static constexpr Quantity kMeasurement{"pixel", "", "", "u,v"};
   double sigma = 0.01;

@@ -6,23 +6,23 @@
 #include "alidade/model/landmark.h"
 #include "support/model_checks.h"
 
-/// Landmarks of every representation before a camera, and what tests of sensors of landmarks ask of
-/// them.
+/// Landmarks of every representation in front of a camera, and checks that tests of landmark
+/// sensors share.
 namespace alidade::testing {
 
 using Vec3 = std::array<double, 3>;
 
-/// A radtan lens, of 640 x 480.
+/// Camera with a radtan lens, 640 x 480 px.
 inline Camera Lens() {
   return Camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0},
                 {0.0012, -0.0007});
 }
 inline Camera Pinhole() { return Camera(640, 480, 525, 525, 320, 240); }
 
-/// Position and orientation of a camera that is turned.
+/// Position and orientation of a camera in a general pose.
 inline const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
 
-/// f(Representation{}) of each representation.
+/// Calls f(Representation{}) for each representation.
 template <class F>
 void ForEachRepresentation(const F& f) {
   for (const auto representation :
@@ -33,7 +33,7 @@ void ForEachRepresentation(const F& f) {
   }
 }
 
-/// The values `y` as blocks of the representation.
+/// Splits the values `y` into the blocks of the representation.
 template <class Representation>
 Blocks CutIntoBlocks(const double* y) {
   Blocks blocks;
@@ -46,7 +46,7 @@ Blocks CutIntoBlocks(const double* y) {
   return blocks;
 }
 
-/// The landmark a + m / rho, m of unit length.
+/// Returns the landmark a + m / rho, with m of unit length.
 template <class Representation>
 Blocks LandmarkOn(const Ray<double>& ray) {
   double y[detail::Blocks<Representation>::kAmbient];
@@ -54,7 +54,7 @@ Blocks LandmarkOn(const Ray<double>& ray) {
   return CutIntoBlocks<Representation>(y);
 }
 
-/// The landmark at `point`, first seen from `anchor`.
+/// Returns the landmark at `point` whose anchor is `anchor`.
 template <class Representation>
 Blocks LandmarkAt(const Vec3& anchor, const Vec3& point) {
   Vec3 m;
@@ -76,14 +76,14 @@ inline std::vector<double> Predicted(const SharedSensor& sensor, const Blocks& r
   return z;
 }
 
-/// Checks Jacobians of Predict against differences.
+/// Compares the Jacobians of Predict with numeric ones.
 inline void ExpectTrueJacobians(const SharedSensor& sensor, const Blocks& roles) {
-  // h^4 times fifth derivatives of pixels, 1e4 of the Jacobians at most
+  // Error: h^4 times fifth derivatives of pixels, at most 1e4 of the Jacobians.
   ExpectSame(SensorJacobian(sensor, roles), NumericSensorJacobian(sensor, roles), 10 * kNumeric);
 }
 
-/// Checks that Initialise inverts Predict, and its Jacobians against differences. `from`: position,
-/// orientation, z and, where the sensor needs one, the prior.
+/// Checks that Initialise inverts Predict, and compares its Jacobians with numeric ones. `from` has
+/// the position, the orientation, z and, if the sensor needs it, the prior.
 inline void ExpectTrueInverse(const SharedSensor& sensor, const Blocks& from) {
   std::vector<Space> spaces{sensor->roles()[0], sensor->roles()[1], sensor->measurement()};
   spaces.resize(from.size());

@@ -11,12 +11,13 @@
 #include "alidade/plugin/plugin_models.h"
 #include "alidade/testing/jacobians.h"
 
-/// What the tests of models ask of them, through the plugin ABI.
+/// Checks that tests of models share, through the plugin ABI.
 namespace alidade::testing {
 
 inline constexpr double kPoison = 1e302;
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Of numeric Jacobians: h^4 = 1e-12 times derivatives of order 1e2, and rounding / h = 1e-13.
+// Tolerance of numeric Jacobians: h^4 = 1e-12 times derivatives of order 1e2, and rounding error /
+// h = 1e-13.
 inline constexpr double kNumeric = 1e-9;
 
 inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& b,
@@ -27,7 +28,7 @@ inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& 
   }
 }
 
-/// Checks F and G of a step at noise w against numeric ones.
+/// Compares F and G of a step with noise w with numeric ones.
 inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                 const std::vector<double>& w, double dt_s) {
   const StepResult out = StepWithJacobians(motion, x, u, w.data(), dt_s),
@@ -37,7 +38,7 @@ inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, con
   ExpectSame(out.g, numeric.g, kNumeric);
 }
 
-/// L L' of the process noise, n_w x n_w.
+/// Returns L L' of the process noise, n_w x n_w.
 inline std::vector<double> Covariance(const SharedMotion& motion, const Blocks& x, double dt_s,
                                       const double* u = nullptr) {
   const int n = motion->noise_size();
@@ -51,7 +52,8 @@ inline std::vector<double> Covariance(const SharedMotion& motion, const Blocks& 
   return q;
 }
 
-/// A step without noise as matrices: F, and N = G Lq with Lq taken at `noise_of` over noise_dt_s.
+/// A step without noise as matrices: F, and N = G Lq with Lq evaluated at `noise_of` over
+/// noise_dt_s.
 struct NoisyStep {
   Blocks next;
   Eigen::MatrixXd f, n;
@@ -67,8 +69,8 @@ inline NoisyStep StepWithNoise(const SharedMotion& motion, const Blocks& x, cons
           Eigen::Map<const Rows>(step.g.data(), n, n_w) * l};
 }
 
-/// How far the noise of two steps is from that of one over both, of the kind that the model
-/// declares, relative to it.
+/// Returns the relative difference between the noise of two steps and that of one step over both,
+/// for the noise kind that the model declares.
 inline double DefectOfParts(const SharedMotion& motion, const Blocks& x, const double* u,
                             double first_s, double second_s) {
   const double both_s = first_s + second_s;

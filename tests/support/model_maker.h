@@ -12,7 +12,7 @@
 
 namespace alidade::testing {
 
-/// A host that answers from a map: models through the plugin ABI without a plugin file.
+/// Host that reads parameters from a map: runs models through the plugin ABI without a plugin file.
 class MapHost {
  public:
   using Values = std::map<std::string, std::vector<double>>;

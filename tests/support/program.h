@@ -37,14 +37,14 @@ inline bool Contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// What a program that ended has left.
+/// Result of a finished program.
 struct Outcome {
-  int code = -1;   ///< exit code, -1 where a signal ended it
-  int signal = 0;  ///< that ended it
+  int code = -1;   ///< exit code, -1 if a signal ended the program
+  int signal = 0;  ///< signal that ended the program, 0 if none
   std::string out, err;
 };
 
-// What the configs below share.
+// Common part of the configs below.
 inline const std::string kTargetConfig = R"(alidade: 1
 state:
   target:
@@ -58,7 +58,7 @@ inline const std::string kStereoConfig = R"(sensors:
            focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
 )";
 
-/// A target in depth, seen by a stereo pair and by its size.
+/// Config of a target whose depth is measured by a stereo pair and by its image size.
 inline const std::string kDepthConfig =
     kTargetConfig + R"(  template:
     model: constant
@@ -72,15 +72,15 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
 reference: truth
 )";
 
-/// Stereo alone, on a table.
+/// Config with stereo only, whose data come from a table.
 inline const std::string kTableConfig =
     kTargetConfig + kStereoConfig +
     R"(source: {type: csv, path: table.csv, streams: {disparity: d}}
 estimators: {ekf: {type: ekf}}
 )";
 
-/// The program of this build, run in a folder of its own that has `config.yaml` and `table.yaml`;
-/// the folder is called config, so that the first of them goes to `runs/config`.
+/// Runs the program of this build in a temporary folder with `config.yaml` and `table.yaml`. The
+/// folder is called `config`, so that the first of them writes to `runs/config`.
 class ProgramTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -95,12 +95,12 @@ class ProgramTest : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
   std::string Read(const std::string& name) const { return ReadText(folder_ / name); }
-  /// A JSON file whose top is an object; JSON is YAML too.
+  /// Reads a JSON file whose root is an object; JSON is also YAML.
   Config Json(const std::string& name) const { return Config::FromText(Read(name), name); }
   bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
 
-  /// Starts `alidade ARGUMENTS...`, its output going to files. A shell runs `before_`, which may
-  /// set limits and redirect, first.
+  /// Starts `alidade ARGUMENTS...` with its output redirected to files. If `before_` is set, a
+  /// shell first runs it, for example to set limits or to redirect.
   pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
     arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
     if (!before_.empty()) {
@@ -137,7 +137,8 @@ class ProgramTest : public ::testing::Test {
     return Wait(Start(std::move(arguments), out));
   }
 
-  /// `arguments`, with 5 m/s towards the camera from 0.3 m away.
+  /// Returns `arguments` extended by an initial state 0.3 m away that approaches the camera with 5
+  /// m/s.
   static Arguments Diverging(Arguments arguments) {
     arguments.insert(arguments.end(),
                      {"--set", "state.target.initial.depth_rate={mean: -5, sigma: 0}", "--set",

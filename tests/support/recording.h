@@ -14,7 +14,7 @@
 #include "support/systems.h"
 #include "support/temporary_folder.h"
 
-/// A small run to record, and what looks at the folder it leaves; for tests.
+/// A small run to record, and functions that read the resulting folder; for tests.
 namespace alidade::testing {
 
 namespace fs = std::filesystem;
@@ -46,8 +46,8 @@ inline std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-/// Depth 0.3 + 0.1 sin(0.4 * 2 pi t), measured exactly but for a wobble; its disparity on every
-/// other frame.
+/// Target at depth 0.3 + 0.1 sin(0.4 * 2 pi t), measured with a small deterministic error; its
+/// disparity only in every other frame.
 class SwingingTarget : public Source {
  public:
   explicit SwingingTarget(int frames) : frames_(frames) {}
@@ -103,7 +103,7 @@ inline Recorder::Options OptionsFor(const fs::path& folder, bool force = false,
   return {folder, force, figures, "alidade run swing.yaml"};
 }
 
-/// Runs what `recorder` is to record.
+/// Runs the experiment with `recorder` as its observer.
 inline RunResult RunInto(Recorder& recorder, Experiment& experiment) {
   RunOptions options;
   options.observers = {&recorder};
@@ -120,7 +120,7 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   recorder.Finish(result);
 }
 
-/// What `call` fails with, 0 where it does not; its text goes to `text`.
+/// Returns the exit code of the error that `call` throws, 0 if none; `text` receives its message.
 template <class Call>
 int CodeOf(const Call& call, std::string* text = nullptr) {
   try {
@@ -132,7 +132,7 @@ int CodeOf(const Call& call, std::string* text = nullptr) {
   return 0;
 }
 
-/// Exit code of `call` in a child process; 128 + n where signal n ended it.
+/// Returns the exit code of `call` in a child process, 128 + n if signal n ended it.
 template <class Call>
 int InChild(const Call& call) {
   const pid_t child = ::fork();

@@ -7,10 +7,10 @@
 #include "alidade/replay/replay.h"
 #include "support/program.h"
 
-/// What a run folder holds, to be compared with another.
+/// Comparison of run folders.
 namespace alidade::testing {
 
-/// The bytes of every file without the wall clock in it, by name.
+/// Returns the content of every file that contains no wall-clock time, by name.
 inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -21,7 +21,7 @@ inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   return files;
 }
 
-/// The same files with the same bytes; says which are not.
+/// Expects the same files with the same content; a failure names the file that differs.
 inline void ExpectSameFiles(const fs::path& folder, const fs::path& expected) {
   const auto files = RunFiles(folder), others = RunFiles(expected);
   EXPECT_GT(others.size(), 4u);

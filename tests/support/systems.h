@@ -14,7 +14,7 @@
 /// Small problems composed in C++, for tests.
 namespace alidade::testing {
 
-/// z = gain x + n, linear: the Kalman filter is exact.
+/// z = gain x + n: linear, so the Kalman filter is exact.
 struct Linear : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}};
   static constexpr Quantity kMeasurement{"z", "m"};
@@ -37,10 +37,10 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// The models that most tests are made of, compiled once.
+// Models used by most tests, compiled once.
 SharedSensor LinearSensor(double gain, double sigma);
 SharedMotion ConstantMotion(int size, double random_walk = 0.0);
-/// One axis, discrete noise.
+/// Constant velocity on one axis, with discrete noise.
 SharedMotion ConstantVelocityMotion(double acceleration);
 
 struct GivenPrior {
@@ -48,32 +48,35 @@ struct GivenPrior {
   double mean, sigma;
 };
 
-/// Adds a state entry whose scalar blocks start at the given priors.
+/// Adds a state entry whose scalar blocks have the given priors.
 void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors);
-/// Adds a sensor of the stream of its name.
+/// Adds a sensor that reads the stream with its own name.
 void AddSensor(Problem& problem, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks);
 
-/// Constant velocity but for an acceleration that each step has by itself, constant during it.
+/// Constant velocity with a random acceleration that is constant within a step and independent
+/// between steps.
 struct Jolted : ConstantVelocity<1, false> {
   using ConstantVelocity<1, false>::ConstantVelocity;
   NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
 };
 
-/// A point that moves with constant velocity, jolted at each step: blocks `p.x`, `p.v`.
+/// Point with the motion model Jolted: blocks `p.x`, `p.v`.
 Problem MovingPoint(double acceleration = 1.0);
-/// The same, with an acceleration that is held from one update to the next.
+/// Returns MovingPoint with an acceleration that is constant from one update to the next.
 Problem HeldPoint(double acceleration = 1.0);
 
-/// The depth filter: blocks `target.depth`, `target.depth_rate`, `template.inverse_distance`;
-/// sensors `disparity` (BF = 26 px m, 1 px) and `inverse_scale` (300 px, 1 px).
+/// Returns the depth filter: blocks `target.depth`, `target.depth_rate`,
+/// `template.inverse_distance`; sensors `disparity` (BF = 26 px m, 1 px) and `inverse_scale` (300
+/// px, 1 px).
 Problem DepthFilter();
 
-/// The same problem, the block `name` (empty: every block) estimated, consider or constant.
+/// Returns the problem with the status of block `name` replaced; if `name` is empty, of every
+/// block.
 Problem WithStatus(Problem problem, const std::string& name, BlockStatus status);
 
-/// z = sqrt(5 - x), not a number once x passes 5, and no more its Jacobian.
+/// z = sqrt(5 - x), NaN for x > 5, as is its Jacobian.
 struct Broken : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -89,7 +92,8 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-/// An orientation that walks at random, known to 0.1 rad at first and measured to 0.05 rad.
+/// Returns a problem of an orientation that walks at random, with a prior of 0.1 rad, measured to
+/// 0.05 rad.
 Problem WalkingOrientation();
 
 }  // namespace alidade::testing

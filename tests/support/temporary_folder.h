@@ -10,7 +10,7 @@
 
 namespace alidade::testing {
 
-/// A folder of its own, which is gone with its owner: tests run next to each other.
+/// Unique temporary folder, deleted with the object: tests run in parallel.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -6,10 +6,11 @@
 
 #include "alidade/evaluate/evaluate.h"
 
-/// Trajectories made by formula, for tests of their evaluation.
+/// Generated trajectories, for tests of their evaluation.
 namespace alidade::testing {
 
-/// `poses` poses, 0.1 s apart from 100 s on, on a curve that bends in all directions and turns.
+/// Returns `poses` poses, 0.1 s apart from 100 s on, on a curve in space with a changing
+/// orientation.
 inline Trajectory Curve(int poses) {
   Trajectory t;
   t.name = "curve.tum";
@@ -25,7 +26,7 @@ inline Trajectory Curve(int poses) {
   return t;
 }
 
-/// A straight line along x, `step_m` each 0.1 s, not turning.
+/// Returns a straight line along x with steps of `step_m` each 0.1 s, without rotation.
 inline Trajectory Line(int poses, double step_m) {
   Trajectory t = Curve(poses);
   for (int i = 0; i < poses; ++i) {
@@ -35,12 +36,12 @@ inline Trajectory Line(int poses, double step_m) {
   return t;
 }
 
-/// A turn by `angle` about an axis that is not one of the three.
+/// Returns a rotation by `angle` about an axis that is not a coordinate axis.
 inline Eigen::Quaterniond Turn(double angle) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()));
 }
 
-/// What takes `Inverse(s) * t` back to t.
+/// Returns the inverse of the similarity `s`.
 inline Similarity Inverse(const Similarity& s) {
   Similarity inverse;
   inverse.scale = 1.0 / s.scale;

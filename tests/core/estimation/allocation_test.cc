@@ -18,8 +18,8 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // the sanitizers replace malloc themselves
+// The sanitizers replace malloc themselves.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // Counts every allocation of this program, including those of operator new and of Eigen.
 extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
 extern "C" void* malloc(std::size_t size) noexcept {

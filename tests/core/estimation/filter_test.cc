@@ -111,7 +111,7 @@ TYPED_TEST(Live, AtIsWhereAFrameWithoutMeasurementsLeads) {
     ExpectSame(at, run.state());
     EXPECT_NE(at.covariance().Dense(), before.covariance().Dense());
   }
-  ExpectSame(filter.At(0), filter.state());  // for a time in the past, At returns the current state
+  ExpectSame(filter.At(0), filter.state());  // the current state, for a past time
 }
 
 // Runs 250 random sequences per filter type.

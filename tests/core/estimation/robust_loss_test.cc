@@ -204,8 +204,8 @@ TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   EXPECT_EQ(count, 2);
 }
 
-// Central differences with step 1e-5: errors of 1e-10 f''' and of rounding, 1e-11. No loss has a kink
-// at these points.
+// Central differences with step 1e-5: their errors are 1e-10 f''' and the rounding error, 1e-11. No
+// loss has a kink at these points.
 TEST(EveryLoss, HasTheWeightAndTheCurvatureOfItsRho) {
   constexpr double kStep = 1e-5, kTolerance = 1e-8;
   for (std::size_t kind = 0; kind < kLosses.size(); ++kind) {

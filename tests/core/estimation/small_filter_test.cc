@@ -165,7 +165,7 @@ std::vector<Frame> WildFrom(int first, int last, int count) {
   return frames;
 }
 
-// A reset changes only its own block.
+// A reset does not change the order of the blocks in the state.
 TEST(SmallEkf, IsResetAsALargeOne) {
   EkfOptions options;
   options.gate = 0.999;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Sizes, places and values of plugin ABI 1.0. What fails here breaks every plugin that was built
- * before: a later minor version may only append lines to this file, for reserved members that it
- * has taken and structs of plugins that have grown. */
+/* Sizes, offsets and values of plugin ABI 1.0. A failure here means that every plugin built before
+ * breaks. A later minor version may only append lines to this file, for reserved members that it
+ * uses and for structs of plugins that it extends. */
 #include "alidade/model/plugin_abi.h"
 
 #ifdef __cplusplus

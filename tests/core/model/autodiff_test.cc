@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dual numbers and thunks: what an author's model is behind the plugin ABI.
+// Dual numbers and the functions that wrap an author's model for the plugin ABI.
 #include "alidade/model/autodiff.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ using testing::SensorJacobian;
 using testing::StepResult;
 using testing::StepWithJacobians;
 
-/// Whether outputs are as they were before the call of a plugin.
+/// Whether a plugin call left its outputs unchanged.
 bool NotWritten(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double x) { return x == kPoison; });
 }
@@ -97,7 +97,7 @@ TEST(AutodiffMotion, OutOfDomainWritesNothing) {
 }
 
 TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
-  // The host passes zeros; another host may pass null, as the ABI allows.
+  // The host of this project passes zeros; another host may pass null, as the ABI allows.
   const auto turn = AbiMotion<Turn>();
   const AlidadeInstance& c = turn->instance().c();
   const Blocks x{{1, 0, 0, 0}};
@@ -141,7 +141,7 @@ TEST(AutodiffMotion, TheJacobianByTheControlInputIsThatOfDifferences) {
   EXPECT_EQ(b[3], kPoison) << "the stride is kept";
 }
 
-/// x' = x + w, with an analytic Jacobian that throws once it has written.
+/// x' = x + w, with an analytic Jacobian that throws after writing.
 struct Faulty : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   explicit Faulty(Params&) {}
@@ -172,7 +172,7 @@ TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
   EXPECT_TRUE(NotWritten({f, g, l}));
 }
 
-/// Bearing of a point from a pose: an angle measured, an optional bias role.
+/// Bearing of a point from a pose: an angle, with an optional role for a bias.
 struct Bearing : Sensor<Angle, Vec<2>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
                                      Quantity{"bias", "rad", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -227,7 +227,7 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   EXPECT_TRUE(NotWritten({z}));
 }
 
-/// z = x, with an analytic Jacobian that throws once it has written, where x < 0.
+/// z = x, with an analytic Jacobian that throws after writing if x < 0.
 struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -262,7 +262,8 @@ TEST(AutodiffSensor, AnAnalyticJacobianThatThrowsWritesNothing) {
   EXPECT_EQ(by_y, 0.0);
 }
 
-/// Inverse measurement model of a point at a known position: roles of different sizes.
+/// Displacement of a point from a camera, with an inverse measurement model and roles of different
+/// sizes.
 struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
                                      Quantity{"camera", "m", "", "x,y,z"}};
@@ -285,7 +286,7 @@ struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   }
 };
 
-/// z = x, and an analytic Jacobian of more numbers than are copied one by one.
+/// z = x, with an analytic Jacobian so large that it is copied as a whole.
 struct Wide : Sensor<Vec<20>, Vec<20>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   template <class T>

@@ -47,7 +47,7 @@ Pixel Projected(const Camera& camera, const Point& h) {
 void ExpectPixels(const Camera& camera, const std::array<Pixel, 5>& expected) {
   for (std::size_t i = 0; i < expected.size(); ++i) {
     const Pixel z = Projected(camera, kPoints[i]);
-    // The numbers below are printed to 15 digits.
+    // The expected pixels are printed to 15 digits.
     EXPECT_NEAR(z[0], expected[i][0], 2e-12) << "point " << i;
     EXPECT_NEAR(z[1], expected[i][1], 2e-12) << "point " << i;
   }
@@ -69,7 +69,7 @@ TEST(Camera, ProjectsAsOpenCvDoes) {
 }
 
 TEST(Camera, ProjectsAsMonoSlamDoes) {
-  // r_d (1 + k1 r_d^2 + k2 r_d^4) = r_u in mm, halved 200 times.
+  // Solution of r_d (1 + k1 r_d^2 + k2 r_d^4) = r_u in mm, by 200 bisections.
   ExpectPixels(Photogrammetric(), {{{216.180981148085, 91.5608935203241},
                                     {80.2554343010394, 182.177924751688},
                                     {160.223214285714, 128.866071428571},
@@ -102,14 +102,14 @@ TEST(Camera, DerivativesOfProjectAgreeWithDifferences) {
       Jet3 h[3], z[2];
       for (int i = 0; i < 3; ++i) h[i] = Jet3(point[static_cast<std::size_t>(i)], i);
       ASSERT_TRUE(camera.Project(h, z));
-      EXPECT_NEAR(z[0].a, Projected(camera, point)[0], 1e-12);  // a rounding of other order
+      EXPECT_NEAR(z[0].a, Projected(camera, point)[0], 1e-12);  // operations in another order
       EXPECT_NEAR(z[1].a, Projected(camera, point)[1], 1e-12);
       for (int k = 0; k < 3; ++k) {
         Point more = point, less = point;
         more[static_cast<std::size_t>(k)] += kStep;
         less[static_cast<std::size_t>(k)] -= kStep;
         const Pixel a = Projected(camera, more), b = Projected(camera, less);
-        // h^2 times third derivatives, of order 1e4 px; rounding is 1e-13 / h
+        // Error: h^2 times third derivatives of order 1e4 px; rounding is 1e-13 / h.
         EXPECT_NEAR(z[0].v[k], (a[0] - b[0]) / (2 * kStep), 1e-5);
         EXPECT_NEAR(z[1].v[k], (a[1] - b[1]) / (2 * kStep), 1e-5);
       }
@@ -148,7 +148,7 @@ TEST(Camera, IsDefinedInFrontOfIt) {
   EXPECT_NEAR(z[0], 320.5 + 525 * std::acos(0.0), 1e-12);
 }
 
-// k1 = -0.3 alone: r (1 - 0.3 r^2) turns back at r^2 = 1 / 0.9.
+// With k1 = -0.3 only, r (1 - 0.3 r^2) has its maximum at r^2 = 1 / 0.9.
 TEST(Camera, IsDefinedWhereTheDistortionGrows) {
   const Camera camera = Made(CameraModel::kRadtan, {-0.3, 0, 0, 0});
   const double turn = 1.0 / std::sqrt(0.9);
@@ -160,7 +160,7 @@ TEST(Camera, IsDefinedWhereTheDistortionGrows) {
   EXPECT_EQ(z, (Pixel{7, 7}));
   const Point within{turn * 0.99, 0, 1};
   EXPECT_TRUE(camera.Project(within.data(), z.data()));
-  const Pixel beyond{320.5 + 525 * turn, 239.25};  // the image of no ray
+  const Pixel beyond{320.5 + 525 * turn, 239.25};  // no ray has this image
   Point h{7, 7, 7};
   EXPECT_FALSE(camera.Unproject(beyond.data(), h.data()));
 }

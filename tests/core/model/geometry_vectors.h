@@ -8,8 +8,9 @@
 
 namespace alidade::testing {
 
-/// y = x (+) d, from the formulas of plugin_abi.h in 40 digits. They pin what is compiled into
-/// every plugin: a host that computes others gives it wrong tangents.
+/// y = x (+) d, computed from the formulas of plugin_abi.h with 40 digits. These values fix the
+/// formulas that are compiled into every plugin: a host with other formulas would interpret its
+/// tangents wrongly.
 struct PlusOfGeometry {
   std::uint32_t geometry;
   std::array<double, 4> x;

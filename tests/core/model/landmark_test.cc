@@ -17,7 +17,7 @@ using testing::Vec3;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// A camera at r, turned by q, and a point 4 m away.
+// A camera at kPosition with orientation kTurn, and a point 4 m away.
 const Vec3 kPosition{0.4, -1.1, 0.3};
 const std::array<double, 4> kTurn{0.8, 0.2, -0.4, 0.4};
 const Vec3 kPoint{1.4, 0.9, 3.6};
@@ -40,7 +40,7 @@ TEST(Landmark, InverseDepthHasTheAnglesOfMonoSlam) {
   EXPECT_NEAR(ray.direction[0], std::sqrt(3.0) / 2, 1e-15);
   EXPECT_NEAR(ray.direction[1], -0.5, 1e-15);
   EXPECT_NEAR(ray.direction[2], 0.0, 1e-15);
-  // 4 m from the anchor
+  // The point is 4 m from the anchor.
   double p[3];
   ASSERT_TRUE(Xyz::FromRay(ray, p));
   EXPECT_NEAR(p[0], 1 + 2 * std::sqrt(3.0), 1e-14);
@@ -71,7 +71,7 @@ TEST(Landmark, IsSeenAtInfinityTheSameFromEverywhere) {
 }
 
 TEST(Landmark, IsPlacedWhereItIsSeen) {
-  const Vec3 h{0.3, -0.2, 1.7};  // of any length
+  const Vec3 h{0.3, -0.2, 1.7};  // not of unit length
   ForEachRepresentation([&](auto representation) {
     using Representation = decltype(representation);
     double y[detail::Blocks<Representation>::kAmbient], p[3];
@@ -80,7 +80,8 @@ TEST(Landmark, IsPlacedWhereItIsSeen) {
     Vec3 along, seen;
     for (std::size_t i = 0; i < 3; ++i) along[i] = p[i] - kPosition[i];
     UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
-    const double scale = 4.0 / std::sqrt(0.09 + 0.04 + 1.7 * 1.7);  // 4 m away, along h
+    const double scale =
+        4.0 / std::sqrt(0.09 + 0.04 + 1.7 * 1.7);  // 4 m away in the direction of h
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen[i], scale * h[i], 1e-14);
   });
 }
@@ -134,8 +135,8 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
 }
 
 TEST(Landmark, LinearityIndexIsThatOfCivera) {
-  // The anchor at the origin, the point 4 m ahead, the camera 3 m next to the anchor: d1 = 5 m,
-  // cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
+  // The anchor is at the origin, the point 4 m ahead, and the camera 3 m to the side: d1 = 5 m, cos
+  // alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
   const double y[6] = {0, 0, 0, 0, 0, 0.25};
   const double beside[3] = {3, 0, 0};
   EXPECT_NEAR(LinearityIndex(InverseDepth::ToRay(y), 0.02, beside), 0.2048, 1e-15);

@@ -95,7 +95,7 @@ TEST(StaticEkf, HoldsDiscreteNoiseOverAGapOfManySteps) {
   }
 }
 
-/// Two numbers at once, correlated noise, two roles of two numbers each.
+/// Two elements with correlated noise and two roles of two elements each.
 struct Difference : Sensor<Vec<2>, Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"a", "m", "", "x,y"}, Quantity{"b", "m", "", "x,y"}};
   static constexpr Quantity kMeasurement{"z", "m", "", "x,y"};
@@ -123,7 +123,7 @@ TEST(StaticEkf, UpdatesWithVectorsAndDerivedJacobiansAsTheTextbookSays) {
   filter.Set<2>(v, 0.5 * own);
   constexpr double kDt = 0.5;
   ASSERT_EQ(filter.Predict(kDt), Status::kOk);
-  // By hand, order a, b, v.
+  // Computed by hand, in the order a, b, v.
   Eigen::Matrix<double, 6, 6> f = Eigen::Matrix<double, 6, 6>::Identity(), p = f, q = 0.0 * f;
   p.setZero();
   p.block<2, 2>(0, 0) = own;
@@ -179,7 +179,7 @@ TEST(StaticEkf, WhatCannotBeUsedChangesNothing) {
   EXPECT_EQ(filter.Update<kDepth>(stereo, &d), StaticOutcome::kOutOfDomain);
 }
 
-/// x' = 2 x + w: overflows in the end.
+/// x' = 2 x + w, which overflows eventually.
 struct Doubling : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -189,7 +189,7 @@ struct Doubling : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// z = x_1 of two, to 1.
+/// z = x_1 of two elements, with sigma 1.
 struct First : Sensor<Vec<1>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -208,7 +208,7 @@ TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
   const double largest = std::numeric_limits<double>::max();
   StaticEkf<Doubling> filter{Doubling()};
   filter.Set<0>(0.75 * largest, 1.0);
-  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // of x
+  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // x overflows
   EXPECT_EQ(*filter.value<0>(), 0.75 * largest);
   EXPECT_EQ(filter.covariance()(0, 0), 1.0);
   filter.Set<0>(3.0, 1.0);
@@ -216,7 +216,7 @@ TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
   p(0) = 0.5 * largest;
   const double three = 3.0;
   filter.Set<0>(&three, p);
-  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // of P, four times as large
+  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // P, four times as large, overflows
   EXPECT_EQ(*filter.value<0>(), 3.0);
   EXPECT_EQ(filter.covariance(), p);
   filter.Set<0>(3.0, 1.0);
@@ -224,7 +224,7 @@ TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
   EXPECT_EQ(*filter.value<0>(), 6.0);
 }
 
-// r = 1e150, S = 2: NIS is 5e299, but K r = 5e302 takes x_2 beyond the largest number.
+// r = 1e150, S = 2: the NIS of 5e299 is finite, but K r = 5e302 makes x_2 overflow.
 TEST(StaticEkf, AnUpdateToWhatIsNotFiniteIsReportedAndChangesNothing) {
   const double largest = std::numeric_limits<double>::max();
   StaticEkf<Constant<2>> filter{Constant<2>(2)};

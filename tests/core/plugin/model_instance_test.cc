@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a plugin says of itself, checked.
+// Checks of the descriptions that a plugin supplies.
 #include "alidade/plugin/model_instance.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-/// A sensor written by hand against the C header, right unless a test spoils it.
+/// A sensor implemented directly against the C header. It is valid unless a test changes it.
 struct HandWritten {
   HandWritten() {
     role.struct_size = output.struct_size = sizeof(AlidadeSpace);
@@ -40,7 +40,7 @@ struct HandWritten {
     instance.description = &description;
     instance.sensor = &sensor;
   }
-  /// Makes a space a product of two scalars, `a` and `b`.
+  /// Turns a space into a product of two scalars, `a` and `b`.
   void Divide(AlidadeSpace& space) {
     parts[0] = parts[1] = output;
     parts[0].name = "a";
@@ -51,7 +51,7 @@ struct HandWritten {
     space.part_count = 2;
     space.part_stride = sizeof(AlidadeSpace);
   }
-  /// Makes the role a state of the sensor.
+  /// Turns the role into a model parameter state of the sensor.
   AlidadeOwned& Own() {
     owned.struct_size = sizeof(owned);
     role.flags = ALIDADE_ROLE_OWNED;
@@ -158,7 +158,7 @@ TEST(ModelInstance, IgnoresHintsThatItDoesNotKnow) {
 }
 
 TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
-  // A plugin of another language may not know null.
+  // A plugin in another language may not support null.
   HandWritten hand;
   AlidadeMotion motion{};
   motion.struct_size = sizeof(motion);

@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 constexpr double kKernelRounding = 1e-11;
 
-/// An update of n states by measurements of so many rows each, and the matrices that it stands for.
+/// An update of n states by measurements with the given numbers of rows, and its dense matrices.
 struct KernelProblem {
   KernelProblem(int n, const std::vector<int>& rows, Random& random)
       : size(n), stride(PaddedSize(n)), capacity(2) {
@@ -47,7 +47,7 @@ struct KernelProblem {
     }
   }
 
-  /// The memory of the update, for these kernels.
+  /// Prepares the memory of the update for these kernels.
   Update Begin(const Kernels& kernels) {
     const auto number = [](int count) { return static_cast<std::size_t>(count); };
     const int rows = PaddedSize(capacity);
@@ -58,7 +58,8 @@ struct KernelProblem {
     update.p = {take(stride * stride), size, stride};
     for (int j = 0; j < size; ++j) {
       for (int i = j; i < size; ++i) update.p(i, j) = p(i, j);
-      for (int i = 0; i < j; ++i) update.p.data[j * stride + i] = 7.0;  // counts for nothing
+      for (int i = 0; i < j; ++i)
+        update.p.data[j * stride + i] = 7.0;  // the upper triangle is not used
     }
     update.capacity = capacity;
     update.panel_rows = kernels.panel_rows;
@@ -109,8 +110,8 @@ double RelativeDifference(const MatrixXd& a, const MatrixXd& b) {
   return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());
 }
 
-/// Calls test(kernels, n) for all kernels that this processor runs, of sizes below, at and above
-/// those of their panels.
+/// Calls test(kernels, n) for all kernels that this processor supports, with sizes below, at and
+/// above that of their panels.
 template <class Test>
 void ForAllKernels(const Test& test) {
   for (int n = 1; n <= 8; ++n) {
@@ -187,7 +188,8 @@ TEST(Kernels, AStepIsThatOfTheTextbook) {
       KernelProblem problem(n, {1}, random);
       Update update = problem.Begin(kernels);
       std::vector<int> rows;
-      for (int i = 0; i < k; ++i) rows.push_back((n - 1 + i * (n - 1)) % n);  // not in their order
+      for (int i = 0; i < k; ++i)
+        rows.push_back((n - 1 + i * (n - 1)) % n);  // not in ascending order
       for (const int width : {0, 1, 3}) {
         const RowMajor f = RandomMatrix(k, k, random), l = RandomMatrix(k, width, random),
                        cross = 0.1 * RandomMatrix(k, k, random);

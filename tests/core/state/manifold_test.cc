@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kPoints = 200;
-// Rounding of a dozen operations on numbers up to 10.
+// Rounding error of a dozen operations on numbers up to 10.
 constexpr double kTolerance = 2e-14;
 
 using Values = std::array<double, 7>;
@@ -77,8 +77,8 @@ TEST_P(GeometryLaws, HoldAtRandomPointsAndStepsOfEverySize) {
 }
 
 TEST_P(GeometryLaws, SmallStepsKeepTheirDigits) {
-  // Where sin(d)/d changes to its series the derivative must not jump: relative error, not
-  // absolute.
+  // The derivative must not jump at the change from sin(d)/d to its series. The relative error
+  // counts, not the absolute one.
   const Values x = [&] {
     Values identity{};
     std::ranges::copy(geometry_.Identity(), identity.begin());
@@ -113,7 +113,7 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
       below[c] -= kStep;
       const Values up = Minus(Plus(x, above), y), down = Minus(Plus(x, below), y);
       for (std::size_t r = 0; r < n; ++r) {
-        // Rounding of 1e-16 over the step, and its square.
+        // Rounding error of 1e-16 divided by the step, and the square of the step.
         EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
       }
     }
@@ -121,7 +121,8 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
 }
 
 TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
-  constexpr double kTransport = 1e-11;  // rounding / (1 + from . to), whose smallest is 1e-4 here
+  constexpr double kTransport =
+      1e-11;  // rounding error / (1 + from . to); the smallest divisor here is 1e-4
   const int n = geometry_.tangent;
   for (int i = 0; i < kPoints; ++i) {
     const Values from = Point(), to = Point();
@@ -251,7 +252,7 @@ TEST(UnitQuaternion, QuarterTurnAboutZ) {
   EXPECT_NEAR(q[3], std::sqrt(0.5), 1e-15);
 }
 
-/// d/dt of x (+) t d at t = 1, in the tangent of the point reached there, by central differences.
+/// d/dt of x (+) t d at t = 1, in the tangent space at the end point, by central differences.
 std::array<double, 2> VelocityAtTheEnd(const double* x, const double* d) {
   const Geometry geometry = Geometry::UnitVector();
   constexpr double kStep = 1e-5;
@@ -281,14 +282,16 @@ TEST(UnitVector, TransportCarriesTheVelocityOfAGeodesicAlongIt) {
     const auto velocity = VelocityAtTheEnd(x, d);
     for (int row = 0; row < 2; ++row) {
       const double carried = j[2 * row] * d[0] + j[2 * row + 1] * d[1];
-      EXPECT_NEAR(carried, velocity[row], 1e-8);  // central differences: step^2 and rounding / step
+      EXPECT_NEAR(carried, velocity[row],
+                  1e-8);  // central differences: step^2 and rounding error / step
       EXPECT_NEAR(carried, -homeward[row], 1e-12);
     }
   }
 }
 
 TEST(UnitVector, TransportKeepsOrientation) {
-  // An orthogonal J could still mirror; det J = 1 everywhere, also across the seam of the basis.
+  // An orthogonal J could still be a reflection; det J = 1 everywhere, also across the
+  // discontinuity of the basis.
   const Geometry geometry = Geometry::UnitVector();
   const double from[3] = {std::sqrt(1 - 1e-6), 0, 1e-3}, to[3] = {std::sqrt(1 - 1e-6), 0, -1e-3};
   double j[4];
@@ -304,7 +307,7 @@ TEST(UnitVector, MinusIsTrueUpToTheAntipode) {
     double y[3], back[2];
     geometry.Plus(x, d, y);
     geometry.Minus(y, x, back);
-    // The direction is that of a vector of length `short_of`, known to rounding.
+    // The direction comes from a vector of length `short_of` with rounding errors.
     const double tolerance = 2e-15 / short_of;
     EXPECT_NEAR(back[0], d[0], tolerance);
     EXPECT_NEAR(back[1], d[1], tolerance);
@@ -367,7 +370,7 @@ TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
   EXPECT_EQ(FindGeometry(99), nullptr);
 }
 
-// The same derivative by dual numbers, to rounding.
+// Compares with the derivative by dual numbers, up to rounding.
 TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
   const auto visit = [&]<class G>(G) {
     const Geometry geometry = Geometry::Of<G>();

@@ -14,7 +14,7 @@ inline Eigen::MatrixXd RandomMatrix(Eigen::Index rows, Eigen::Index columns, Ran
   return m;
 }
 
-/// A covariance of rows taken in the given parts, all correlated.
+/// Returns a full random covariance of blocks with the given sizes.
 inline Covariance RandomCovariance(const std::vector<int>& parts, Random& random) {
   Covariance p;
   for (const int rows : parts) p.Add(rows);

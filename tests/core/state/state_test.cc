@@ -20,7 +20,7 @@ void Move(State& state, const Eigen::VectorXd& dx) {
 
 Space Named(const Geometry& geometry) { return {"value", "m", "", {""}, geometry, 0}; }
 
-/// Blocks a (2), b (1), c (2), all correlated.
+/// Returns a state of the correlated blocks a (2), b (1) and c (2).
 State Abc() {
   State state;
   const double zero[2] = {1.0, 2.0};
@@ -106,7 +106,7 @@ TEST(State, DropKeepsTheRestAndFillsTheGap) {
   State state = Abc();
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
   state.Remove(state.layout().Find("s.a"));
-  // c, the last block of the same size, moved into the place of a.
+  // Block c, the last one of the same size, moved to the position of a.
   EXPECT_EQ(state.covariance().size(), 3);
   EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
   EXPECT_EQ(state.layout()[state.layout().Find("s.c")].tangent_offset, 0);
@@ -196,7 +196,7 @@ TEST(State, MovesOnTheManifold) {
   const BlockId q = state.Declare("s.q", "s", Named(Geometry::UnitQuaternion()));
   const double identity[4] = {1, 0, 0, 0};
   state.Add(q, identity, Eigen::Matrix3d::Identity());
-  // Half a turn about z by two quarter turns.
+  // A half turn about z in two quarter turns.
   const double quarter = std::acos(0.0);
   Move(state, Eigen::Vector3d(0, 0, quarter));
   Move(state, Eigen::Vector3d(0, 0, quarter));
@@ -221,7 +221,7 @@ TEST(State, MoveToTransportsTheCovarianceOfADirection) {
 TEST(StateLayout, ABlockIsDeclaredLikeAnotherOfTheSameLayout) {
   StateLayout layout;
   layout.Declare("s.a", "s", Named(Geometry::UnitQuaternion()));
-  for (int i = 0; i < 20; ++i) {  // blocks move in memory
+  for (int i = 0; i < 20; ++i) {  // reallocates the blocks
     const Block& first = layout[0];
     const BlockId id = layout.Declare("s." + std::to_string(i), first.owner, first.space);
     EXPECT_EQ(layout[id].owner, "s");

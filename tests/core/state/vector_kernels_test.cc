@@ -21,13 +21,13 @@ MatrixXd Drawn(Eigen::Index rows, Eigen::Index columns, Random& random) {
   return m;
 }
 
-/// The largest difference of two matrices, relative to the largest number of the second.
+/// Returns the largest difference of two matrices, relative to the largest element of the second.
 double Difference(const MatrixXd& a, const MatrixXd& b) {
   if (b.size() == 0) return 0.0;
   return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());
 }
 
-/// Sizes below, at and above those that the loops take at once.
+/// Sizes below, at and above the numbers of rows that one loop iteration processes.
 constexpr Eigen::Index kRowCounts[] = {0, 1, 2, 3, 7, 8, 23, 24, 25, 49, 193, 300};
 
 TEST(VectorKernels, ProductsAreThoseOfEigen) {
@@ -76,7 +76,7 @@ TEST(VectorKernels, DividesAsEigen) {
     const VectorKernels& kernels = VectorKernelsOf(set);
     for (const Eigen::Index rows : kRowCounts) {
       for (const Eigen::Index m : {0, 1, 4, 9, 64, 300}) {
-        MatrixXd l = 0.1 * Drawn(m, m, random);  // what is above the diagonal is not read
+        MatrixXd l = 0.1 * Drawn(m, m, random);  // the upper triangle is not read
         l.diagonal().array() += 2.0;
         const MatrixXd before = Drawn(rows + 3, m, random);
         MatrixXd b = before;

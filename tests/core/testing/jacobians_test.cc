@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// z = b x y with a factor b that comes with the measurement; kFault: times dz/dy as it is given.
+/// z = b x y with a factor b that is supplied with the measurement. The analytic dz/dy is
+/// multiplied by kFault.
 template <int kFault>
 struct Scaled : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
@@ -45,7 +46,8 @@ TEST(Jacobians, OfASensorAreThoseOfTheModelAndOfDifferences) {
   EXPECT_EQ(SensorJacobian(wrong, roles, &factor), (std::vector<double>{10.0, 12.0}));
   for (const SharedSensor& sensor : {right, wrong}) {
     const std::vector<double> numeric = NumericSensorJacobian(sensor, roles, &factor);
-    EXPECT_LT(LargestDifference(numeric, {10.0, 6.0}), 1e-11);  // rounding of 30 over 1e-3
+    EXPECT_LT(LargestDifference(numeric, {10.0, 6.0}),
+              1e-11);  // rounding error of 30, divided by 1e-3
   }
   EXPECT_THROW(SensorJacobian(right, {{-1.0}, {5.0}}, &factor), ContractViolation);
   EXPECT_THROW(NumericSensorJacobian(right, {{1e-4}, {5.0}}, &factor), ContractViolation);

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// The kinds of events, in the order of kEventKinds.
+/// Kinds of events, in the order of kEventKinds.
 enum class EventKind {
   kDiverged,
   kFailed,
@@ -47,21 +47,22 @@ enum class EventKind {
   kEstimatorSpecific,
 };
 
+/// Severity of a kind of event.
 enum class EventSeverity {
   kInfo,     ///< for the record
   kWarning,  ///< the estimates may be worse than the filter believes
   kError,    ///< the estimator, or one of its sensors, ended
 };
 
-/// A kind of event.
+/// Name, severity and meaning of a kind of event.
 struct EventKindInfo {
   EventKind kind;
-  const char* name;  ///< in files
+  const char* name;  ///< the word in files
   EventSeverity severity;
   const char* meaning;  ///< a sentence for the documentation
 };
 
-/// All kinds of events. A new kind is a value of EventKind and a row here.
+/// All kinds of events. To add a kind, add a value of EventKind and an entry here.
 inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kDiverged, "diverged", EventSeverity::kError,
                   "an estimate left the domain of its models; the estimator ended"},
@@ -86,14 +87,14 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
-                  "the source names a truth that no frame had"},
+                  "the source names a truth that no frame provided"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
                   "no sensor of this estimator determines this direction of the state"},
     EventKindInfo{
         EventKind::kObservability, "observability", EventSeverity::kInfo,
         "unobservable directions were not searched for: the state has more than 500 elements"},
     EventKindInfo{EventKind::kRejectionRecovery, "rejection_recovery", EventSeverity::kWarning,
-                  "a sensor was rejected so often in a row that the filter recovers"},
+                  "many measurements of a sensor in a row were rejected; the filter recovers"},
     EventKindInfo{
         EventKind::kRepaired, "repaired", EventSeverity::kWarning,
         "a covariance lost positive semi-definiteness and was repaired (`max_covariance_repairs`)"},
@@ -109,20 +110,20 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kNotConverged, "not_converged", EventSeverity::kWarning,
                   "an iteration ended before it converged"},
     EventKindInfo{EventKind::kStale, "stale", EventSeverity::kWarning,
-                  "the frame is older than the state, so its measurements are not used; once for "
-                  "each such run of frames"},
+                  "the frame is older than the state, so its measurements are not used; reported "
+                  "once for consecutive frames"},
     EventKindInfo{EventKind::kOutOfSequence, "out_of_sequence", EventSeverity::kWarning,
                   "the frame was dropped: it is older than `out_of_sequence.window_s` allows"},
     EventKindInfo{EventKind::kInputStale, "input_stale", EventSeverity::kWarning,
                   "a motion model steps with u = 0: no control input has arrived, or the last is "
                   "older than `timeout_s`"},
     EventKindInfo{EventKind::kInputRefused, "input_refused", EventSeverity::kWarning,
-                  "a control input is not finite; once until one is accepted"},
+                  "a control input is not finite; reported once until an input is accepted"},
     EventKindInfo{EventKind::kSubsteps, "substeps", EventSeverity::kInfo,
-                  "a gap is longer than `max_dt_s` and was stepped in parts, at least twice as "
-                  "many as reported before"},
+                  "a gap longer than `max_dt_s` was divided into steps, at least twice as many as "
+                  "in the last report"},
     EventKindInfo{EventKind::kTooManySubsteps, "too_many_substeps", EventSeverity::kError,
-                  "a gap needs more parts than allowed; the estimator ended"},
+                  "a gap needs more steps than allowed; the estimator ended"},
     EventKindInfo{EventKind::kSolution, "solution", EventSeverity::kInfo,
                   "the end of the batch: its iterations, and whether it converged"},
     EventKindInfo{EventKind::kNoSolution, "no_solution", EventSeverity::kError,
@@ -134,12 +135,11 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kSolvedAsAWhole, "solved_as_a_whole", EventSeverity::kInfo,
                   "an incremental solve was repeated over all data"},
     EventKindInfo{EventKind::kInexact, "inexact", EventSeverity::kWarning,
-                  "variances of the batch may be wrong by rounding: a prior is very vague"},
-    EventKindInfo{
-        EventKind::kSlow, "slow", EventSeverity::kInfo,
-        "the batch has so many noise inputs that the time of a solve grows with their cube"},
+                  "variances of the batch may have large rounding errors: a prior is very vague"},
+    EventKindInfo{EventKind::kSlow, "slow", EventSeverity::kInfo,
+                  "the batch has many noise inputs; the time of a solve grows with their cube"},
     EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
-                  "an event of an estimator plugin that has no kind of its own here"},
+                  "an event of an estimator plugin without a kind in this list"},
 };
 static_assert(
     [] {
@@ -148,26 +148,26 @@ static_assert(
       }
       return kEventKinds.back().kind == EventKind::kEstimatorSpecific;
     }(),
-    "one row for each kind, in the order of EventKind");
+    "one entry for each kind, in the order of EventKind");
 
-/// The row of a kind.
+/// Returns the entry of a kind.
 inline const EventKindInfo& InfoOf(EventKind kind) {
   return kEventKinds[static_cast<std::size_t>(kind)];
 }
-/// The name of a kind, as in files: `diverged`.
+/// Returns the name of a kind as in files: `diverged`.
 inline const char* ToString(EventKind kind) { return InfoOf(kind).name; }
-/// The name of a severity: `info`, `warning`, `error`.
+/// Returns the name of a severity: `info`, `warning`, `error`.
 inline const char* ToString(EventSeverity severity) {
   constexpr std::array kNames = {"info", "warning", "error"};
   return kNames[static_cast<std::size_t>(severity)];
 }
 
-/// An occurrence that the user of an estimator should know of.
+/// An occurrence that the user of an estimator should know about.
 struct Event {
-  Timestamp timestamp = kNoTimestamp;  ///< of the frame; kNoTimestamp: of the whole run
+  Timestamp timestamp = kNoTimestamp;  ///< of the frame; kNoTimestamp: whole run
   EventKind kind = EventKind::kEstimatorSpecific;
   std::string text;
-  bool divergence = false;  ///< true if the estimator diverged or failed by this
+  bool divergence = false;  ///< true if the estimator diverged or failed at this event
 };
 
 }  // namespace alidade

@@ -13,7 +13,7 @@ namespace {
 
 /// Adds an event `unit` for each sensor whose measurements are far from all its predictions.
 void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResult& result) {
-  for (const int index : metrics.far_off()) {
+  for (const int index : metrics.far_off_sensors()) {
     const SensorBinding& sensor = problem.sensors[static_cast<std::size_t>(index)];
     const Space& measured = sensor.model->measurement();
     const bool is_angle = measured.geometry.is_angle();
@@ -53,7 +53,7 @@ void AddConsistencyEvents(EstimatorResult& result) {
 
 /// Adds an event `truth` if no frame had the truth that the source declares.
 void AddTruthEvent(const Metrics& metrics, EstimatorResult& result) {
-  const std::vector<std::string> names = metrics.without_truth();
+  const std::vector<std::string> names = metrics.blocks_without_truth();
   if (names.empty()) return;
   result.events.push_back({kNoTimestamp, EventKind::kTruth,
                            "no frame has the truth of " + Join(names) +

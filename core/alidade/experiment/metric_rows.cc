@@ -21,11 +21,11 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// The row of kMetrics that a key belongs to; null for a key that is not in the table.
+/// Returns the entry of kMetrics for a key; null if the table has no such metric.
 const MetricInfo* InfoOf(const MetricKey& key) { return FindMetric(key.name); }
 
-/// Sort key: metrics that are shown, in the order of the table, then the others; the whole run
-/// before segments; then by name.
+/// Returns the sort key of a metric. Shown metrics come first, in the order of kMetrics, and the
+/// whole run comes before segments. The last criterion is the name.
 auto Rank(const std::string& text) {
   const MetricKey key = MetricKey::Parse(text);
   const MetricInfo* const metric = InfoOf(key);
@@ -46,23 +46,23 @@ std::vector<std::string> Keys(const RunResult& result, const Map EstimatorResult
   return keys;
 }
 
-/// A unit with the prefix that makes numbers of this size easy to read, and what to multiply by.
-struct Scaled {
+/// A unit with an SI prefix that suits the size of the numbers, and the factor for the numbers.
+struct ScaledUnit {
   double factor = 1.0;
   std::string unit;
 };
 
-Scaled ScaleUnit(const std::string& unit, double largest) {
+ScaledUnit ScaleUnit(const std::string& unit, double largest) {
   const std::string_view base = std::string_view(unit).substr(0, unit.find('/'));
-  const bool takes_prefix = base == "m" || base == "s" || base == "rad";
-  if (!takes_prefix || !(largest > 0.0) || largest >= 1.0) return {1.0, unit};
-  return largest >= 1e-3 ? Scaled{1e3, 'm' + unit} : Scaled{1e6, 'u' + unit};
+  const bool allows_prefix = base == "m" || base == "s" || base == "rad";
+  if (!allows_prefix || !(largest > 0.0) || largest >= 1.0) return {1.0, unit};
+  return largest >= 1e-3 ? ScaledUnit{1e3, 'm' + unit} : ScaledUnit{1e6, 'u' + unit};
 }
 
 using Values = std::vector<std::optional<double>>;
 
-/// Cells with four significant digits each, and all of those before the point. What is below 1e-5
-/// or from 1e7 on is in scientific notation.
+/// Returns cells with at least four significant digits, including all digits before the point.
+/// Magnitudes up to 1e-5 and from 1e7 are in scientific notation.
 std::vector<std::string> Format(const Values& values) {
   constexpr double kSmall = 1e-5, kLarge = 1e7;
   const auto decimals = [](double v) {
@@ -87,8 +87,8 @@ std::vector<std::string> Format(const Values& values) {
 
 std::string UnitOfKey(const RunResult& result, const MetricKey& key) {
   for (const EstimatorResult& estimator : result.estimators) {
-    const auto unit = estimator.units.find(key.subject);
-    if (unit != estimator.units.end()) return unit->second;
+    const auto found = estimator.units.find(key.subject);
+    if (found != estimator.units.end()) return found->second;
   }
   return {};
 }
@@ -104,7 +104,7 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
 }
 
 /// Returns the largest finite RMSE of all blocks with that unit, or without truth the largest
-/// difference: one prefix serves the whole table.
+/// difference. It determines one prefix for the whole table.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
   for (const std::string& text : Keys(result, &EstimatorResult::metrics)) {
@@ -117,8 +117,8 @@ double LargestRmse(const RunResult& result, const std::string& unit) {
   return largest;
 }
 
-/// The unit of a metric in a table, with the factor of its values.
-Scaled ScaledUnitOf(const RunResult& result, const MetricKey& key) {
+/// Returns the unit of a metric in a table, with the factor of its values.
+ScaledUnit ScaledUnitOf(const RunResult& result, const MetricKey& key) {
   const MetricInfo* const metric = InfoOf(key);
   if (metric == nullptr) return {};
   switch (metric->unit) {
@@ -132,7 +132,7 @@ Scaled ScaledUnitOf(const RunResult& result, const MetricKey& key) {
       return {1.0, "ms"};
     case MetricUnit::kShare:
       return {100.0, "%"};
-    case MetricUnit::kMicrosecond:  // in its label
+    case MetricUnit::kMicrosecond:  // the label includes the unit
     case MetricUnit::kFrames:
     case MetricUnit::kNone:
       break;
@@ -140,10 +140,10 @@ Scaled ScaledUnitOf(const RunResult& result, const MetricKey& key) {
   return {};
 }
 
-/// The row of a metric, which is labelled `name` and by its subject and segment.
+/// Returns the row of a metric. Its label has `name`, the subject, the segment and the unit.
 TableRow RowOf(const RunResult& result, const std::string& text, const std::string& name) {
   const MetricKey key = MetricKey::Parse(text);
-  const Scaled scaled = ScaledUnitOf(result, key);
+  const ScaledUnit scaled = ScaledUnitOf(result, key);
   Values values = ValuesOf(result, text);
   for (auto& value : values) {
     if (value) *value *= scaled.factor;
@@ -155,11 +155,11 @@ TableRow RowOf(const RunResult& result, const std::string& text, const std::stri
   return {label, Format(values)};
 }
 
-/// The name of a metric in a table, which has the unit beside it.
+/// Returns the name of a metric in a table, without the unit, which the label shows.
 std::string ShownName(const std::string& name) { return name == "lag_ms" ? "lag" : name; }
 
-/// Returns true if every estimator has the subject without any error, as a block that is held at
-/// truth.
+/// Returns true if the errors of the subject are zero in every estimator, as for a block that is
+/// fixed at its true value.
 bool IsExact(const RunResult& result, const std::string& subject) {
   for (const char* name : {"rmse", "nees.mean"}) {
     const Values values = ValuesOf(result, MetricKey{name, subject, ""}.text());
@@ -171,24 +171,24 @@ bool IsExact(const RunResult& result, const std::string& subject) {
   return false;
 }
 
-/// Returns true if tables show the metric. comparison.csv has all of them.
+/// Returns true if tables show the metric. comparison.csv contains all metrics.
 bool IsShown(const RunResult& result, const MetricKey& key) {
   const MetricInfo* const metric = InfoOf(key);
   if (metric == nullptr || IsExact(result, key.subject)) return false;
   return key.segment.empty() ? metric->is_shown : metric->is_shown_by_segment;
 }
 
-/// The rows of the metrics that tables show and of the counts, of those keys that are `included`.
-template <class Included>
-std::vector<TableRow> SelectRows(const RunResult& result, const Included& included) {
+/// Returns the rows of the shown metrics and of the counts whose keys satisfy `is_included`.
+template <class Predicate>
+std::vector<TableRow> SelectRows(const RunResult& result, const Predicate& is_included) {
   std::vector<TableRow> rows;
   for (const std::string& text : OrderedMetrics(result)) {
     const MetricKey key = MetricKey::Parse(text);
-    if (!IsShown(result, key) || !included(text)) continue;
+    if (!IsShown(result, key) || !is_included(text)) continue;
     rows.push_back(RowOf(result, text, ShownName(key.name)));
   }
   for (const std::string& text : OrderedCounts(result)) {
-    if (!included(text)) continue;
+    if (!is_included(text)) continue;
     const MetricKey key = MetricKey::Parse(text);
     TableRow row{key.name + ' ' + (key.subject.empty() ? key.name : key.subject), {}};
     for (const EstimatorResult& estimator : result.estimators) {
@@ -212,7 +212,7 @@ void AddHealthRows(const RunResult& result, std::vector<TableRow>& rows) {
 
 constexpr std::size_t kMainRows = 10;
 
-/// The priority of a metric or count among the rows of MainRows; 0: it is not among them.
+/// Returns the priority of a metric or count in MainRows(); 0 if it is never a main row.
 int PriorityOf(const MetricKey& key) {
   constexpr int kAcceptedPriority = 4;
   if (!key.segment.empty()) return 0;
@@ -221,7 +221,8 @@ int PriorityOf(const MetricKey& key) {
   return metric == nullptr ? 0 : metric->priority;
 }
 
-/// The keys of MainRows but for the two of health: in turns one subject of each metric.
+/// Returns the keys of MainRows() without `diverged` and `inconsistent`. Each round chooses one
+/// subject of each metric.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
   std::map<int, std::vector<std::pair<std::size_t, std::string>>> by_priority;  // subject, key
   const auto add = [&](const std::vector<std::string>& candidates, bool is_count) {
@@ -229,17 +230,17 @@ std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::s
       const MetricKey key = MetricKey::Parse(text);
       const int priority = PriorityOf(key);
       if (priority == 0 || (!is_count && !IsShown(result, key))) continue;
-      const auto place = std::find(subjects.begin(), subjects.end(), key.subject);
-      by_priority[priority].emplace_back(place - subjects.begin(), text);
+      const auto position = std::find(subjects.begin(), subjects.end(), key.subject);
+      by_priority[priority].emplace_back(position - subjects.begin(), text);
     }
   };
   add(Keys(result, &EstimatorResult::metrics), false);
   add(Keys(result, &EstimatorResult::counts), true);
-  std::vector<std::tuple<std::size_t, int, std::string>> ranked;  // turn, priority, key
+  std::vector<std::tuple<std::size_t, int, std::string>> ranked;  // round, priority, key
   for (auto& [priority, keys] : by_priority) {
     std::sort(keys.begin(), keys.end());
-    for (std::size_t turn = 0; turn < keys.size(); ++turn) {
-      ranked.emplace_back(turn, priority, keys[turn].second);
+    for (std::size_t round = 0; round < keys.size(); ++round) {
+      ranked.emplace_back(round, priority, keys[round].second);
     }
   }
   std::sort(ranked.begin(), ranked.end());
@@ -310,8 +311,8 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment) {
 }
 
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects) {
-  std::vector<TableRow> rows_of_all = ComparisonRows(result);
-  if (rows_of_all.size() <= kMainRows) return rows_of_all;
+  std::vector<TableRow> all_rows = ComparisonRows(result);
+  if (all_rows.size() <= kMainRows) return all_rows;
   const std::set<std::string> keys = MainKeys(result, subjects);
   std::vector<TableRow> rows =
       SelectRows(result, [&](const std::string& key) { return keys.contains(key); });
@@ -321,9 +322,9 @@ std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::s
 
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects) {
   const std::vector<TableRow> rows = MainRows(result, subjects);
-  const std::size_t left_out = ComparisonRows(result).size() - rows.size();
+  const std::size_t omitted = ComparisonRows(result).size() - rows.size();
   return TableOf(result, rows) +
-         (left_out > 0 ? '\n' + std::to_string(left_out) + " more rows: --all\n" : "");
+         (omitted > 0 ? '\n' + std::to_string(omitted) + " more rows: --all\n" : "");
 }
 
 std::string ReferenceText(const RunResult& result) {

@@ -9,56 +9,57 @@
 
 namespace alidade {
 
-/// The subject of a metric's key.
+/// Subject in the key of a metric.
 enum class MetricSubject { kRun, kBlock, kOwner, kSensor };
 
+/// Unit of a metric.
 enum class MetricUnit {
   kNone,
-  kSubject,  ///< of the block, or of the block that a sensor determines
+  kSubject,  ///< unit of the block, or of the block that the sensor implies
   kMetre,
   kMillisecond,
   kMicrosecond,
   kFrames,
-  kShare,  ///< 0 to 1, shown in %
+  kShare,  ///< 0 to 1, displayed in %
 };
 
-/// The best value of a metric.
+/// Best value of a metric.
 enum class MetricGoal { kNone, kZero, kOne, k95Percent };
 
-/// How the samples of a run become the metric.
+/// Reduction of the samples of a run to the metric.
 enum class MetricReduction { kMean, kRootMean, kMax, kLast };
 
-/// The section of a comparison that shows a metric.
+/// Section of a comparison that shows a metric.
 enum class MetricSection {
   kNone,
   kAlong,  ///< over the run
-  kFinal,  ///< at its end
+  kFinal,  ///< at the end of the run
 };
 
-/// The error of a block at one timestamp.
+/// Error of a block at one timestamp.
 struct BlockSample {
   double square;                ///< |e|^2; infinite if e is not finite
-  double error;                 ///< its first element
-  std::optional<double> sigma;  ///< of a scalar block with a variance
+  double error;                 ///< first element of e
+  std::optional<double> sigma;  ///< only of a scalar block with a variance
 };
-/// The joint error of the blocks of an owner at one timestamp.
+/// Joint error of the blocks of an owner at one timestamp.
 struct OwnerSample {
   double nees;
   int dof;
   double bound95;  ///< chi2(0.95, dof)
 };
-/// One accepted measurement.
+/// Innovation of one accepted measurement.
 struct SensorSample {
   double nis;
   int dof;
 };
-/// The error of the state that one measurement implies without a filter.
+/// Error of the state that one measurement implies without a filter.
 struct ImpliedSample {
   double square;
 };
 
 /// A metric: its meaning, its accumulation over a run, and its place in tables. A sampled metric
-/// has one of the sample functions. The others are computed by code of their own.
+/// has exactly one of the four sample functions. Separate code computes each other metric.
 struct MetricInfo {
   const char* name;
   const char* meaning;  ///< for the documentation, in Markdown
@@ -67,27 +68,27 @@ struct MetricInfo {
   MetricGoal goal = MetricGoal::kNone;
   bool needs_truth = true;
 
-  /// Sampled: one value a timestamp or measurement, or none.
+  // Sample functions: return one value for a timestamp or measurement, or nothing.
   std::optional<double> (*block)(const BlockSample&) = nullptr;
   std::optional<double> (*owner)(const OwnerSample&) = nullptr;
   std::optional<double> (*sensor)(const SensorSample&) = nullptr;
   std::optional<double> (*implied)(const ImpliedSample&) = nullptr;
   MetricReduction reduction = MetricReduction::kMean;
-  bool has_segments = false;  ///< also taken over each segment
+  bool has_segments = false;  ///< also computed for each segment
 
-  bool is_shown = false;             ///< a row of the tables of `run` and `sweep`
-  bool is_shown_by_segment = false;  ///< one for each segment, too
-  int priority = 0;                  ///< order among the ten rows of `run`, from 1; 0: not there
+  bool is_shown = false;             ///< has a row in the tables of `run` and `sweep`
+  bool is_shown_by_segment = false;  ///< also has a row for each segment
+  int priority = 0;  ///< order among the ten main rows of `run`, from 1; 0: not a main row
 
   MetricSection section = MetricSection::kNone;
-  const char* label = "";  ///< in a comparison
-  bool is_main = false;    ///< also in the short form of a comparison
-  bool has_ratio = false;  ///< a comparison has its ratio to the reference
-  bool is_ratio = false;   ///< it is itself a ratio of means over the runs
+  const char* label = "";  ///< label in a comparison
+  bool is_main = false;    ///< also shown in the short form of a comparison
+  bool has_ratio = false;  ///< a comparison shows its ratio to the reference
+  bool is_ratio = false;   ///< is itself a ratio of means over the runs
   bool is_cost = false;    ///< independent of the estimate
 };
 
-/// All metrics, in the order in which tables show them. A new sampled metric is one row.
+/// All metrics, in the order of the tables. To add a sampled metric, add one entry.
 inline constexpr std::array kMetrics = {
     MetricInfo{.name = "rmse",
                .meaning = "sqrt(mean \\|e\\|^2); infinite if an estimate is not finite",
@@ -113,9 +114,10 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .is_ratio = true},
     MetricInfo{.name = "implied.rmse",
-               .meaning = "RMSE of the block that single measurements of the sensor imply, without "
-                          "a filter, as in `implied_states.csv`: the baseline that any filter must "
-                          "beat. Gated measurements count, too; other roles are at truth",
+               .meaning =
+                   "RMSE of the block that single measurements of the sensor imply without "
+                   "a filter, as in `implied_states.csv`: the baseline that any filter must "
+                   "beat. Includes gated measurements; all other roles have their true values",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kSubject,
                .goal = MetricGoal::kZero,
@@ -151,9 +153,8 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD",
                .is_main = true},
     MetricInfo{.name = "trajectory.sim3.rmsd",
-               .meaning =
-                   "`compare`: the same of the position, Sim(3)-aligned, if the scale of the "
-                   "problem is free",
+               .meaning = "`compare`: RMSD of the Sim(3)-aligned trajectory, if the scale of the "
+                          "problem is not observable",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -162,7 +163,7 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD, Sim3-aligned trajectory",
                .is_main = true},
     MetricInfo{.name = "rmsd.sigmas",
-               .meaning = "`compare`: that difference in sigmas of the reference",
+               .meaning = "`compare`: RMSD in sigmas of the reference",
                .subject = MetricSubject::kOwner,
                .goal = MetricGoal::kZero,
                .needs_truth = false,
@@ -170,13 +171,13 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD in sigmas",
                .is_main = true},
     MetricInfo{.name = "lag_ms",
-               .meaning = "delay after truth, see [Lag](#lag); > 0 is late. Scalar blocks",
+               .meaning = "delay after truth, see [Lag](#lag); > 0 is late; scalar blocks only",
                .subject = MetricSubject::kBlock,
                .unit = MetricUnit::kMillisecond,
                .goal = MetricGoal::kZero,
                .is_shown = true},
     MetricInfo{.name = "coverage95",
-               .meaning = "share of timestamps with \\|e\\| <= 1.96 sigma. Scalar blocks",
+               .meaning = "share of timestamps with \\|e\\| <= 1.96 sigma; scalar blocks only",
                .subject = MetricSubject::kBlock,
                .unit = MetricUnit::kShare,
                .goal = MetricGoal::k95Percent,
@@ -246,7 +247,7 @@ inline constexpr std::array kMetrics = {
                .subject = MetricSubject::kSensor,
                .needs_truth = false},
     MetricInfo{.name = "cpu_us",
-               .meaning = "`compare`: CPU time a frame",
+               .meaning = "`compare`: CPU time per frame",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMicrosecond,
                .goal = MetricGoal::kZero,
@@ -256,7 +257,7 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .is_cost = true},
     MetricInfo{.name = "cpu_us.start",
-               .meaning = "`compare`: CPU time a frame of the filter that a batch starts from",
+               .meaning = "`compare`: CPU time per frame of the filter that initialises a batch",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMicrosecond,
                .goal = MetricGoal::kZero,
@@ -266,7 +267,7 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .is_cost = true},
     MetricInfo{.name = "time_us",
-               .meaning = "`compare`: wall-clock time a measurement, if the CPU time is unknown",
+               .meaning = "`compare`: wall-clock time per measurement, if the CPU time is unknown",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMicrosecond,
                .goal = MetricGoal::kZero,
@@ -295,7 +296,7 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kFinal,
                .label = "difference"},
     MetricInfo{.name = "final_difference.sigmas",
-               .meaning = "`compare`: that difference in sigmas of the reference",
+               .meaning = "`compare`: final difference in sigmas of the reference",
                .subject = MetricSubject::kOwner,
                .goal = MetricGoal::kZero,
                .needs_truth = false,
@@ -303,7 +304,7 @@ inline constexpr std::array kMetrics = {
                .label = "difference in sigmas"},
     MetricInfo{.name = "map.rmse",
                .meaning = "sqrt(mean \\|p - p_true\\|^2) of the landmarks in the state at the end "
-                          "whose true position the source knows",
+                          "whose true position the source provides",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -314,7 +315,7 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .has_ratio = true},
     MetricInfo{.name = "map.sim3.rmse",
-               .meaning = "the same after the similarity that minimises it [Umeyama1991]",
+               .meaning = "`map.rmse` after the similarity that minimises it [Umeyama1991]",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -342,7 +343,7 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD, map",
                .is_main = true},
     MetricInfo{.name = "map.sim3.rmsd",
-               .meaning = "`compare`: the same after the similarity that minimises it",
+               .meaning = "`compare`: `map.rmsd` after the similarity that minimises it",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -351,7 +352,7 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD, Sim3-aligned map",
                .is_main = true},
     MetricInfo{.name = "reprojection",
-               .meaning = "with landmarks: rms of the innovations that a frame accepts, as in "
+               .meaning = "with landmarks: rms of the accepted innovations of a frame, as in "
                           "`NAME/reprojection.csv`; median over the last half of the frames",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kNone,
@@ -360,9 +361,9 @@ inline constexpr std::array kMetrics = {
                .is_shown = true,
                .priority = 8},
     MetricInfo{.name = "settling_frames",
-               .meaning = "the first frame, from 1, from which on the centred rms over up to 9 "
-                          "frames stays within 20 % of `reprojection`; infinite if it is outside "
-                          "at the end",
+               .meaning = "number of the first frame (from 1) from which the centred rms over up "
+                          "to 9 frames stays within 20 % of `reprojection`; infinite if it is "
+                          "outside at the end",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kFrames,
                .goal = MetricGoal::kZero,
@@ -370,13 +371,13 @@ inline constexpr std::array kMetrics = {
                .is_shown = true},
 };
 
-/// The place of a metric in kMetrics; kMetrics.size() if there is none of that name.
+/// Returns the index of a metric in kMetrics; kMetrics.size() if no metric has that name.
 constexpr std::size_t IndexOfMetric(std::string_view name) {
   std::size_t index = 0;
   while (index < kMetrics.size() && name != kMetrics[index].name) ++index;
   return index;
 }
-/// The row of a metric; null if there is none of that name.
+/// Returns the entry of a metric; null if no metric has that name.
 constexpr const MetricInfo* FindMetric(std::string_view name) {
   const std::size_t index = IndexOfMetric(name);
   return index < kMetrics.size() ? &kMetrics[index] : nullptr;

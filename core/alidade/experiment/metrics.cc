@@ -32,13 +32,13 @@ constexpr int kInconsistentTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 
-/// Whether the innovation of an angle, which is never beyond pi, looks like one of another unit:
-/// far beyond its sigma, and either spread over the circle, or of a measurement beyond a turn.
-bool IsFarAngle(const MeasurementReport& m) {
-  if (!(m.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
-  if (m.innovation.empty() || m.z.empty()) return false;
-  return std::abs(m.innovation[0]) > 0.25 * std::numbers::pi ||
-         std::abs(m.z[0]) > 2.0 * std::numbers::pi;
+/// Returns true if the innovation of an angle, which never exceeds pi, indicates another unit. It
+/// is then far beyond its sigma, and it exceeds pi / 4 or the measurement exceeds a turn.
+bool IsFarAngle(const MeasurementReport& measurement) {
+  if (!(measurement.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
+  if (measurement.innovation.empty() || measurement.z.empty()) return false;
+  return std::abs(measurement.innovation[0]) > 0.25 * std::numbers::pi ||
+         std::abs(measurement.z[0]) > 2.0 * std::numbers::pi;
 }
 
 }  // namespace
@@ -71,13 +71,13 @@ struct Metrics::Impl {
     }
   };
 
-  /// The sampled metrics over all timestamps, or over those of one segment: for each of kMetrics
-  /// one accumulator a subject.
-  struct Sums {
-    std::string segment;
+  /// Accumulators of the sampled metrics over the whole run or one segment: for each entry of
+  /// kMetrics one accumulator per subject.
+  struct PeriodSums {
+    std::string segment;  ///< "": the whole run
     std::array<std::vector<Accumulator>, kMetrics.size()> metrics;
 
-    /// Adds the sample of subject `index` to each metric that has this member function.
+    /// Adds the sample of subject `index` to each metric that has this sample function.
     template <class Sample>
     void Add(std::optional<double> (*MetricInfo::*function)(const Sample&), std::size_t index,
              const Sample& sample) {
@@ -92,22 +92,22 @@ struct Metrics::Impl {
     }
   };
 
-  /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Only the
-  /// first ones are kept, so that memory and time of a long run do not grow with it.
+  /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Retains only
+  /// the first kMaxSize values, which bounds memory and computing time.
   struct LagSeries {
-    static constexpr std::size_t kMost = 100'000;
+    static constexpr std::size_t kMaxSize = 100'000;
 
     std::vector<double> estimate, truth;
     Timestamp first = 0, last = 0;
-    Timestamp shortest = INT64_MAX, longest = 0;
+    Timestamp shortest_step = INT64_MAX, longest_step = 0;
 
     void Add(Timestamp timestamp, double true_value, double error) {
-      if (truth.size() == kMost) return;
+      if (truth.size() == kMaxSize) return;
       if (truth.empty()) {
         first = timestamp;
       } else {
-        shortest = std::min(shortest, timestamp - last);
-        longest = std::max(longest, timestamp - last);
+        shortest_step = std::min(shortest_step, timestamp - last);
+        longest_step = std::max(longest_step, timestamp - last);
       }
       last = timestamp;
       truth.push_back(true_value);
@@ -116,144 +116,154 @@ struct Metrics::Impl {
     double step_ms() const {
       return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
     }
-    /// Within 5 % of the mean step: what a camera's clock does.
-    bool even() const {
-      if (truth.size() < 2 || shortest <= 0) return false;
-      return 1e-6 * static_cast<double>(longest) < 1.05 * step_ms() &&
-             1e-6 * static_cast<double>(shortest) > 0.95 * step_ms();
+    /// Returns true if all steps are within 5 % of their mean, as for the clock of a camera.
+    bool is_even() const {
+      if (truth.size() < 2 || shortest_step <= 0) return false;
+      return 1e-6 * static_cast<double>(longest_step) < 1.05 * step_ms() &&
+             1e-6 * static_cast<double>(shortest_step) > 0.95 * step_ms();
     }
   };
 
   /// A block whose truth is known.
-  struct Tracked {
+  struct TrackedBlock {
     BlockId id;
-    std::size_t truth;
+    std::size_t truth;  ///< index into the truths
     std::string name, unit;
     Geometry geometry;
-    std::vector<std::string> elements;  ///< of the tangent
-    std::vector<int> outside;  ///< timestamps on end beyond 10 sigma, by element; -1: reported
-    bool scalar;
+    std::vector<std::string> elements;  ///< names of the tangent elements
+    /// Number of timestamps in a row beyond 10 sigma, by element; -1: the event is reported.
+    std::vector<int> outside_counts;
+    bool is_scalar;
     double truth_variance;  ///< of each element
-    LagSeries series;       ///< where scalar
-    bool was_known = false;
+    LagSeries series;       ///< only of a scalar block
+    bool was_ever_known = false;
 
-    bool known = false;  ///< at this timestamp, and so are the members below
+    // At the current timestamp; `error` and `squared_error` are valid only if is_known.
+    bool is_known = false;
     Eigen::VectorXd error;
-    double square;
+    double squared_error;
   };
 
-  /// Every n-th value of a series, n so that there are not too many for their autocorrelation.
-  struct Thinned {
-    static constexpr std::size_t kMost = 10'000;
+  /// Every n-th value of a series. The stride n grows so that there are fewer than kMaxSize values,
+  /// which bounds the cost of their autocorrelation.
+  struct ThinnedSeries {
+    static constexpr std::size_t kMaxSize = 10'000;
     std::vector<double> values;
     std::size_t count = 0, stride = 1;
 
     void Add(double value) {
       if (count++ % stride != 0) return;
       values.push_back(value);
-      if (values.size() < kMost) return;
-      for (std::size_t i = 0; 2 * i < kMost; ++i) values[i] = values[2 * i];
-      values.resize(kMost / 2);
+      if (values.size() < kMaxSize) return;
+      for (std::size_t i = 0; 2 * i < kMaxSize; ++i) values[i] = values[2 * i];
+      values.resize(kMaxSize / 2);
       stride *= 2;
     }
   };
 
-  /// The state that single measurements of a sensor imply, where its truth is known.
-  struct Implied {
+  /// The state that single measurements of a sensor imply. Its truth is known.
+  struct ImpliedBlock {
     internal::ImpliedState state;
-    std::size_t truth;
+    std::size_t truth;  ///< index into the truths
     Geometry geometry;
   };
 
   struct Owner {
     std::string name;
-    std::vector<std::size_t> tracked;
-    Thinned nees = {};  ///< per dof
+    std::vector<std::size_t> blocks;  ///< indices into tracked_blocks
+    ThinnedSeries nees = {};          ///< per dof
   };
 
-  /// What the bounds of a sensor's NIS need.
-  struct Whiteness {
-    bool told = false;  ///< its innovations are those of a filter, without a robust loss
+  /// Inputs to the NIS bounds of a sensor.
+  struct NisSamples {
+    bool has_bounds = false;  ///< true if a filter without a robust loss provides the innovations
     int dof = 0;
-    std::int64_t frames = 0, last_frame = -1;  ///< with an accepted measurement
-    double cut = kInfinity;                    ///< the least NIS that was gated
+    std::int64_t frames = 0, last_frame = -1;  ///< frames with an accepted measurement
+    double smallest_gated = kInfinity;         ///< the smallest NIS that was gated
   };
 
-  std::vector<Tracked> tracked;
+  std::vector<TrackedBlock> tracked_blocks;
   std::vector<Owner> owners;
-  std::vector<std::string> sensors, motions;
-  std::map<int, Implied> implied;  ///< by sensor
+  std::vector<std::string> sensors, motions;   ///< names
+  std::map<int, ImpliedBlock> implied_blocks;  ///< by sensor
   bool has_landmarks = false, has_ransac = false;
-  /// Measurements of a sensor that were accepted or gated, and those of them that are far off.
-  struct FarOff {
-    std::int64_t count = 0, far = 0;
+  /// Number of accepted and gated measurements of a sensor, and how many of them are far off.
+  struct FarOffCounts {
+    std::int64_t total = 0, far_off = 0;
   };
-  std::vector<FarOff> far_off;       ///< by sensor
-  std::vector<bool> angle;           ///< sensors that measure one
-  std::vector<Whiteness> whiteness;  ///< by sensor
-  std::int64_t reports = 0;
+  std::vector<FarOffCounts> far_off_counts;  ///< by sensor
+  std::vector<bool> measures_angle;          ///< by sensor
+  std::vector<NisSamples> nis_samples;       ///< by sensor
+  std::int64_t report_count = 0;
   std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
-  std::vector<Sums> sums;                           ///< all timestamps, then the segments
-  std::vector<std::array<std::int64_t*, kOutcomes.size()>> count_of;  ///< into counts, by sensor
+  std::vector<PeriodSums> periods;                  ///< the whole run, then the segments
+  /// Pointers into `counts`, by sensor and outcome; null before the first measurement.
+  std::vector<std::array<std::int64_t*, kOutcomes.size()>> outcome_counts;
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
   std::map<int, double> quantiles;  ///< chi2(0.95, dof)
-  BlockId path = -1;                ///< that landmarks are seen from
+  BlockId position_block = -1;      ///< position from which landmarks are observed; -1: none
   internal::TrajectoryAlignment alignment;
   std::vector<Event> events;
 
-  void Track(const Problem& problem, const std::vector<StreamInfo>& truths);
-  void FindImplied(const Problem& problem, const std::vector<StreamInfo>& truths);
-  void AddImplied(const Truth& truth, const std::vector<Sums*>& into, const UpdateReport& report);
+  void TrackBlocks(const Problem& problem, const std::vector<StreamInfo>& truths);
+  void FindImpliedBlocks(const Problem& problem, const std::vector<StreamInfo>& truths);
+  void AddImplied(const Truth& truth, const std::vector<PeriodSums*>& destinations,
+                  const UpdateReport& report);
   template <class ValueOf>
-  void FindErrors(Timestamp timestamp, const Truth& truth, const ValueOf& value_of);
-  void AddErrors(Timestamp timestamp, const std::vector<Sums*>& into, const State* state);
-  void CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma);
-  void AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into, const State& state);
-  void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
-  void AddInnovation(std::size_t sensor, const MeasurementReport& m);
-  /// The sums over all timestamps, and over the segments that a frame is in.
-  std::vector<Sums*> SumsOf(const std::vector<bool>& in_segment);
+  void ComputeErrors(Timestamp timestamp, const Truth& truth, const ValueOf& value_of);
+  void AddErrors(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
+                 const State* state);
+  void CheckElement(Timestamp timestamp, TrackedBlock& block, int element, double sigma);
+  void AddNees(Owner& owner, std::size_t index, const std::vector<PeriodSums*>& destinations,
+               const State& state);
+  void AddReport(const std::vector<PeriodSums*>& destinations, const UpdateReport& report);
+  void AddInnovation(std::size_t sensor, const MeasurementReport& measurement);
+  /// Returns the sums of the whole run, and of the segments that contain the frame.
+  std::vector<PeriodSums*> PeriodsOf(const std::vector<bool>& in_segment);
   const std::string& SubjectOf(const MetricInfo& metric, std::size_t index) const;
-  void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
+  void Write(const PeriodSums& sums, std::map<std::string, double>& metrics) const;
   void WriteBounds(std::map<std::string, double>& metrics) const;
 };
 
 namespace {
 
-/// Unit of the error of a block: rad for an orientation or a direction, else the unit of the block.
+/// Returns the unit of the error of a block: rad for an orientation or a direction, else the unit
+/// of the block.
 std::string UnitOfError(const Problem& problem, BlockId id) {
   return problem.layout[id].geometry().is_angular() ? "rad" : internal::UnitOf(problem, id);
 }
 
 }  // namespace
 
-void Metrics::Impl::Track(const Problem& problem, const std::vector<StreamInfo>& truths) {
+void Metrics::Impl::TrackBlocks(const Problem& problem, const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
   for (BlockId id = 0; id < static_cast<int>(match.size()); ++id) {
     if (match[id] < 0) continue;
     const Block& block = problem.layout[id];
-    Tracked one;
-    one.id = id;
-    one.truth = static_cast<std::size_t>(match[id]);
-    one.name = block.name;
-    one.unit = UnitOfError(problem, id);
-    one.geometry = block.geometry();
-    one.elements = internal::TangentNames(block.name, block.space);
-    one.outside.assign(block.geometry().tangent, 0);
-    one.scalar = block.geometry().tangent == 1;
-    one.truth_variance = truths[one.truth].sigma * truths[one.truth].sigma;
-    one.error.resize(block.geometry().tangent);
-    if (!one.unit.empty()) units[one.name] = one.unit;
+    TrackedBlock tracked_block;
+    tracked_block.id = id;
+    tracked_block.truth = static_cast<std::size_t>(match[id]);
+    tracked_block.name = block.name;
+    tracked_block.unit = UnitOfError(problem, id);
+    tracked_block.geometry = block.geometry();
+    tracked_block.elements = internal::TangentNames(block.name, block.space);
+    tracked_block.outside_counts.assign(block.geometry().tangent, 0);
+    tracked_block.is_scalar = block.geometry().tangent == 1;
+    tracked_block.truth_variance =
+        truths[tracked_block.truth].sigma * truths[tracked_block.truth].sigma;
+    tracked_block.error.resize(block.geometry().tangent);
+    if (!tracked_block.unit.empty()) units[tracked_block.name] = tracked_block.unit;
     auto owner = std::find_if(owners.begin(), owners.end(),
                               [&](const Owner& o) { return o.name == block.owner; });
     if (owner == owners.end()) owner = owners.insert(owner, {block.owner, {}});
-    owner->tracked.push_back(tracked.size());
-    tracked.push_back(std::move(one));
+    owner->blocks.push_back(tracked_blocks.size());
+    tracked_blocks.push_back(std::move(tracked_block));
   }
 }
 
-void Metrics::Impl::FindImplied(const Problem& problem, const std::vector<StreamInfo>& truths) {
+void Metrics::Impl::FindImpliedBlocks(const Problem& problem,
+                                      const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = internal::MatchTruths(problem.layout, truths);
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const SensorBinding& sensor = problem.sensors[s];
@@ -261,131 +271,140 @@ void Metrics::Impl::FindImplied(const Problem& problem, const std::vector<Stream
     if (!state) continue;
     const int truth = match[static_cast<std::size_t>(state->block())];
     if (truth < 0) continue;
-    implied.emplace(static_cast<int>(s), Implied{*state, static_cast<std::size_t>(truth),
-                                                 problem.layout[state->block()].geometry()});
+    implied_blocks.emplace(static_cast<int>(s),
+                           ImpliedBlock{*state, static_cast<std::size_t>(truth),
+                                        problem.layout[state->block()].geometry()});
     const std::string unit = internal::UnitOf(problem, state->block());
     if (!unit.empty()) units.emplace(sensor.name, unit);
   }
 }
 
-void Metrics::Impl::AddImplied(const Truth& truth, const std::vector<Sums*>& into,
+void Metrics::Impl::AddImplied(const Truth& truth, const std::vector<PeriodSums*>& destinations,
                                const UpdateReport& report) {
-  if (implied.empty()) return;
-  for (const MeasurementReport& m : report.measurements()) {
-    const auto found = implied.find(m.sensor);
-    if (found == implied.end() || m.z.empty()) continue;
-    const Implied& state = found->second;
-    if (state.truth >= truth.size() || truth[state.truth].empty()) continue;
-    const std::optional<double> value = state.state.From(truth, m.z.data());
+  if (implied_blocks.empty()) return;
+  for (const MeasurementReport& measurement : report.measurements()) {
+    const auto found = implied_blocks.find(measurement.sensor);
+    if (found == implied_blocks.end() || measurement.z.empty()) continue;
+    const ImpliedBlock& block = found->second;
+    if (block.truth >= truth.size() || truth[block.truth].empty()) continue;
+    const std::optional<double> value = block.state.From(truth, measurement.z.data());
     if (!value) continue;
     double error = 0.0;
-    state.geometry.Minus(truth[state.truth].data(), &*value, &error);
-    for (Sums* sums_of : into) {
-      sums_of->Add<ImpliedSample>(&MetricInfo::implied, static_cast<std::size_t>(m.sensor),
-                                  {error * error});
+    block.geometry.Minus(truth[block.truth].data(), &*value, &error);
+    for (PeriodSums* sums : destinations) {
+      sums->Add<ImpliedSample>(&MetricInfo::implied, static_cast<std::size_t>(measurement.sensor),
+                               {error * error});
     }
   }
 }
 
-/// Computes the error of each tracked block. value_of(id) is the estimate of a block, or null.
+/// Computes the error of each tracked block. value_of(id) returns the estimate of a block, or null.
 template <class ValueOf>
-void Metrics::Impl::FindErrors(Timestamp timestamp, const Truth& truth, const ValueOf& value_of) {
-  for (Tracked& block : tracked) {
+void Metrics::Impl::ComputeErrors(Timestamp timestamp, const Truth& truth,
+                                  const ValueOf& value_of) {
+  for (TrackedBlock& block : tracked_blocks) {
     const double* const estimate = value_of(block.id);
-    block.known = estimate != nullptr && block.truth < truth.size() && !truth[block.truth].empty();
-    if (!block.known) continue;
-    const double* const is = truth[block.truth].data();
-    // In the tangent at the estimate, where P is.
-    block.geometry.Minus(is, estimate, block.error.data());
-    block.square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
-    block.was_known = true;
-    if (block.id == path && std::isfinite(block.square)) {
+    block.is_known =
+        estimate != nullptr && block.truth < truth.size() && !truth[block.truth].empty();
+    if (!block.is_known) continue;
+    const double* const true_value = truth[block.truth].data();
+    // In the tangent space at the estimate, like P.
+    block.geometry.Minus(true_value, estimate, block.error.data());
+    block.squared_error = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
+    block.was_ever_known = true;
+    if (block.id == position_block && std::isfinite(block.squared_error)) {
       alignment.Add(Eigen::Map<const Eigen::Vector3d>(estimate),
-                    Eigen::Map<const Eigen::Vector3d>(is));
+                    Eigen::Map<const Eigen::Vector3d>(true_value));
     }
-    if (!block.scalar) continue;
-    double value = is[0];
+    if (!block.is_scalar) continue;
+    double unwrapped = true_value[0];
     if (block.geometry.is_angle() && !block.series.truth.empty()) {
-      const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
-      value = before + Angle::Wrap(is[0] - before);
+      const double previous = block.series.truth.back();  // the lag needs a series without jumps
+      unwrapped = previous + Angle::Wrap(true_value[0] - previous);
     }
-    block.series.Add(timestamp, value, block.error[0]);
+    block.series.Add(timestamp, unwrapped, block.error[0]);
   }
 }
 
-void Metrics::Impl::CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma) {
-  int& outside = block.outside[element];
-  if (outside < 0) return;
+void Metrics::Impl::CheckElement(Timestamp timestamp, TrackedBlock& block, int element,
+                                 double sigma) {
+  int& outside_count = block.outside_counts[element];
+  if (outside_count < 0) return;
   const double error = std::abs(block.error[element]);
-  // A sigma of zero is a value taken as known: its errors are not the filter's.
-  const bool inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
-  outside = inside ? 0 : outside + 1;
-  if (outside < kInconsistentTimestamps) return;
-  outside = -1;
+  // A sigma of zero belongs to a value that the filter assumes to be known.
+  const bool is_inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
+  outside_count = is_inside ? 0 : outside_count + 1;
+  if (outside_count < kInconsistentTimestamps) return;
+  outside_count = -1;
   const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
   events.push_back({timestamp, EventKind::kInconsistent,
                     block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
-                        unit + ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
+                        unit + ", exceeded " + internal::NumberText(kInconsistentSigmas) +
                         " sigma for " + std::to_string(kInconsistentTimestamps) +
-                        " timestamps; sigma is " + internal::RoundedText(sigma, 4) + unit});
+                        " timestamps in a row; sigma is " + internal::RoundedText(sigma, 4) +
+                        unit});
 }
 
-/// Adds the errors that FindErrors found. `state` has the covariance; null: it is unknown.
-void Metrics::Impl::AddErrors(Timestamp timestamp, const std::vector<Sums*>& into,
+/// Adds the errors that ComputeErrors computed. `state` provides the covariance; null: unknown.
+void Metrics::Impl::AddErrors(Timestamp timestamp, const std::vector<PeriodSums*>& destinations,
                               const State* state) {
-  for (std::size_t i = 0; i < tracked.size(); ++i) {
-    Tracked& block = tracked[i];
-    if (!block.known) continue;
+  for (std::size_t i = 0; i < tracked_blocks.size(); ++i) {
+    TrackedBlock& block = tracked_blocks[i];
+    if (!block.is_known) continue;
     std::optional<double> sigma;
-    const Block* const place = state == nullptr ? nullptr : &state->layout()[block.id];
-    for (int e = 0; place != nullptr && place->has_covariance() && e < block.geometry.tangent;
+    const Block* const state_block = state == nullptr ? nullptr : &state->layout()[block.id];
+    for (int e = 0;
+         state_block != nullptr && state_block->has_covariance() && e < block.geometry.tangent;
          ++e) {
-      sigma =
-          std::sqrt(state->covariance().Variance(place->tangent_offset + e) + block.truth_variance);
+      sigma = std::sqrt(state->covariance().Variance(state_block->tangent_offset + e) +
+                        block.truth_variance);
       CheckElement(timestamp, block, e, *sigma);
     }
-    if (!block.scalar) sigma.reset();
-    for (Sums* sums_of : into) {
-      sums_of->Add<BlockSample>(&MetricInfo::block, i, {block.square, block.error[0], sigma});
+    if (!block.is_scalar) sigma.reset();
+    for (PeriodSums* sums : destinations) {
+      sums->Add<BlockSample>(&MetricInfo::block, i, {block.squared_error, block.error[0], sigma});
     }
   }
   if (state == nullptr) return;
-  for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, into, *state);
+  for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, destinations, *state);
 }
 
-void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into,
-                            const State& state) {
+void Metrics::Impl::AddNees(Owner& owner, std::size_t index,
+                            const std::vector<PeriodSums*>& destinations, const State& state) {
   std::vector<internal::BlockError> errors;
-  for (const std::size_t i : owner.tracked) {
-    const Tracked& block = tracked[i];
-    if (block.known) errors.push_back({block.id, &block.error, block.truth_variance});
+  for (const std::size_t i : owner.blocks) {
+    const TrackedBlock& block = tracked_blocks[i];
+    if (block.is_known) errors.push_back({block.id, &block.error, block.truth_variance});
   }
   const auto [nees, dof] = internal::JointNees(state, errors);
   if (dof == 0 || std::isnan(nees)) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
-  for (Sums* sums_of : into) {
-    sums_of->Add<OwnerSample>(&MetricInfo::owner, index, {nees, dof, bound->second});
+  for (PeriodSums* sums : destinations) {
+    sums->Add<OwnerSample>(&MetricInfo::owner, index, {nees, dof, bound->second});
   }
   owner.nees.Add(nees / dof);
 }
 
-void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& m) {
-  ++far_off[sensor].count;
-  far_off[sensor].far +=
-      m.nis > kFarSigmas * kFarSigmas * m.dof || (angle[sensor] && IsFarAngle(m));
-  Whiteness& white = whiteness[sensor];
-  white.dof = m.dof;
-  if (m.outcome == Outcome::kGated) {
-    if (m.nis > 0.0) white.cut = std::min(white.cut, m.nis);
-  } else if (white.last_frame != reports) {
-    white.last_frame = reports;
-    ++white.frames;
+void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& measurement) {
+  ++far_off_counts[sensor].total;
+  far_off_counts[sensor].far_off += measurement.nis > kFarSigmas * kFarSigmas * measurement.dof ||
+                                    (measures_angle[sensor] && IsFarAngle(measurement));
+  NisSamples& samples = nis_samples[sensor];
+  samples.dof = measurement.dof;
+  if (measurement.outcome == Outcome::kGated) {
+    if (measurement.nis > 0.0) {
+      samples.smallest_gated = std::min(samples.smallest_gated, measurement.nis);
+    }
+  } else if (samples.last_frame != report_count) {
+    samples.last_frame = report_count;
+    ++samples.frames;
   }
 }
 
-void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport& report) {
-  ++reports;
+void Metrics::Impl::AddReport(const std::vector<PeriodSums*>& destinations,
+                              const UpdateReport& report) {
+  ++report_count;
   if (has_landmarks) {
     counts["landmarks.initialised"] += report.landmarks.initialised;
     counts["landmarks.deleted"] += report.landmarks.deleted;
@@ -396,18 +415,22 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     counts["landmarks.hypotheses"] += report.landmarks.hypotheses;
     counts["landmarks.rescued"] += report.landmarks.rescued;
   }
-  for (const MeasurementReport& m : report.measurements()) {
-    if (m.sensor < 0 || m.sensor >= static_cast<int>(sensors.size())) continue;
-    const auto sensor = static_cast<std::size_t>(m.sensor);
-    std::int64_t*& count = count_of[sensor][static_cast<std::size_t>(m.outcome)];
+  for (const MeasurementReport& measurement : report.measurements()) {
+    if (measurement.sensor < 0 || measurement.sensor >= static_cast<int>(sensors.size())) continue;
+    const auto sensor = static_cast<std::size_t>(measurement.sensor);
+    std::int64_t*& count = outcome_counts[sensor][static_cast<std::size_t>(measurement.outcome)];
     if (count == nullptr)
-      count = &counts[MetricKey{ToString(m.outcome), sensors[sensor], ""}.text()];
+      count = &counts[MetricKey{ToString(measurement.outcome), sensors[sensor], ""}.text()];
     ++*count;
-    const bool compared = m.outcome == Outcome::kAccepted || m.outcome == Outcome::kGated;
-    if (compared && m.dof > 0) AddInnovation(sensor, m);
-    if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
-    for (Sums* sums_of : into) {
-      sums_of->Add<SensorSample>(&MetricInfo::sensor, sensor, {m.nis, m.dof});
+    const bool is_compared =
+        measurement.outcome == Outcome::kAccepted || measurement.outcome == Outcome::kGated;
+    if (is_compared && measurement.dof > 0) AddInnovation(sensor, measurement);
+    if (measurement.outcome != Outcome::kAccepted || measurement.dof <= 0 ||
+        !std::isfinite(measurement.nis)) {
+      continue;
+    }
+    for (PeriodSums* sums : destinations) {
+      sums->Add<SensorSample>(&MetricInfo::sensor, sensor, {measurement.nis, measurement.dof});
     }
   }
   for (auto& [sensor, frames] : reprojection) {
@@ -419,16 +442,17 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
   }
 }
 
-std::vector<Metrics::Impl::Sums*> Metrics::Impl::SumsOf(const std::vector<bool>& in_segment) {
-  ALIDADE_EXPECTS(in_segment.size() + 1 == sums.size());
-  std::vector<Sums*> into = {&sums[0]};
+std::vector<Metrics::Impl::PeriodSums*> Metrics::Impl::PeriodsOf(
+    const std::vector<bool>& in_segment) {
+  ALIDADE_EXPECTS(in_segment.size() + 1 == periods.size());
+  std::vector<PeriodSums*> destinations = {&periods[0]};
   for (std::size_t i = 0; i < in_segment.size(); ++i) {
-    if (in_segment[i]) into.push_back(&sums[i + 1]);
+    if (in_segment[i]) destinations.push_back(&periods[i + 1]);
   }
-  return into;
+  return destinations;
 }
 
-/// The name of subject `index` of a metric.
+/// Returns the name of subject `index` of a metric.
 const std::string& Metrics::Impl::SubjectOf(const MetricInfo& metric, std::size_t index) const {
   switch (metric.subject) {
     case MetricSubject::kOwner:
@@ -439,16 +463,16 @@ const std::string& Metrics::Impl::SubjectOf(const MetricInfo& metric, std::size_
     case MetricSubject::kRun:
       break;
   }
-  return tracked[index].name;
+  return tracked_blocks[index].name;
 }
 
-void Metrics::Impl::Write(const Sums& sums_of, std::map<std::string, double>& metrics) const {
+void Metrics::Impl::Write(const PeriodSums& sums, std::map<std::string, double>& metrics) const {
   for (std::size_t m = 0; m < kMetrics.size(); ++m) {
     const MetricInfo& metric = kMetrics[m];
-    for (std::size_t i = 0; i < sums_of.metrics[m].size(); ++i) {
-      const Accumulator& accumulator = sums_of.metrics[m][i];
+    for (std::size_t i = 0; i < sums.metrics[m].size(); ++i) {
+      const Accumulator& accumulator = sums.metrics[m][i];
       if (accumulator.count == 0) continue;
-      metrics[MetricKey{metric.name, SubjectOf(metric, i), sums_of.segment}.text()] =
+      metrics[MetricKey{metric.name, SubjectOf(metric, i), sums.segment}.text()] =
           accumulator.Reduce(metric.reduction);
     }
   }
@@ -464,24 +488,25 @@ void Metrics::Impl::WriteBounds(std::map<std::string, double>& metrics) const {
     const std::vector<double>& nees = owner.nees.values;
     if (nees.empty()) continue;
     const double dof = metrics.at(MetricKey{"nees.dof", owner.name, ""}.text());
-    const double samples = static_cast<double>(nees.size()) / AutocorrelationTime(nees, 1.0);
-    write("nees", owner.name, ConsistencyBounds(dof, samples));
+    const double independent = static_cast<double>(nees.size()) / AutocorrelationTime(nees, 1.0);
+    write("nees", owner.name, ConsistencyBounds(dof, independent));
   }
   for (std::size_t i = 0; i < sensors.size(); ++i) {
-    const Whiteness& white = whiteness[i];
-    if (!white.told || white.frames == 0) continue;
+    const NisSamples& samples = nis_samples[i];
+    if (!samples.has_bounds || samples.frames == 0) continue;
     write("nis", sensors[i],
-          ConsistencyBounds(white.dof, static_cast<double>(white.frames), white.cut));
+          ConsistencyBounds(samples.dof, static_cast<double>(samples.frames),
+                            samples.smallest_gated));
   }
 }
 
 Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truths,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
-  impl_->Track(spec.problem, truths);
-  impl_->FindImplied(spec.problem, truths);
+  impl_->TrackBlocks(spec.problem, truths);
+  impl_->FindImpliedBlocks(spec.problem, truths);
   impl_->sensors = internal::NamesOf(spec.problem.sensors);
-  impl_->path = internal::PositionBlockOf(spec.problem);
+  impl_->position_block = internal::PositionBlockOf(spec.problem);
   impl_->motions = internal::NamesOf(spec.problem.motions);
   impl_->has_landmarks = spec.problem.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
@@ -490,16 +515,17 @@ Metrics::Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truth
     if (!internal::HasReprojection(spec.problem.sensors[s])) continue;
     impl_->reprojection[static_cast<int>(s)] = {};
   }
-  impl_->count_of.resize(impl_->sensors.size());
-  impl_->far_off.resize(impl_->sensors.size());
-  const bool filters = spec.estimator == nullptr || !spec.estimator->offline();
+  impl_->outcome_counts.resize(impl_->sensors.size());
+  impl_->far_off_counts.resize(impl_->sensors.size());
+  const bool is_filter = spec.estimator == nullptr || !spec.estimator->offline();
   for (const SensorBinding& sensor : spec.problem.sensors) {
-    const Geometry& measured = sensor.model->measurement().geometry;
-    impl_->angle.push_back(measured.is_angle());
-    impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
+    const Geometry& geometry = sensor.model->measurement().geometry;
+    impl_->measures_angle.push_back(geometry.is_angle());
+    impl_->nis_samples.emplace_back().has_bounds = is_filter && sensor.loss.kind == LossKind::kNone;
   }
-  impl_->sums.resize(1 + segments.size());
-  for (std::size_t i = 0; i < segments.size(); ++i) impl_->sums[i + 1].segment = segments[i].name;
+  impl_->periods.resize(1 + segments.size());
+  for (std::size_t i = 0; i < segments.size(); ++i)
+    impl_->periods[i + 1].segment = segments[i].name;
 }
 
 Metrics::~Metrics() = default;
@@ -507,19 +533,19 @@ Metrics::Metrics(Metrics&&) noexcept = default;
 
 void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment, const State& state,
                   const UpdateReport& report) {
-  const std::vector<Impl::Sums*> into = impl_->SumsOf(in_segment);
+  const std::vector<Impl::PeriodSums*> destinations = impl_->PeriodsOf(in_segment);
   if (!report.stale) {
-    impl_->FindErrors(frame.timestamp, frame.truth, [&](BlockId id) {
+    impl_->ComputeErrors(frame.timestamp, frame.truth, [&](BlockId id) {
       return state.layout()[id].present ? state.value(id) : nullptr;
     });
-    impl_->AddErrors(frame.timestamp, into, &state);
-    impl_->AddImplied(frame.truth, into, report);
+    impl_->AddErrors(frame.timestamp, destinations, &state);
+    impl_->AddImplied(frame.truth, destinations, report);
   }
-  impl_->AddReport(into, report);
+  impl_->AddReport(destinations, report);
 }
 
 void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport& report) {
-  impl_->AddReport(impl_->SumsOf(in_segment), report);
+  impl_->AddReport(impl_->PeriodsOf(in_segment), report);
 }
 
 void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
@@ -529,23 +555,23 @@ void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<d
     const std::vector<double>& value = estimate[static_cast<std::size_t>(id)];
     return value.empty() ? nullptr : value.data();
   };
-  impl_->FindErrors(timestamp, reference, value_of);
-  impl_->AddErrors(timestamp, impl_->SumsOf(in_segment), nullptr);
+  impl_->ComputeErrors(timestamp, reference, value_of);
+  impl_->AddErrors(timestamp, impl_->PeriodsOf(in_segment), nullptr);
 }
 
-std::vector<std::string> Metrics::without_truth() const {
+std::vector<std::string> Metrics::blocks_without_truth() const {
   std::vector<std::string> names;
-  for (const Impl::Tracked& block : impl_->tracked) {
-    if (!block.was_known) names.push_back(block.name);
+  for (const Impl::TrackedBlock& block : impl_->tracked_blocks) {
+    if (!block.was_ever_known) names.push_back(block.name);
   }
   return names;
 }
 
-std::vector<int> Metrics::far_off() const {
+std::vector<int> Metrics::far_off_sensors() const {
   std::vector<int> sensors;
-  for (std::size_t i = 0; i < impl_->far_off.size(); ++i) {
-    const Impl::FarOff& far_off = impl_->far_off[i];
-    if (2 * far_off.far > far_off.count) sensors.push_back(static_cast<int>(i));
+  for (std::size_t i = 0; i < impl_->far_off_counts.size(); ++i) {
+    const Impl::FarOffCounts& counts = impl_->far_off_counts[i];
+    if (2 * counts.far_off > counts.total) sensors.push_back(static_cast<int>(i));
   }
   return sensors;
 }
@@ -558,10 +584,10 @@ const std::map<std::string, std::string>& Metrics::units() const { return impl_-
 
 std::map<std::string, double> Metrics::Finish() const {
   std::map<std::string, double> metrics;
-  for (const Impl::Sums& sums : impl_->sums) impl_->Write(sums, metrics);
+  for (const Impl::PeriodSums& sums : impl_->periods) impl_->Write(sums, metrics);
   impl_->WriteBounds(metrics);
-  for (const Impl::Tracked& block : impl_->tracked) {
-    if (!block.series.even()) continue;
+  for (const Impl::TrackedBlock& block : impl_->tracked_blocks) {
+    if (!block.series.is_even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
     if (std::isfinite(lag)) metrics[MetricKey{"lag_ms", block.name, ""}.text()] = lag;
   }

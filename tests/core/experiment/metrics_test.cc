@@ -350,7 +350,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   EXPECT_EQ(event.kind, EventKind::kInconsistent);
   EXPECT_EQ(event.timestamp, 39 * Timestamp{100'000'000});
   EXPECT_EQ(event.text,
-            "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
+            "a.x: the error, 21 m, exceeded 10 sigma for 20 timestamps in a row; sigma is 2 m");
 }
 
 // The truth has sigma 3 m and the filter 2 m: the error has the variance 13 m^2.

@@ -15,11 +15,11 @@
 #include "alidade/record/contents.h"
 #include "alidade/state/element_names.h"
 
-/// The columns of the csv files of a run folder, a table for each file. A new column is an entry of
-/// a table.
+/// Columns of the csv files of a run folder, one table for each file. To add a column, add an entry
+/// to the table.
 namespace alidade::internal {
 
-/// `v0`, `v1` and so on.
+/// Returns columns with a letter and a number: `v0`, `v1` and so on.
 inline std::vector<Column> NumberedColumns(const std::string& letter, std::size_t count) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < count; ++i) columns.push_back({letter + std::to_string(i), "", ""});
@@ -34,7 +34,7 @@ inline void WriteFinite(double value, CsvFile& file) {
 // measurements.csv
 
 struct MeasurementLayout {
-  std::size_t width, known_width;  ///< of the widest stream
+  std::size_t width, known_width;  ///< numbers of columns, from the widest stream
 };
 struct MeasurementRow {
   const Measurement& measurement;
@@ -73,7 +73,7 @@ inline constexpr std::array kMeasurementColumns =
 
 struct TruthLayout {
   std::vector<StreamInfo> truths;
-  std::vector<std::vector<std::string>> names;  ///< of the elements of each truth
+  std::vector<std::vector<std::string>> names;  ///< element names of each truth
 };
 inline constexpr std::array kTruthColumns = std::to_array<ColumnInfo<TruthLayout, SourceFrame>>({
     {"t_s", "s", "timestamp of the frame",
@@ -125,7 +125,7 @@ inline constexpr std::array kExpectedColumns =
 // implied_states.csv
 
 struct ImpliedLayout {
-  std::vector<Column> blocks;  ///< a column each
+  std::vector<Column> blocks;  ///< one column for each block
 };
 struct ImpliedRow {
   Timestamp timestamp;
@@ -138,14 +138,14 @@ inline constexpr std::array kImpliedColumns = std::to_array<ColumnInfo<ImpliedLa
      [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
     {"sensor", "", "sensor of the measurement",
      [](const auto&, const ImpliedRow& row, CsvFile& file) { file.Text(row.sensor); }},
-    {"value", "of the block", "the value of the block that the measurement implies",
+    {"value", "of the block", "value of the block that the measurement implies",
      [](const ImpliedLayout& layout, const ImpliedRow& row, CsvFile& file) {
        file.Empty(row.block).Number(row.value).Empty(layout.blocks.size() - row.block - 1);
      },
      [](const ImpliedLayout& layout) { return layout.blocks; }, "`block`"},
 });
 
-// NAME/estimates.csv and NAME/errors.csv: the timestamp, then the entries below for each block
+// NAME/estimates.csv and NAME/errors.csv: the timestamp, then the entries below for each block.
 
 inline const Column kTimeColumn{"t_s", "s", "t_s"};
 
@@ -162,19 +162,19 @@ struct BlockRow {
   const SourceFrame& frame;
   const State& state;
 
-  /// The truth of a block; null if it is unknown.
+  /// Returns the truth of a block; null if it is unknown.
   const double* TruthOf(const BlockLayout& block) const {
     const auto truth = static_cast<std::size_t>(block.truth);
     const bool is_known = truth < frame.truth.size() && !frame.truth[truth].empty();
     return is_known ? frame.truth[truth].data() : nullptr;
   }
-  /// Empty if the block has no value.
+  /// Returns the value of a block; empty if the block has no value.
   std::vector<double> ValuesOf(const BlockLayout& block) const {
     if (!state.layout()[block.id].present) return {};
     const double* const values = state.value(block.id);
     return {values, values + block.ambient()};
   }
-  /// e = x (-) x_true in the tangent at x; empty if one of them is unknown.
+  /// Returns e = x (-) x_true in the tangent space at x; empty if x or x_true is unknown.
   std::vector<double> ErrorOf(const BlockLayout& block) const {
     const double* const truth = TruthOf(block);
     if (truth == nullptr || !state.layout()[block.id].present) return {};
@@ -183,12 +183,12 @@ struct BlockRow {
     for (double& element : error) element = 0.0 - element;
     return error;
   }
-  /// sqrt(P_ii); empty if the block has no covariance.
+  /// Returns sqrt(P_ii); empty if the block has no covariance.
   std::vector<double> SigmasOf(const BlockLayout& block) const {
-    const Block& place = state.layout()[block.id];
+    const Block& state_block = state.layout()[block.id];
     std::vector<double> sigmas;
-    for (int i = 0; place.has_covariance() && i < block.space.geometry.tangent; ++i) {
-      sigmas.push_back(std::sqrt(state.covariance().Variance(place.tangent_offset + i)));
+    for (int i = 0; state_block.has_covariance() && i < block.space.geometry.tangent; ++i) {
+      sigmas.push_back(std::sqrt(state.covariance().Variance(state_block.tangent_offset + i)));
     }
     return sigmas;
   }
@@ -198,18 +198,19 @@ struct BlockRow {
 std::vector<BlockLayout> BlockLayoutsOf(const Problem& problem,
                                         const std::vector<StreamInfo>& truths);
 
-/// An entry of the table of a file with columns for each block.
+/// Columns of one quantity in a file that has them for each block.
 struct BlockColumnInfo {
   const char* quantity;
-  const char* names;  ///< of the columns, for the documentation
-  const char* unit;   ///< for the documentation
-  const char* meaning;
+  const char* names;                         ///< names of the columns, for the documentation
+  const char* unit;                          ///< for the documentation
+  const char* meaning;                       ///< for the documentation, in Markdown
   std::size_t (BlockLayout::*size)() const;  ///< number of columns
   std::vector<Column> (*columns)(const BlockLayout& block);
-  std::vector<double> (*numbers)(const BlockLayout& block, const BlockRow& row);  ///< empty: none
+  std::vector<double> (*numbers)(const BlockLayout& block,
+                                 const BlockRow& row);  ///< empty: empty cells
 };
 
-/// Returns a column for each tangent element of a block, with the name PREFIX and the element.
+/// Returns a column for each tangent element of a block. Its name is `prefix` and the element.
 inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::string& prefix) {
   std::vector<Column> columns;
   for (const std::string& name : TangentNames(block.name, block.space)) {
@@ -222,7 +223,7 @@ inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::s
 inline constexpr BlockColumnInfo kSigmaColumns{
     "sigma",
     "`sigma:block.element`",
-    "of the block; rad of an angle or rotation",
+    "of the block; rad for an angle or rotation",
     "sqrt(P_ii) of each tangent element; empty without a covariance",
     &BlockLayout::tangent,
     [](const BlockLayout& block) { return TangentColumns(block, "sigma:"); },
@@ -244,7 +245,7 @@ inline constexpr std::array kEstimateColumns{
 
 inline constexpr std::array kErrorColumns{
     BlockColumnInfo{
-        "error", "`block.element`", "of the block; rad of an angle or rotation",
+        "error", "`block.element`", "of the block; rad for an angle or rotation",
         "e = x (-) x_true of each tangent element, at the estimate; empty without truth",
         &BlockLayout::tangent, [](const BlockLayout& block) { return TangentColumns(block, ""); },
         [](const BlockLayout& block, const BlockRow& row) { return row.ErrorOf(block); }},
@@ -275,7 +276,7 @@ void WriteCells(const std::array<BlockColumnInfo, n>& table, const BlockLayout& 
 // NAME/innovations.csv
 
 struct InnovationLayout {
-  std::size_t width;  ///< of the widest measurement
+  std::size_t width;  ///< size of the widest measurement
 };
 struct InnovationRow {
   Timestamp timestamp;
@@ -284,62 +285,59 @@ struct InnovationRow {
 
   bool is_predicted() const { return !report.s.empty(); }
 };
-inline constexpr std::array kInnovationColumns =
-    std::to_array<ColumnInfo<InnovationLayout, InnovationRow>>({
-        {"t_s", "s", "timestamp of the frame",
-         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Time(row.timestamp); }},
-        {"stream", "", "stream of the source",
-         [](const auto&, const InnovationRow& row, CsvFile& file) {
-           file.Text(row.sensor.stream);
-         }},
-        {"sensor", "", "sensor of the estimator",
-         [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.name); }},
-        {"landmark", "", "id of the landmark; empty if the measurement has no id",
-         [](const auto&, const InnovationRow& row, CsvFile& file) {
-           file.Landmark(row.report.landmark);
-         }},
-        {"outcome", "", "outcome of the measurement, see [Outcomes](#outcomes)",
-         [](const auto&, const InnovationRow& row, CsvFile& file) {
-           file.Text(ToString(row.report.outcome));
-         }},
-        {"dof", "", "degrees of freedom",
-         [](const auto&, const InnovationRow& row,
-            CsvFile& file) { file.Integer(row.report.dof); }},
-        {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
-         [](const auto&, const InnovationRow& row, CsvFile& file) {
-           row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
-         }},
-        {"z", "of the sensor", "the measurement, ambient",
-         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-           file.Numbers(row.report.z.data(), row.report.z.size(), layout.width);
-         },
-         [](const InnovationLayout& layout) { return NumberedColumns("z", layout.width); },
-         "`z0`, `z1`, ..."},
-        {"h", "of the sensor", "the prediction h(x), ambient",
-         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-           file.Numbers(row.report.h.data(), row.report.h.size(), layout.width);
-         },
-         [](const InnovationLayout& layout) { return NumberedColumns("h", layout.width); },
-         "`h0`, `h1`, ..."},
-        {"s", "of the sensor",
-         "sqrt of the diagonal of S = H P H' + R, tangent; with a robust loss of H P H' + R / w",
-         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-           std::vector<double> sigmas;
-           const auto m = static_cast<std::size_t>(row.report.dof);
-           for (std::size_t i = 0; i < m && row.is_predicted(); ++i) {
-             sigmas.push_back(std::sqrt(row.report.s[i * m + i]));
-           }
-           file.Numbers(sigmas.data(), sigmas.size(), layout.width);
-         },
-         [](const InnovationLayout& layout) { return NumberedColumns("s", layout.width); },
-         "`s0`, `s1`, ..."},
-        {"r", "of the sensor", "the innovation z (-) h, tangent",
-         [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
-           file.Numbers(row.report.innovation.data(), row.report.innovation.size(), layout.width);
-         },
-         [](const InnovationLayout& layout) { return NumberedColumns("r", layout.width); },
-         "`r0`, `r1`, ..."},
-    });
+inline constexpr std::array kInnovationColumns = std::to_array<
+    ColumnInfo<InnovationLayout, InnovationRow>>({
+    {"t_s", "s", "timestamp of the frame",
+     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Time(row.timestamp); }},
+    {"stream", "", "stream of the source",
+     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.stream); }},
+    {"sensor", "", "sensor of the estimator",
+     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Text(row.sensor.name); }},
+    {"landmark", "", "id of the landmark; empty if the measurement has no id",
+     [](const auto&, const InnovationRow& row, CsvFile& file) {
+       file.Landmark(row.report.landmark);
+     }},
+    {"outcome", "", "outcome of the measurement, see [Outcomes](#outcomes)",
+     [](const auto&, const InnovationRow& row, CsvFile& file) {
+       file.Text(ToString(row.report.outcome));
+     }},
+    {"dof", "", "degrees of freedom",
+     [](const auto&, const InnovationRow& row, CsvFile& file) { file.Integer(row.report.dof); }},
+    {"nis", "", "r' S^-1 r, not divided by `dof`; empty if S was not computed",
+     [](const auto&, const InnovationRow& row, CsvFile& file) {
+       row.is_predicted() ? file.Number(row.report.nis) : file.Empty();
+     }},
+    {"z", "of the sensor", "the measurement, each ambient element",
+     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+       file.Numbers(row.report.z.data(), row.report.z.size(), layout.width);
+     },
+     [](const InnovationLayout& layout) { return NumberedColumns("z", layout.width); },
+     "`z0`, `z1`, ..."},
+    {"h", "of the sensor", "the prediction h(x), each ambient element",
+     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+       file.Numbers(row.report.h.data(), row.report.h.size(), layout.width);
+     },
+     [](const InnovationLayout& layout) { return NumberedColumns("h", layout.width); },
+     "`h0`, `h1`, ..."},
+    {"s", "of the sensor",
+     "sqrt(S_ii) of each tangent element, S = H P H' + R; with a robust loss S = H P H' + R / w",
+     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+       std::vector<double> sigmas;
+       const auto m = static_cast<std::size_t>(row.report.dof);
+       for (std::size_t i = 0; i < m && row.is_predicted(); ++i) {
+         sigmas.push_back(std::sqrt(row.report.s[i * m + i]));
+       }
+       file.Numbers(sigmas.data(), sigmas.size(), layout.width);
+     },
+     [](const InnovationLayout& layout) { return NumberedColumns("s", layout.width); },
+     "`s0`, `s1`, ..."},
+    {"r", "of the sensor", "the innovation z (-) h, each tangent element",
+     [](const InnovationLayout& layout, const InnovationRow& row, CsvFile& file) {
+       file.Numbers(row.report.innovation.data(), row.report.innovation.size(), layout.width);
+     },
+     [](const InnovationLayout& layout) { return NumberedColumns("r", layout.width); },
+     "`r0`, `r1`, ..."},
+});
 
 // NAME/gains.csv
 
@@ -349,15 +347,15 @@ struct GainLayout {
 struct GainRow {
   Timestamp timestamp;
   const std::string& sensor;
-  const std::vector<const double*>& cells;  ///< by element; null: not of this sensor
+  const std::vector<const double*>& cells;  ///< by element; null: element of another sensor
 };
 inline constexpr std::array kGainColumns = std::to_array<ColumnInfo<GainLayout, GainRow>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const GainRow& row, CsvFile& file) { file.Time(row.timestamp); }},
     {"sensor", "", "sensor of the estimator",
      [](const auto&, const GainRow& row, CsvFile& file) { file.Text(row.sensor); }},
-    {"gain", "of the block element by that of the measured one",
-     "K of a block element by a measured element; empty for other sensors",
+    {"gain", "of the block / of the sensor",
+     "element of K for the block element and the measured element; empty for other sensors",
      [](const auto&, const GainRow& row, CsvFile& file) {
        for (const double* const cell : row.cells) {
          cell != nullptr ? file.Number(*cell) : file.Empty();
@@ -379,13 +377,14 @@ inline constexpr std::array kReprojectionColumns =
     std::to_array<ColumnInfo<NoLayout, ReprojectionRow>>({
         {"t_s", "s", "timestamp of the frame",
          [](const auto&, const ReprojectionRow& row, CsvFile& file) { file.Time(row.timestamp); }},
-        {"sensor", "", "sensor of landmarks",
+        {"sensor", "", "sensor that observes landmarks",
          [](const auto&, const ReprojectionRow& row, CsvFile& file) { file.Text(row.sensor); }},
         {"landmarks", "", "number of accepted measurements",
          [](const auto&, const ReprojectionRow& row, CsvFile& file) {
            file.Integer(row.innovation.measurements);
          }},
-        {"rms", "", "sqrt(mean r_i^2) over all elements of their innovations, unit of the sensor",
+        {"rms", "",
+         "sqrt(mean r_i^2) over all elements of the accepted innovations, unit of the sensor",
          [](const auto&, const ReprojectionRow& row, CsvFile& file) {
            file.Number(row.innovation.rms);
          }},
@@ -396,7 +395,7 @@ inline constexpr std::array kEventColumns = std::to_array<ColumnInfo<NoLayout, E
      [](const auto&, const Event& event, CsvFile& file) { file.Time(event.timestamp); }},
     {"kind", "", "kind of the event, see [Events](#events)",
      [](const auto&, const Event& event, CsvFile& file) { file.Text(ToString(event.kind)); }},
-    {"text", "", "a sentence",
+    {"text", "", "description of the event",
      [](const auto&, const Event& event, CsvFile& file) { file.Text(event.text); }},
 });
 
@@ -408,7 +407,7 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Integer(landmark.generation);
          }},
-        {"representation", "", "representation in the state; empty for one of the sensor's own",
+        {"representation", "", "representation in the state; empty if the sensor defines its own",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Text(landmark.representation ? ToString(*landmark.representation) : "");
          }},
@@ -418,18 +417,20 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[1], file); }},
         {"z", "m", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[2], file); }},
-        {"sigma_x", "m", "its standard deviations",
-         [](const auto&, const auto& l,
-            CsvFile& file) { WriteFinite(std::sqrt(l.covariance(0, 0)), file); }},
+        {"sigma_x", "m", "standard deviation of the position",
+         [](const auto&, const auto& l, CsvFile& file) {
+           WriteFinite(std::sqrt(l.covariance(0, 0)), file);
+         }},
         {"sigma_y", "m", "",
          [](const auto&, const auto& l,
             CsvFile& file) { WriteFinite(std::sqrt(l.covariance(1, 1)), file); }},
         {"sigma_z", "m", "",
          [](const auto&, const auto& l,
             CsvFile& file) { WriteFinite(std::sqrt(l.covariance(2, 2)), file); }},
-        {"inverse_distance", "1/m", "from the place of its first observation; empty for xyz",
+        {"inverse_distance", "1/m",
+         "inverse distance from the camera position of the first observation; empty for xyz",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.inverse_distance, file); }},
-        {"sigma_inverse_distance", "1/m", "its standard deviation",
+        {"sigma_inverse_distance", "1/m", "standard deviation of the inverse distance",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.sigma, file); }},
         {"first_s", "s", "timestamp of the first observation",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.first); }},
@@ -439,13 +440,13 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.tried); }},
         {"accepted", "", "number of accepted measurements",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.accepted); }},
-        {"true_x", "m", "true position; empty if the source does not know it",
+        {"true_x", "m", "true position; empty if the source does not provide it",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[0], file); }},
         {"true_y", "m", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[1], file); }},
         {"true_z", "m", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.true_position[2], file); }},
-        {"cov_xy", "m^2", "the other elements of the covariance of the position",
+        {"cov_xy", "m^2", "off-diagonal elements of the covariance of the position",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 1), file); }},
         {"cov_xz", "m^2", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 2), file); }},
@@ -469,7 +470,7 @@ struct TimingRow {
 inline constexpr std::array kTimingColumns = std::to_array<ColumnInfo<TimingLayout, TimingRow>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const TimingRow& row, CsvFile& file) { file.Time(row.timestamp); }},
-    {"wall", "s", "wall-clock time of each estimator that is not offline",
+    {"wall", "s", "wall-clock time of each online estimator",
      [](const auto&, const TimingRow& row, CsvFile& file) {
        for (const std::optional<double>& cell : row.wall_s) {
          cell ? file.Number(*cell) : file.Empty();

@@ -11,24 +11,24 @@
 
 namespace alidade::internal {
 
-/// A column of a csv file of a run folder.
+/// Column of a csv file in a run folder.
 struct Column {
   std::string name;
-  std::string unit;          ///< "" if it has none, or if it depends on the row
-  std::string quantity;      ///< of the ColumnInfo that it belongs to
-  std::string subject = {};  ///< its block, sensor or estimator; "" if it has none
+  std::string unit;          ///< "" if there is no unit, or if it depends on the row
+  std::string quantity;      ///< ColumnInfo::quantity of its entry
+  std::string subject = {};  ///< block, sensor or estimator of the column, or ""
 };
 
-/// An entry of the table of a file: one column, or several of one quantity. `Layout` determines
-/// the columns, `Row` their cells.
+/// Entry in the column table of a file: a single column, or several columns of one quantity.
+/// `Layout` determines the columns, `Row` their cells.
 template <class Layout, class Row>
 struct ColumnInfo {
-  const char* quantity;  ///< the name of the column, if it is only one
-  const char* unit;      ///< that of the column, if it is only one; else for the documentation
+  const char* quantity;  ///< also the name of a single column
+  const char* unit;      ///< unit of a single column; of several columns for the documentation
   const char* meaning;   ///< for the documentation, in Markdown
   void (*write)(const Layout& layout, const Row& row, CsvFile& file);
-  std::vector<Column> (*columns)(const Layout& layout) = nullptr;  ///< null: it is only one
-  const char* names = "";  ///< of the columns, for the documentation, if there are several
+  std::vector<Column> (*columns)(const Layout& layout) = nullptr;  ///< null: a single column
+  const char* names = "";  ///< names of several columns, for the documentation
 };
 
 /// Appends the columns of a table.
@@ -47,14 +47,14 @@ void AppendColumns(const std::array<ColumnInfo<Layout, Row>, n>& table, const La
   }
 }
 
-/// Writes the cells of a table for one row, without the end of the row.
+/// Writes the cells of a table for one row. Does not end the row.
 template <class Layout, class Row, std::size_t n>
 void WriteCells(const std::array<ColumnInfo<Layout, Row>, n>& table, const Layout& layout,
                 const Row& row, CsvFile& file) {
   for (const ColumnInfo<Layout, Row>& info : table) info.write(layout, row, file);
 }
 
-/// The columns of all csv files of a run folder, by file: `columns.json`.
+/// Columns of all csv files of a run folder, by file name. `columns.json` contains them.
 using RunColumns = std::map<std::string, std::vector<Column>>;
 
 /// Creates a csv file with these columns and adds them to `run_columns`. Errors: kCannotCreate,
@@ -62,8 +62,8 @@ using RunColumns = std::map<std::string, std::vector<Column>>;
 CsvFile CreateCsv(const OutputFolder& folder, const std::string& name, std::vector<Column> columns,
                   RunColumns& run_columns);
 
-/// The text of `columns.json`: FILE: [{name, unit, quantity, subject}, ...]; the keys `unit` and
-/// `subject` are omitted if they are "".
+/// Returns the text of `columns.json`: FILE: [{name, unit, quantity, subject}, ...]. The keys `unit`
+/// and `subject` are omitted if they are "".
 std::string ColumnsJson(const RunColumns& run_columns);
 
 }  // namespace alidade::internal

@@ -12,17 +12,17 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
     if (block.truth < 0) continue;
     blocks_.push_back(block);
     AppendColumns(kErrorColumns, block, columns);
-    int part = 0;
+    int element = 0;
     for (const std::string& name : TangentNames(block.name, block.space)) {
-      const bool is_angle = block.space.geometry.IsAngular(part);
-      elements_.push_back({name, block.unit, block.truth, part++, is_angle});
+      const bool is_angle = block.space.geometry.IsAngular(element);
+      elements_.push_back({name, block.unit, block.truth, element++, is_angle});
     }
   }
   if (blocks_.empty()) return;
   file_ = CreateCsv(folder, estimator + "/errors.csv", std::move(columns), run_columns);
 }
 
-/// Records which elements have a known error and a variance.
+/// Records the elements that have a known error, and those that have a variance.
 void ErrorsFile::Record(const BlockRow& row) {
   std::size_t first = 0;
   for (const BlockLayout& block : blocks_) {

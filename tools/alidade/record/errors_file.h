@@ -10,30 +10,31 @@
 
 namespace alidade::internal {
 
-/// `NAME/errors.csv`, for an estimator with a block whose truth the source names:
+/// Writer of `NAME/errors.csv`, which exists if the source names the truth of a block:
 ///
-///   e      = x (-) x_true    of each tangent element, in the tangent at the estimate, as P
-///   sigma  = sqrt(P_ii)      of the estimate alone
+///   e      = x (-) x_true    each tangent element, in the tangent space at the estimate, like P
+///   sigma  = sqrt(P_ii)      of the estimate only, without the uncertainty of the truth
 ///
-/// e is -(x_true (-) x): the same for vectors, angles and rotations. The error of a rotation is in
-/// the body frame, rad.
+/// e is computed as -(x_true (-) x), which is equal for vectors, angles and rotations. The error of
+/// a rotation is in the body frame, rad.
 class ErrorsFile {
  public:
-  /// `blocks` are those of the problem.
+  /// `blocks` are all blocks of the problem. Creates no file if no block has a truth.
   ErrorsFile(const OutputFolder& folder, const std::string& estimator,
              const std::vector<BlockLayout>& blocks, RunColumns& run_columns);
 
-  /// Writes a row. Cells are empty while value, truth or P is unknown. Error: kIo.
+  /// Writes a row. A cell is empty if its value, truth or covariance is unknown. Error: kIo.
   void Add(const SourceFrame& frame, const State& state);
+  /// Closes the file. Error: kIo.
   void Close();
   const std::vector<RecordedError>& elements() const { return elements_; }
 
  private:
   void Record(const BlockRow& row);
 
-  std::vector<BlockLayout> blocks_;  ///< those with truth
+  std::vector<BlockLayout> blocks_;  ///< only the blocks with truth
   std::vector<RecordedError> elements_;
-  std::optional<CsvFile> file_;  ///< none if no block has a truth
+  std::optional<CsvFile> file_;  ///< empty if no block has a truth
 };
 
 }  // namespace alidade::internal

@@ -19,8 +19,8 @@ std::string InParentheses(const std::string& unit) {
   return unit.find_first_of("/ ^") == unit.npos ? unit : '(' + unit + ')';
 }
 
-/// Returns the unit of the gain of an element with this unit; "" if it has none or is unknown. A
-/// sensor of several elements without a common unit may have one for each element.
+/// Returns the unit of the gain of a block element with the unit `unit`; "" if the gain has no unit
+/// or an unknown one. The unit is unknown if the sensor has several elements without a common unit.
 std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
   if (unit == sensor.unit) return "";
   if (sensor.unit.empty()) return sensor.tangent == 1 ? unit : "";
@@ -50,7 +50,7 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& 
                                const TruthLayout& truth, bool covariances, RunColumns& run_columns)
     : recorded_(Describe(spec)) {
   AddBlocks(spec.problem, truth);
-  FindPath(spec.problem);
+  RecordPositionElements(spec.problem);
   OpenEstimates(folder, run_columns);
   const auto create = [&](const char* file, std::vector<Column> columns) {
     return CreateCsv(folder, spec.name + file, std::move(columns), run_columns);
@@ -86,21 +86,21 @@ void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const Problem& p
   pose_ = FindPose(BlocksOf(problem));
   if (!pose_) return;
   trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
-  const auto constant = [&](std::size_t id) {
+  const auto is_constant = [&](std::size_t id) {
     return problem.layout.blocks()[id].status == BlockStatus::kConstant;
   };
-  if (constant(pose_->position) || constant(pose_->orientation)) return;
+  if (is_constant(pose_->position) || is_constant(pose_->orientation)) return;
   trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", *pose_,
                                  true);
 }
 
-void EstimatorFiles::FindPath(const Problem& problem) {
+void EstimatorFiles::RecordPositionElements(const Problem& problem) {
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     recorded_.sensors[s].has_reprojection = HasReprojection(problem.sensors[s]);
   }
-  const BlockId path = PositionBlockOf(problem);
+  const BlockId position = PositionBlockOf(problem);
   for (const RecordedBlock& block : blocks_) {
-    if (block.layout.id == path) recorded_.path = static_cast<int>(block.element);
+    if (block.layout.id == position) recorded_.path = static_cast<int>(block.element);
   }
 }
 
@@ -122,7 +122,7 @@ void EstimatorFiles::AddBlocks(const Problem& problem, const TruthLayout& truth)
 
 GainLayout EstimatorFiles::AddGains(const Problem& problem) {
   GainLayout layout;
-  std::map<std::string, std::size_t> known;  // sensors with the same measured names share columns
+  std::map<std::string, std::size_t> cells;  // sensors with equal element names share columns
   for (std::size_t s = 0; s < problem.sensors.size(); ++s) {
     const Space& space = problem.sensors[s].model->measurement();
     if (problem.sensors[s].model->has_landmark()) continue;
@@ -133,7 +133,7 @@ GainLayout EstimatorFiles::AddGains(const Problem& problem) {
         for (const std::string& measured : TangentNames(space.name, space)) {
           const std::string name = element.name + "<-" + measured;
           const std::string unit = UnitOfGain(element.unit, recorded_.sensors[s]);
-          const auto [cell, is_new] = known.try_emplace(name, known.size());
+          const auto [cell, is_new] = cells.try_emplace(name, cells.size());
           if (is_new) layout.elements.push_back({name, unit, "", block.layout.name});
           recorded_.sensors[s].gains.push_back({name, unit, cell->second});
         }
@@ -165,7 +165,7 @@ void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const Upd
   }
 }
 
-/// Records which elements have a value, truth and variance.
+/// Records the elements that have a value, a truth or a variance.
 void EstimatorFiles::RecordEstimate(const SourceFrame& frame, const State& state) {
   const BlockRow row{frame, state};
   for (const RecordedBlock& recorded : blocks_) {
@@ -239,7 +239,7 @@ void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
   std::vector<const double*> cells(gain_layout_.elements.size(), nullptr);
   const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
   std::size_t next = 0;  // index into sensor.gains, by block, element and measured element
-  std::size_t row = 0;   // of K
+  std::size_t row = 0;   // row of K
   for (const RecordedBlock& recorded : blocks_) {
     const Block& block = state.layout()[recorded.layout.id];
     if (block.status == BlockStatus::kConstant) continue;

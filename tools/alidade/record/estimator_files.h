@@ -13,34 +13,39 @@
 
 namespace alidade::internal {
 
-/// Writer of the files of one estimator that grow frame by frame: `estimates.csv`,
-/// `innovations.csv` and `gains.csv`; `errors.csv` if a block has truth; `reprojection.csv` if a
-/// sensor observes landmarks; `trajectory.tum`, and `trajectory_covariance.tum` if both have a
-/// covariance, if there are blocks X.position and X.orientation. The files have the blocks and
-/// sensors of the initial problem.
+/// Writer of the files of one estimator that grow frame by frame. The files contain the blocks and
+/// sensors of the initial problem:
+///
+///   estimates.csv, innovations.csv, gains.csv
+///   errors.csv                   if a block has truth
+///   reprojection.csv             if a sensor observes landmarks
+///   trajectory.tum               if there are blocks X.position and X.orientation
+///   trajectory_covariance.tum    if these blocks also have a covariance
+///   covariance.bin               on request
 class EstimatorFiles {
  public:
-  /// `truth` has the columns of truth.csv. Writes `covariance.bin`, too, if `covariances`.
+  /// `truth` has the columns of truth.csv. `covariances`: also writes covariance.bin.
   EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec, const TruthLayout& truth,
                  bool covariances, RunColumns& run_columns);
 
-  /// Writes the rows of a frame. A frame older than the state does not get a row in estimates.csv,
-  /// because the state has a later timestamp. Error: kIo.
+  /// Writes the rows of a frame. For a frame older than the state, it writes no row to
+  /// estimates.csv, because the state has a later timestamp. Error: kIo.
   void Add(const SourceFrame& frame, const State& state, const UpdateReport& report);
+  /// Closes all files and completes recorded(). Error: kIo.
   void Close();
   const RecordedEstimator& recorded() const { return recorded_; }
 
  private:
   struct RecordedBlock {
     BlockLayout layout;
-    std::size_t element;  ///< its first index in recorded_.elements
-    std::size_t sigma;    ///< its first index in recorded_.sigmas
+    std::size_t element;  ///< index of its first element in recorded_.elements
+    std::size_t sigma;    ///< index of its first element in recorded_.sigmas
   };
 
   static RecordedEstimator Describe(const EstimatorSpec& spec);
   void AddBlocks(const Problem& problem, const TruthLayout& truth);
-  /// Finds the elements of the position that sees landmarks.
-  void FindPath(const Problem& problem);
+  /// Records the elements of the position from which landmarks are observed.
+  void RecordPositionElements(const Problem& problem);
   void OpenEstimates(const OutputFolder& folder, RunColumns& run_columns);
   GainLayout AddGains(const Problem& problem);
   void OpenTrajectory(const OutputFolder& folder, const Problem& problem);
@@ -56,9 +61,9 @@ class EstimatorFiles {
   std::vector<Timestamp> last_measured_;  ///< by sensor
   std::optional<CsvFile> estimates_, innovations_, gains_, reprojection_;
   std::optional<ErrorsFile> errors_;
-  std::optional<PosePlace> pose_;  ///< its indices among the blocks
+  std::optional<PosePlace> pose_;  ///< indices of the pose among the blocks
   std::optional<PoseFile> trajectory_, trajectory_covariance_;
-  std::unique_ptr<OutputFile> covariances_;  ///< null if it is not written
+  std::unique_ptr<OutputFile> covariances_;  ///< covariance.bin; null if not requested
 };
 
 }  // namespace alidade::internal

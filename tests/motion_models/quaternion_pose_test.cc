@@ -196,8 +196,8 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.3);
 }
 
-// Per axis, the noise is sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] of (r, v) and, without rotation, of (q,
-// omega).
+// Per axis, the noise of (r, v) and, without rotation, of (q, omega) is
+// sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt].
 TEST(ContinuousQuaternionPose, NoiseAddsUp) {
   const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
   EXPECT_FALSE(motion->discrete_noise());

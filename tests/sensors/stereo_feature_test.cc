@@ -17,8 +17,8 @@ SharedSensor MadeStereo() {
 }
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
-  // The left camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m; the left pixel is
-  // that of one camera.
+  // The left camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m. The left pixel is
+  // that of a single camera.
   // d = 525 0.1 / 2 = 26.25 px: u_right = 57.5 - 26.25
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);

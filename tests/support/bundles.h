@@ -15,7 +15,7 @@
 /// Generated bundles, for tests.
 namespace alidade::testing {
 
-/// Deterministic noise: a product of sines, the same in every run.
+/// Returns deterministic noise: a product of sines, the same in every run.
 inline double Wave(int i) { return std::sin(1.7 * i + 0.3) * std::cos(0.9 * i); }
 
 /// Returns the true problem: `cameras` on an arc around `points` in a box 6 m ahead, measured

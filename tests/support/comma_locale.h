@@ -34,7 +34,7 @@ class CommaLocale {
   CommaLocale(const CommaLocale&) = delete;
   CommaLocale& operator=(const CommaLocale&) = delete;
 
-  /// False if the locale could not be built.
+  /// Whether the locale could be built.
   bool active() const { return active_; }
 
  private:

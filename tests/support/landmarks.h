@@ -12,7 +12,7 @@ namespace alidade::testing {
 
 using Vec3 = std::array<double, 3>;
 
-/// Camera with a radtan lens, 640 x 480 px.
+/// Returns a camera with a radtan lens, 640 x 480 px.
 inline Camera Lens() {
   return Camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0},
                 {0.0012, -0.0007});

@@ -40,7 +40,7 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
 // Models used by most tests, compiled once.
 SharedSensor LinearSensor(double gain, double sigma);
 SharedMotion ConstantMotion(int size, double random_walk = 0.0);
-/// Constant velocity on one axis, with discrete noise.
+/// Returns constant velocity on one axis, with discrete noise.
 SharedMotion ConstantVelocityMotion(double acceleration);
 
 struct GivenPrior {
@@ -62,9 +62,9 @@ struct Jolted : ConstantVelocity<1, false> {
   NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
 };
 
-/// Point with the motion model Jolted: blocks `p.x`, `p.v`.
+/// Returns a problem of a point with the motion model Jolted: blocks `p.x`, `p.v`.
 Problem MovingPoint(double acceleration = 1.0);
-/// Returns MovingPoint with an acceleration that is constant from one update to the next.
+/// Returns MovingPoint with an acceleration that is constant between two updates.
 Problem HeldPoint(double acceleration = 1.0);
 
 /// Returns the depth filter: blocks `target.depth`, `target.depth_rate`,

@@ -274,8 +274,8 @@ TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
   }
 }
 
-// A key with the unit of another quantity may be another key. It is an error only if no one reads
-// it.
+// A key with the unit of another quantity may be another key. It is an error only if the program
+// does not read it.
 TEST(Node, UnitsOfDifferentQuantitiesDoNotConvert) {
   const std::vector<std::string> units = {"m",  "s",   "rad",  "hz", "px",     "m2",
                                           "s2", "px2", "rad2", "kg", "percent"};

@@ -31,7 +31,7 @@ extern "C" void* malloc(std::size_t size) noexcept {
 namespace alidade {
 namespace {
 
-/// The depth filter with a second motion model, whose block no sensor uses.
+/// Returns the depth filter with a second motion model, whose block no sensor uses.
 Problem WalkingDepthFilter() {
   Problem problem = testing::DepthFilter();
   testing::AddMotion(problem, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
@@ -60,8 +60,8 @@ TEST(Log, TakesNoAllocationWithoutASink) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-/// Frames with both sensors, with one, with an outlier, without measurements, and with the sensors
-/// in reverse order.
+/// Returns frames with both sensors, with one, with an outlier, without measurements, and with the
+/// sensors in reverse order.
 std::vector<Frame> Frames() {
   std::vector<Frame> frames;
   for (int k = 0; k < 60; ++k) {
@@ -237,7 +237,7 @@ TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
   ExpectNoAllocationOf(filter, 20);
 }
 
-/// Thirty states of fifteen moving points, one measurement for each point.
+/// Returns a problem of thirty states: fifteen moving points, with one measurement for each point.
 Problem ThirtyStates() {
   Problem problem;
   for (int i = 0; i < 15; ++i) {

@@ -45,7 +45,8 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   }
 };
 
-/// One block of each geometry. Both walk at random and are correlated by the prior.
+/// Returns a problem with one block of each geometry. Both walk at random and are correlated by the
+/// prior.
 template <class A, class B>
 Problem Walking() {
   Problem problem;

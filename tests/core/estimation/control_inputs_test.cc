@@ -26,8 +26,8 @@ constexpr double kNoise = 0.2, kSigma = 0.3;  // m/s^0.5, m
 
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 
-/// `car.position` starts at 1 +- 0.5 m and is driven by stream `odometry`; sensor `fix` measures
-/// it.
+/// Returns the problem of `car.position`, 1 +- 0.5 m, driven by stream `odometry` and measured by
+/// sensor `fix`.
 Problem Car(double timeout_s = kInfinity) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});

@@ -19,7 +19,8 @@ Eigen::Vector3d PointAt(int i) {
   return {0.1 * (i % 8 - 4), 0.1 * (i / 8 - 2), 2.0 + 0.1 * (i % 5)};
 }
 
-/// A known map and a camera whose position has the standard deviation `sigma_0`.
+/// Returns a problem with a known map and a camera whose position has the standard deviation
+/// `sigma_0`.
 Problem KnownMap(double sigma_0 = 0.1) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {

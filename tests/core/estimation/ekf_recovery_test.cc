@@ -129,7 +129,8 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// Nor do invalid covariances: they are a fault of the measurement, not of the filter.
+// Invalid covariances do not count as rejections either: they are a fault of the measurement, not
+// of the filter.
 TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
   const Problem problem = DepthFilter();
   for (const double variance : {std::nan(""), -1e6}) {
@@ -356,7 +357,7 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   problem.priors[0] = {0, {}, {}, "disparity"};
   problem.priors[2] = {2, {}, {}, "inverse_scale"};
   Ekf ekf(problem, {}, StreamsOf(problem));
-  // The scale alone is not sufficient without a depth.
+  // A measurement of the scale cannot initialise its block without a depth.
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements()[0].outcome, Outcome::kNotReady);
   const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);

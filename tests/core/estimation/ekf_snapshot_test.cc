@@ -19,7 +19,7 @@ struct Breaking : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// One block with the prior 1 +- 1, measured directly with the given noise.
+/// Returns a filter of one block with the prior 1 +- 1, measured directly with the given noise.
 Ekf OneBlock(double sigma) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});

@@ -181,7 +181,7 @@ TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
 }
 
 // The expected pixels are those of the camera at its predicted position. A landmark that is not in
-// the map has none.
+// the map has no expected pixel.
 TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), WithPrior()));
   ekf.Process(FrameOf(0.0, {{3, {0.1, 0.2}}, {8, {-0.3, 0.0}}, {5, {0.0, -0.1}}}));

@@ -294,7 +294,7 @@ TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   EXPECT_GT(std::abs(covariance(starts) - covariance(goes_on)), 1e-3);
 }
 
-// Least squares over x_k = Phi_k x_0 + sum Gamma w, with one w from each measured frame to the next.
+// Least squares over x_k = Phi_k x_0 + sum Gamma w; one w per interval between measured frames.
 TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;

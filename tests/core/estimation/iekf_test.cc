@@ -361,8 +361,8 @@ struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// z = x - c + n. Its update changes P = 1.9 I to the correlated P = [[1, .9], [.9, 1]]: .9 = 1.9^2
-/// / S.
+/// z = x - c + n. Its update changes P = 1.9 I to the correlated P = [[1, .9], [.9, 1]], in which
+/// .9 = 1.9^2 / S.
 struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
   static constexpr Quantity kMeasurement{"z"};

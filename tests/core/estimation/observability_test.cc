@@ -94,7 +94,7 @@ TEST(UnobservableDirections, OneCameraCannotTellScale) {
   LandmarkOptions known = testing::WithPrior();
   known.known = {{1, {0.0, 0.0, 2.0}, 0.01}};
   EXPECT_TRUE(UnobservableDirections(problem(known)).empty());
-  // So does any offset in metres.
+  // Any offset in metres determines the scale, too.
   EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
 }
 

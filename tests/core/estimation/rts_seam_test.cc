@@ -113,8 +113,8 @@ struct SeamDistance {
   double estimate = 0.0, covariance = 0.0;
 };
 
-/// Filters a direction that crosses z = 0 several times, at which the basis changes
-/// discontinuously. All angles scale with `sigma`.
+/// Filters a direction that crosses z = 0 several times. At z = 0, the basis of the tangent plane
+/// changes discontinuously. All angles scale with `sigma`.
 SeamDistance Follow(double sigma) {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Wander(sigma), "wander"), {}};

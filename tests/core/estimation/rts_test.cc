@@ -16,8 +16,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Least squares over the first state and all noise inputs, which also allows a singular Q: x_k =
-/// Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
+/// Least squares over the first state and all noise inputs, which also allows a singular Q:
+/// x_k = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
 struct DenseBatch {
   std::vector<Eigen::MatrixXd> map;  ///< x_k as a function of the unknowns
   Eigen::MatrixXd normal;
@@ -128,8 +128,8 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
 }
 
 // The depth filter is not linear. The expected values come from the Rauch-Tung-Striebel recursion,
-// with the inverse that the adjoint form avoids: x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-)
-// C', C = P F' P-^-1.
+// with the inverse that the adjoint form avoids:
+// x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-) C', C = P F' P-^-1.
 TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
   const Problem problem = DepthFilter();
   EkfOptions options;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Compares a filter of few states, with unrolled kernels, with the same filter plus unobserved
-// states. The additional states are so many that the vector kernels are used.
+// states. The larger filter has enough states for the vector kernels.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>

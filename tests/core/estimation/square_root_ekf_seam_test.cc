@@ -39,8 +39,8 @@ struct Fixture : Motion<0, UnitVector> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// A direction at z = 0.05 that the measurement moves across z = 0, at which the basis of its
-/// tangent plane changes discontinuously.
+/// Returns a problem of a direction at z = 0.05 that the measurement moves across z = 0. At z = 0,
+/// the basis of the tangent plane changes discontinuously.
 Problem DirectionNearTheSeam() {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};

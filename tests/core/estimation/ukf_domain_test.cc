@@ -83,8 +83,8 @@ Problem NearZero(double x) {
 }
 
 // The estimate is as little as 1e-3 sigma from the edge of the domain, so the points are 1e-3 sigma
-// from it. For a linear h, the moments equal those of the EKF at any spread, up to eps 5 / (2 c^2)
-// = 6e-10 for the narrowest.
+// from the estimate. For a linear h, the moments equal those of the EKF at any spread. The rounding
+// error at the narrowest spread is eps 5 / (2 c^2) = 6e-10.
 TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
     const Problem problem = NearZero(x);
@@ -103,7 +103,7 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   }
 }
 
-// Points that close would only measure rounding errors.
+// Points so close to the estimate would yield only rounding errors.
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
     const Problem problem = NearZero(x);

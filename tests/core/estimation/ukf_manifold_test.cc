@@ -156,8 +156,8 @@ struct Dragged : Motion<2, Vec<2>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 0.1; }
 };
 
-// N = 4, so c = 2: the points of v are at 2 sigma, and the step multiplies them by 1 - 0.3 dt 2
-// sigma.
+// N = 4, so c = 2: the points of v are at 2 sigma, and the step multiplies them by
+// 1 - 0.3 dt 2 sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   Problem problem;
   const SharedMotion model = MakeMotion(Dragged(), "dragged");

@@ -18,8 +18,8 @@ namespace {
 
 using testing::FrameAt;
 
-/// Frame k of a target at depth 0.3 + 0.1 sin(t). Its measurements have errors of a pixel and more;
-/// every third frame has no disparity.
+/// Returns frame k of a target at depth 0.3 + 0.1 sin(t). Its measurements have errors of a pixel
+/// and more; every third frame has no disparity.
 SourceFrame SwingingFrame(int k) {
   const double t_s = 0.1 * k, depth = 0.3 + 0.1 * std::sin(t_s), wobble = std::sin(37.0 * k);
   SourceFrame frame{FrameAt(t_s, {{1, depth / 0.3 + 0.01 * wobble}}),

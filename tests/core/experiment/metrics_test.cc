@@ -87,7 +87,7 @@ StateLayout Scalars(const std::vector<std::string>& names) {
   return layout;
 }
 
-/// Metrics of a state of one scalar `a.x` with variance 4 m^2.
+/// Returns the metrics of a state of one scalar `a.x` with variance 4 m^2.
 MetricsOf OneScalar(int segments = 0) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1}}, segments);
   const double zero = 0.0;
@@ -110,7 +110,7 @@ TEST(Metrics, TakesErrorsByHand) {
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
 
-// The error of an orientation and of a direction, whose elements have no unit.
+// The elements of an orientation and of a direction have no unit, but their errors are in rad.
 TEST(Metrics, ErrorsOfRotationsAreInRad) {
   StateLayout layout;
   layout.Declare("a.q", "a", SpaceOf("q", "", Geometry::UnitQuaternion()));

@@ -466,7 +466,7 @@ class EachSecond : public testing::SwingingTarget {
   double t_s_ = 0.0;
 };
 
-// Each input arrives too late: the run reports one event and counts the others.
+// Each input arrives too late: the run reports one event and a count.
 TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   Experiment experiment;
   experiment.source = std::make_unique<EachSecond>(100);

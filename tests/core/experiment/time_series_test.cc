@@ -66,8 +66,8 @@ TEST(Lag, FindsTheShiftOfARamp) {
     EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
     EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
   }
-  // Noise of 0.3 at a slope of 0.8 per sample: its mean over 100 samples shifts the lag by 0.3 /
-  // sqrt(100) / 0.8 samples.
+  // Noise of 0.3 at a slope of 0.8 per sample: its mean over 100 samples shifts the lag by
+  // 0.3 / sqrt(100) / 0.8 samples.
   Random random(1);
   const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
   EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
@@ -104,9 +104,11 @@ TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
-// The series is 3, 3, 1.5, then 1. The centred RMS of value 4 is sqrt((9 + 9 + 2.25 + 4) / 7) =
-// 1.86, of value 5 sqrt((18 + 2.25 + 6) / 9) = 1.71 and of value 6 sqrt((9 + 2.25 + 7) / 9) = 1.42.
-// Value 7 has sqrt((2.25 + 8) / 9) = 1.07, the first within 20 % of 1.
+// The series is 3, 3, 1.5, then 1. Its centred RMS is:
+// value 4  sqrt((9 + 9 + 2.25 + 4) / 7) = 1.86
+// value 5  sqrt((18 + 2.25 + 6) / 9) = 1.71
+// value 6  sqrt((9 + 2.25 + 7) / 9) = 1.42
+// value 7  sqrt((2.25 + 8) / 9) = 1.07, the first within 20 % of 1
 TEST(Settling, CountsUntilTheCentredRmsStaysInTheBand) {
   std::vector<double> rms(60, 1.0);
   rms[0] = rms[1] = 3.0;

@@ -129,7 +129,7 @@ TEST(Jet, DecisionsAreThoseOfTheValue) {
   EXPECT_TRUE(isinf(Jet2(infinity)) && isnan(Jet2(infinity) - infinity));
 }
 
-/// A formula with vector operations of Eigen, for any number type.
+/// Computes a formula with vector operations of Eigen, for any number type.
 template <class T>
 T WithEigen(const T& a, const T& b) {
   const Eigen::Matrix<T, 3, 1> x(a, b, T(2.0)), y = x.cross(Eigen::Matrix<T, 3, 1>(b, a, a));

@@ -135,8 +135,8 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
 }
 
 TEST(Landmark, LinearityIndexIsThatOfCivera) {
-  // The anchor is at the origin, the point 4 m ahead, and the camera 3 m to the side: d1 = 5 m, cos
-  // alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
+  // The anchor is at the origin, the point 4 m ahead, and the camera 3 m to the side:
+  // d1 = 5 m, cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
   const double y[6] = {0, 0, 0, 0, 0, 0.25};
   const double beside[3] = {3, 0, 0};
   EXPECT_NEAR(LinearityIndex(InverseDepth::ToRay(y), 0.02, beside), 0.2048, 1e-15);

@@ -252,7 +252,8 @@ TEST(UnitQuaternion, QuarterTurnAboutZ) {
   EXPECT_NEAR(q[3], std::sqrt(0.5), 1e-15);
 }
 
-/// d/dt of x (+) t d at t = 1, in the tangent space at the end point, by central differences.
+/// Returns d/dt of x (+) t d at t = 1, in the tangent space at the end point, by central
+/// differences.
 std::array<double, 2> VelocityAtTheEnd(const double* x, const double* d) {
   const Geometry geometry = Geometry::UnitVector();
   constexpr double kStep = 1e-5;

@@ -4,33 +4,33 @@
 # tests/layering_test.sh [ROOT]
 # tests/layering_test.sh --self-test [ROOT]
 #
-# Checks who includes whom and what must not stand in the sources: one line
-# `FILE:LINE: [rule] text` for each violation, exit code 1 where there is one. With --self-test it
-# plants violations of every rule in a copy of the tree and fails unless each is caught.
+# Checks the include rules and the forbidden content of sources. Prints one line `FILE:LINE: [rule]
+# text` for each violation; the exit code is 1 if there is any. With --self-test it adds violations
+# of every rule to a copy of the tree and fails unless each is caught.
 #
 #   spdx      every source, CMake file and script begins with the licence line
-#   core      core includes headers of core alone, tools those of core and tools, each by its full
-#             path, "alidade/ROOM/FILE.h"
-#   order     a room of core or tools includes itself and those before it, in the order of `rooms`;
-#             none includes testing, which is for tests alone
+#   core      core includes only headers of core, tools only those of core and tools, each by its
+#             full path, "alidade/ROOM/FILE.h"
+#   order     a room of core or tools includes itself and earlier rooms in the order of `rooms`;
+#             none includes testing, which is only for tests
 #   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
 #             their own stem
-#   plugin    nothing includes from plugins/, but a plugin from its own folder, tests/plugins and
-#             tests/fuzz, which test the library behind the export; bench includes the costs of
-#             plugins/ceres
-#   upward    what lies below does not include cli, bench, tests or examples
-#   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools alone;
-#             of nlohmann-json the forward declarations also in core/alidade/io/json.h, which
-#             names the type for all, and the whole in its test; CLI11 in cli, OpenCV in
-#             image plugins and tests/images, Ceres in plugins/ceres, and all three in bench, alone;
-#             model, state and estimation include Eigen alone, and base the standard library;
-#             GoogleTest in testing and tests alone
-#   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
+#   plugin    only a plugin's own folder, tests/plugins and tests/fuzz, which test the library
+#             behind the export, include from plugins/; bench includes the costs of plugins/ceres
+#   upward    lower layers do not include cli, bench, tests or examples
+#   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json only in sources of core and tools;
+#             the forward declarations of nlohmann-json also in core/alidade/io/json.h, which
+#             declares the type for all rooms, and all of nlohmann-json in its test; CLI11 only in
+#             cli and bench, OpenCV only in image plugins, tests/images and bench, Ceres only in
+#             plugins/ceres and bench; model, state and estimation include only Eigen, and base
+#             only the standard library; GoogleTest only in testing and tests
+#   exit      core, tools, models and plugins neither exit nor abort (except `_exit` in a file that
+#             forks)
 #   print     core, tools, models and plugins do not print
-#   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
-#             bad plugins in tests/faults and tests/plugins)
-#   named     core and tools name no shipped plugin of C++, nor its file: what is on offer says what
-#             it can do (`csv`, `scene` and `tracks` are words of their own)
+#   flags     no instruction-set or fast-math flag in CMake files (except for the deliberately
+#             faulty plugins in tests/faults and tests/plugins)
+#   named     core and tools name neither a shipped C++ plugin nor its file: a plugin declares its
+#             capabilities itself (`csv`, `scene` and `tracks` are also words)
 set -euo pipefail
 
 self_test=false
@@ -42,7 +42,7 @@ rooms="model base state estimation testing io config plugin experiment evaluate 
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
 folders=(core tools motion_models sensors plugins cli bench tests examples)
 
-# Violations in the sources given as arguments.
+# Prints the violations in the sources given as arguments.
 sources() {
   awk -v rooms="$rooms" '
     function report(rule, text) { print FILENAME ":" FNR ": [" rule "] " text }
@@ -56,7 +56,7 @@ sources() {
       close(file)
       return found
     }
-    # Blanks comments and the contents of texts; `in_comment` goes on over lines.
+    # Blanks comments and the contents of strings; `in_comment` carries over to the next line.
     function code_of(text,    out, two, c) {
       out = ""
       while (text != "") {
@@ -82,7 +82,7 @@ sources() {
       }
       return out
     }
-    # True where `path` names a file of a plugin other than the one of the present file.
+    # True if `path` names a file of a plugin other than that of the current file.
     function of_plugin(path,    base) {
       base = path
       while (sub(/^(\.\.?\/)+/, "", base)) {}
@@ -101,7 +101,8 @@ sources() {
       if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
       return 1
     }
-    # The place of the room of `path`, "core/alidade/base/x.h" or "alidade/base/x.h", in the order.
+    # Returns the position of the room of `path`, "core/alidade/base/x.h" or "alidade/base/x.h", in
+    # the order.
     function floor_of(path) {
       sub(/^(core|tools)\//, "", path)
       sub(/^alidade\//, "", path)
@@ -189,7 +190,7 @@ sources() {
     }' "$@"
 }
 
-# Scripts and CMake files: the licence line, below `#!` where there is one.
+# Scripts and CMake files: the licence line comes first, or after `#!`.
 licences() {
   awk '
     FNR == 1 && /^#!/ { below = 1; next }
@@ -208,7 +209,7 @@ flags() {
     }' "$@"
 }
 
-# All violations in the tree at $1, or those of its file $2 alone.
+# Prints all violations in the tree at $1, or those of its file $2 only.
 violations() {
   cd "$1"
   local only=${2:-}
@@ -262,7 +263,7 @@ planted=0
 failed=0
 licence='// SPDX-License-Identifier: Apache-2.0'
 
-# plant RULE FILE TEXT: TEXT, appended to FILE or making it, is a violation of RULE on its last line.
+# plant RULE FILE TEXT: appends TEXT to FILE; this must violate RULE on the last line.
 plant() {
   local rule=$1 file=$copy/$2 text=$3 existed=false found
   planted=$((planted + 1))
@@ -280,7 +281,7 @@ plant() {
   if $existed; then mv "$file.kept" "$file"; else rm "$file"; fi
 }
 
-# allow FILE TEXT: TEXT, appended to FILE or making it, breaks no rule.
+# allow FILE TEXT: appends TEXT to FILE; this must not violate a rule.
 allow() {
   local file=$copy/$1 existed=false found
   planted=$((planted + 1))

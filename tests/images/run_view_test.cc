@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade run --save-video`: what is in the video, and what is refused.
+// `alidade run --save-video`: the contents of the video, and the refused cases.
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -19,7 +19,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-// Four points on a textured plate 4 m ahead. A camera that goes sideways, x = 0 to 0.3 m, sees
+// Four points on a textured plate 4 m ahead. A camera that moves sideways, x = 0 to 0.3 m, sees
 // them at u = 159.5 + 250 (X - x) / 4, v = 119.5 + 250 Y / 4.
 const std::string kPlate = R"(alidade: 1
 title: A plate
@@ -48,7 +48,7 @@ source:
                          {position: [0.3, 0, 0], target: [0.3, 0, 4]}]}
 estimators: {ekf: {type: ekf}}
 )";
-// 320 x 240 px three times as large, and the panel.
+// 320 x 240 px, enlarged three times, and the panel.
 constexpr int kTimes = 3, kWidth = 320 * kTimes + 400, kHeight = 240 * kTimes;
 
 class RunView : public testing::ProgramTest {
@@ -64,12 +64,13 @@ class RunView : public testing::ProgramTest {
     for (cv::Mat frame; video.read(frame);) frames.push_back(frame.clone());
     return frames;
   }
-  /// Blue, green and red where pixel (u, v) of the source's image is drawn, mean of 3 x 3.
+  /// Returns the mean blue, green and red of 3 x 3 pixels around pixel (u, v) of the source's
+  /// image.
   static cv::Scalar ColourAt(const cv::Mat& frame, double u, double v) {
     const int x = cvRound(kTimes * (u + 0.5) - 0.5), y = cvRound(kTimes * (v + 0.5) - 0.5);
     return cv::mean(frame(cv::Rect(x - 1, y - 1, 3, 3)));
   }
-  /// Whether channel 0, 1 or 2 (blue, green, red) stands out of the others.
+  /// Returns whether channel 0, 1 or 2 (blue, green, red) is clearly brighter than the others.
   static bool Is(const cv::Scalar& colour, int channel) {
     for (int other = 0; other < 3; ++other) {
       if (other != channel && colour[channel] < colour[other] + 50.0) return false;
@@ -90,7 +91,7 @@ TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   for (const cv::Mat& frame : frames) EXPECT_EQ(frame.size(), cv::Size(kWidth, kHeight));
   const cv::VideoCapture video((folder_ / "plate.avi").string(), cv::CAP_OPENCV_MJPEG);
   EXPECT_EQ(video.get(cv::CAP_PROP_FPS), 10.0);
-  // The panel to its last block; another reader finds all frames too.
+  // Frames are complete up to the last block of the panel, and another reader finds all of them.
   for (const cv::Mat& frame : frames) {
     const cv::Scalar last = cv::mean(frame(cv::Rect(kWidth - 8, kHeight - 8, 8, 8)));
     for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(last[channel], 27.0, 6.0);
@@ -100,10 +101,12 @@ TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   for (cv::Mat frame; other.read(frame);) ++count;
   EXPECT_EQ(count, 8) << other.getBackendName();
   for (const auto& [u, v] : kFirst) {
-    EXPECT_TRUE(Is(ColourAt(frames[0], u, v), 0)) << ColourAt(frames[0], u, v);  // new: blue
+    // new features are blue
+    EXPECT_TRUE(Is(ColourAt(frames[0], u, v), 0)) << ColourAt(frames[0], u, v);
     EXPECT_FALSE(Is(ColourAt(frames[0], u + 20.0, v), 0));
   }
-  // 0.3 m in the 7 intervals, 250 / 4 px a metre; accepted from the second frame on: green.
+  // The camera moves 0.3 m in the 7 intervals, at 250 / 4 px a metre. Features accepted from the
+  // second frame on are green.
   for (std::size_t k = 1; k < frames.size(); ++k) {
     const double moved = 0.3 / 7.0 * static_cast<double>(k) * 250.0 / 4.0;
     for (const auto& [u, v] : kFirst) {
@@ -124,7 +127,7 @@ TEST_F(RunView, RejectedFeaturesAreRed) {
   }
 }
 
-// 3 sigma of the innovation: at least 6 px for R alone, a ring that the larger S widens.
+// The ellipse of 3 sigma of the innovation: at least 6 px for R alone, and S makes it larger.
 TEST_F(RunView, TheInnovationHasItsEllipse) {
   ASSERT_EQ(Run(kPlate, {"--save-video", "p.avi"}).code, 0);
   const cv::Mat frame = Frames("p.avi").at(4);
@@ -135,10 +138,10 @@ TEST_F(RunView, TheInnovationHasItsEllipse) {
     for (int x = -60; x <= 60; ++x) {
       const cv::Scalar colour =
           frame.at<cv::Vec3b>(cvRound(kTimes * (v + 0.5)) + y, cvRound(kTimes * (u + 0.5)) + x);
-      const double away = std::hypot(x, y) / kTimes;  // px of the source
+      const double away = std::hypot(x, y) / kTimes;  // px of the source's image
       if (!Is(colour, 1)) continue;
       if (away > 5.5 && away < 12.0) ++ring;
-      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // but for the tail
+      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // except for the tail
     }
   }
   EXPECT_GT(ring, 60);
@@ -166,14 +169,14 @@ TEST_F(RunView, ShowsTheImagesThatFeaturesWereFoundIn) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::vector<cv::Mat> frames = Frames("found.avi");
   ASSERT_EQ(frames.size(), 8u);
-  // Green dots, three times as many pixels as rings of nothing could have.
+  // The green dots have three times as many pixels as rings without a feature could have.
   cv::Mat channels[3];
   cv::split(frames[5](cv::Rect(0, 0, 320 * kTimes, kHeight)), channels);
   const cv::Mat green = channels[1] > channels[0] + 60;
   EXPECT_GT(cv::countNonZero(green), 1000);
 }
 
-// The target is 90 px wide from (75, 45) on in the first image; its outline leaves out 4 % of it.
+// In the first image the target is 90 px wide, from (75, 45) on. Its outline excludes 4 % of it.
 TEST_F(RunView, ShowsTheOutlineOfATarget) {
   Write("scene.yaml", R"(alidade: 1
 source:
@@ -197,7 +200,7 @@ source:
   const std::vector<cv::Mat> frames = Frames("target.avi");
   ASSERT_EQ(frames.size(), 7u);
   ASSERT_EQ(frames[0].size(), cv::Size(4 * 240 + 400, 720));
-  const auto green_columns = [&](int from, int to) {  // of the row through the middle
+  const auto green_columns = [&](int from, int to) {  // in the row through the middle
     int count = 0;
     for (int x = from; x < to; ++x) {
       const cv::Vec3b at = frames[0].at<cv::Vec3b>(360, x);
@@ -263,7 +266,7 @@ TEST_F(RunView, AWindowNeedsADisplay) {
       << outcome.err;
   EXPECT_FALSE(Exists("run"));
 
-  ::setenv("DISPLAY", ":4711", 1);  // of nobody
+  ::setenv("DISPLAY", ":4711", 1);  // no X server has this number
   const Outcome nobody = Run(kPlate, {"--view"});
   ::unsetenv("DISPLAY");
   EXPECT_EQ(nobody.code, 73) << nobody.err;

@@ -16,7 +16,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-// A lens that bends the corners inwards by about 40 px.
+// A lens that moves the corners inwards by about 40 px.
 const std::string kScene = R"(alidade: 1
 camera: {model: radtan, width: 320, height: 240, fx: 260, fy: 265, cx: 160.5, cy: 119,
          k1: -0.25, k2: 0.05, p1: 0.001, p2: -0.002}
@@ -43,7 +43,7 @@ class SimulateImages : public testing::ProgramTest {
     return Call(more);
   }
 
-  /// Adds the pixels in a file of rows frame,feature,dim,value.
+  /// Reads the pixels of a file with rows frame,feature,dim,value into `pixels`.
   void Read(const std::string& name, Pixels& pixels) const {
     std::istringstream rows(ProgramTest::Read(name));
     std::string row;
@@ -76,10 +76,11 @@ class SimulateImages : public testing::ProgramTest {
   }
 };
 
-constexpr double kRadius = 4.0, kDark = 60.0;  // px; brighter than the frame's number
+// kRadius in px. The grey value of the frame number is below kDark.
+constexpr double kRadius = 4.0, kDark = 60.0;
 
-/// How far the discs lie from `points`, those that touch another or the border left out: the
-/// largest distance of a centroid from its point, px. Counts those that were looked at.
+/// Returns the largest distance of a disc's centroid from its point, px. Skips discs that touch
+/// another disc or the border, and counts the others.
 double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, int& count) {
   double largest = 0.0;
   for (const auto& [feature, p] : points) {
@@ -120,8 +121,8 @@ TEST_F(SimulateImages, DiscsLieWhereTheTracksSay) {
     const cv::Mat image = Image("data/images/00000" + std::to_string(k) + ".png");
     ASSERT_EQ(image.size(), cv::Size(320, 240));
     ASSERT_EQ(frames[static_cast<std::size_t>(k)].size(), cv::Size(320, 240));
-    // The smoothed discs of OpenCV lie within 0.06 px of their centres at any of 16 x 16 places in
-    // a pixel; the losses of JPEG come on top.
+    // The smoothed discs of OpenCV lie within 0.06 px of their centres for any of 16 x 16 sub-pixel
+    // positions. JPEG adds its losses.
     EXPECT_LT(LargestError(image, pixels.at(k), seen), 0.1) << "frame " << k;
     const cv::Mat& frame = frames[static_cast<std::size_t>(k)];
     EXPECT_LT(LargestError(frame, pixels.at(k), seen_again), 0.5) << "frame " << k;
@@ -134,12 +135,13 @@ TEST_F(SimulateImages, AreAllAlikeAndOfNothingElse) {
   ASSERT_EQ(Simulate(kScene, {"--images", "images"}).code, 0);
   const Pixels pixels = AllPixels();
   const cv::Mat image = Image("data/images/000000.png");
-  // All discs together: between none and every one of their area, which is pi r^2 of 255 each.
+  // The sum over all discs is between zero and that of separate discs: an area of pi r^2 with a
+  // value of 255 each.
   const double total = cv::sum(cv::max(image, static_cast<int>(kDark)) - kDark)[0];
   const double one = M_PI * (kRadius + 0.5) * (kRadius + 0.5) * (255.0 - kDark);
   const auto count = static_cast<double>(pixels.at(0).size());
   EXPECT_LT(total, 1.1 * count * one);
-  EXPECT_GT(total, 0.7 * count * one);  // some touch, or are cut by the border
+  EXPECT_GT(total, 0.7 * count * one);  // some discs touch, or the border cuts them
 }
 
 TEST_F(SimulateImages, TheVideoHasTheRateOfTheSource) {
@@ -216,7 +218,7 @@ source:
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return cv::imread((folder_ / folder / "images/000000.png").string(), cv::IMREAD_GRAYSCALE);
   };
-  // The textures go by the places in the list: one out of sight stands for the wall.
+  // The textures follow the order of the list: a rectangle out of view replaces the wall.
   const char* const kAway = "{rectangle: {corner: [0, 0, -5], right: [1, 0, 0], down: [0, 1, 0]}}";
   const std::string wall =
       "{rectangle: {corner: [-5, -5, 4], right: [10, 0, 0], down: [0, 10, 0]}}";
@@ -231,7 +233,7 @@ source:
   EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
 }
 
-// Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
+// Blocks have 512 bytes: each other file fits into 16 blocks, and an image needs more than 2.
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});

@@ -39,7 +39,7 @@ source:
   target: [75, 45, 90, 90]
 )";
 
-/// Values of a stream without landmarks, by frame.
+/// Values of a stream without landmarks by frame.
 using Values = std::map<int, double>;
 
 class StereoTarget : public testing::ProgramTest {
@@ -136,7 +136,7 @@ sensors:
            focal_px: 120, baseline_m: 0.065, sigma_px: 50}
 estimators: {ekf: {type: ekf}}
 )");
-  // The model alone would take the disparity to 50 px, and the depth would stay where it was.
+  // The sensor's sigma is 50 px. Without the variances of the measurements the depth hardly changes.
   const auto rmse_mm = [&](const char* estimate) {
     const Outcome outcome =
         Call({"run", "run.yaml", "-o", "run", "--force", "--set",
@@ -154,7 +154,7 @@ estimators: {ekf: {type: ekf}}
 
 TEST_F(StereoTarget, HiddenBlackAndFrozenImagesGiveNothingFalse) {
   MakePair();
-  // Black; dimmer, which changes nothing; the same image again.
+  // Black images; a dimmer image, which has no effect; and a repeated image.
   for (const int k : {5, 6, 7}) Change(k, [](cv::Mat& image) { image.setTo(0); });
   Change(12, [](cv::Mat& image) { image = 0.5 * image + 20; });
   for (const char* side : {"left", "right"}) {
@@ -192,7 +192,8 @@ TEST_F(StereoTarget, WithoutTextureThereIsNoDisparity) {
 
 TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   MakePair();
-  // Upright stripes 12 px wide, as like at each twelfth disparity, whose rows differ.
+  // Vertical stripes with a period of 12 px look the same at each twelfth disparity; their rows
+  // differ.
   for (int k = 0; k < 21; ++k) {
     Change(k, [&](cv::Mat& image) {
       for (int y = 0; y < image.rows; ++y) {
@@ -207,7 +208,7 @@ TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(Found("disparity").empty());
   EXPECT_EQ(Found("inverse_scale").size(), 21u);
-  // It is the repetition alone.
+  // The repetition is the only cause.
   ASSERT_EQ(Measure({"--set", "source.disparity.min_distinct=0"}).code, 0);
   EXPECT_FALSE(Found("disparity").empty());
 }
@@ -225,7 +226,7 @@ source: {type: stereo_target, left: 'pair/images/left/*.png', rate_hz: 20, boxes
 }
 
 TEST_F(StereoTarget, APlaneThatTiltsKeepsItsDepth) {
-  // A textured plate, 2 m ahead, then tilted more and more and pushed back, by its homography.
+  // A textured plate 2 m ahead, tilted and moved back step by step, drawn by its homography.
   const cv::Matx33d k(200, 0, 160, 0, 200, 120, 0, 0, 1);
   cv::Mat texture(240, 320, CV_8U);
   cv::RNG random(3);
@@ -265,7 +266,8 @@ source: {type: stereo_target, left: plate, rate_hz: 20, target: [110, 70, 101, 1
 
 TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   MakePair();
-  // A plate slides over it from the left and stays, to image 12; then all is as it was.
+  // A plate slides over the target from the left and stays until image 12. Later images are
+  // unchanged.
   cv::Mat plate(180, 240, CV_8U);
   cv::RNG random(5);
   random.fill(plate, cv::RNG::UNIFORM, 0, 255);
@@ -286,9 +288,9 @@ TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   }
 }
 
-/// A textured square before a wall that is textured as well. It grows, and from image 1 on it goes
-/// up and down by 16 px from image to image, and each image is the mean of its exposure, four
-/// fifths of that time. Its size / that in image 0.
+/// Draws a textured square in front of a textured wall. The square grows, and from image 1 on it
+/// moves up and down by 16 px between images. Each image is the mean over its exposure, four fifths
+/// of that time. Returns the size of the square relative to image 0.
 std::vector<double> DrawSwing(const std::filesystem::path& folder, int count) {
   std::filesystem::create_directories(folder);
   cv::RNG random(11);
@@ -331,18 +333,18 @@ source: {type: stereo_target, left: swing, rate_hz: 20, target: [101, 71, 38, 38
   const Outcome outcome = Measure();
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Values scale = Found("inverse_scale");
-  EXPECT_GE(scale.size(), 38u);  // 10 without a blurred template
+  EXPECT_GE(scale.size(), 38u);  // without a blurred template 10
   for (const auto& [frame, value] : scale) {
     EXPECT_NEAR(value * sizes[static_cast<std::size_t>(frame)], 1.0, 0.02) << frame;
   }
-  // What the blur leaves uncertain can be left out.
+  // Measurements with a large uncertainty from the blur can be omitted.
   ASSERT_EQ(Measure({"--set", "source.max_relative_sigma=0.01"}).code, 0);
   EXPECT_LT(Found("inverse_scale").size(), scale.size());
 }
 
 TEST_F(StereoTarget, ATargetThatIsGoneIsNotFoundElsewhere) {
   DrawSwing(folder_ / "swing", 2);
-  // From then on 54 images of other things of its size: one place is always most like it.
+  // The next 54 images have other content of the same size: some place always matches best.
   cv::RNG random(2);
   for (int k = 2; k < 56; ++k) {
     cv::Mat image(180, 240, CV_8U);
@@ -381,7 +383,7 @@ TEST_F(StereoTarget, ABoxSaysWhereItIsAndThatItIsNot) {
   Write("config.yaml", R"(alidade: 1
 source: {type: stereo_target, left: pair/images/left, rate_hz: 20, boxes: boxes.csv}
 )");
-  // Four corners that are a pixel off, a row that says it is not seen.
+  // Four corners with errors of a pixel, and a row for an image without the target.
   Write("boxes.csv", "0,75,45,165,44,164,135,74,134\n5,nan,nan,nan,nan\n");
   ASSERT_EQ(Measure().code, 0);
   const Values depth = Depth(), scale = Found("inverse_scale");
@@ -390,7 +392,7 @@ source: {type: stereo_target, left: pair/images/left, rate_hz: 20, boxes: boxes.
   for (const auto& [frame, value] : scale) {
     EXPECT_NEAR(value, depth.at(frame) / depth.at(0), 5e-3 * value) << frame;
   }
-  // Black in the first image that has a box: the next one counts.
+  // The first image with a box is black: the next box is used.
   Change(0, [](cv::Mat& image) { image.setTo(0); });
   Write("boxes.csv", "0,75,45,90,90\n1,75,45,90,90\n");
   ASSERT_EQ(Measure().code, 0);
@@ -449,7 +451,7 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
     std::filesystem::copy_file(example + name, folder_ / name,
                                std::filesystem::copy_options::overwrite_existing);
   }
-  // To 1.8 s: near, where stereo is blind from 1.25 s on.
+  // 1.8 s long: the target is near, so stereo is blind from 1.25 s on.
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "pair", "--images", "images", "--set",
                              "source.duration_s=1.8"});
   ASSERT_EQ(made.code, 0) << made.err;
@@ -474,7 +476,7 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
   }
 }
 
-/// 13 real pairs of a chessboard, whose depth is known from its corners.
+/// 13 real stereo pairs of a chessboard, with the depth known from its corners.
 TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::filesystem::path boards =
@@ -519,7 +521,7 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
     cv::FileStorage stereo((folder_ / "stereo.yml").string(), cv::FileStorage::WRITE);
     stereo << "M1" << m1 << "D1" << d1 << "M2" << m2 << "D2" << d2 << "R" << r << "T" << t;
   }
-  // In the rectified left camera, where the source measures: the middle of the board, by its
+  // The source measures in the rectified left camera: the centre of the board there, from its
   // corners.
   cv::Mat r1, r2, p1, p2, q;
   cv::stereoRectify(m1, d1, m2, d2, size, r, t, r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0.0);
@@ -569,10 +571,10 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   RecordProperty("median_by_scale", std::to_string(median(by_scale)));
 }
 
-/// Videos of faces with labelled boxes [Kalal2010]: one config, which is told the first box alone.
+/// Videos of faces with labelled boxes [Kalal2010]: one config, which has only the first box.
 class StereoTargetOfFaces : public StereoTarget {
  protected:
-  /// Median of the relative error of the size, of at least `fewest` images.
+  /// Checks the median relative error of the size, over at least `fewest` images.
   void ExpectSizes(const std::string& name, std::size_t fewest) {
     const char* const data = std::getenv("ALIDADE_DATA");
     const auto video = std::filesystem::path(data == nullptr ? "" : data) / "tld-boxes" / name;

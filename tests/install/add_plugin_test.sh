@@ -4,14 +4,14 @@
 # tests/install/add_plugin_test.sh CMAKE COMPILER
 #
 # Configures tests/install/echo with the function alidade_add_plugin of this tree. Its plugin must
-# be compiled with -O2 if nobody chooses a level, else as the build type or the flags choose.
+# be compiled with -O2 by default, and otherwise with the level of the build type or of the flags.
 set -euo pipefail
 cmake=$1 compiler=$2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Stands for the installed package.
+# Replaces the installed package.
 mkdir "$work/package"
 cat >"$work/package/alidadeConfig.cmake" <<END
 add_library(alidade::model INTERFACE IMPORTED)
@@ -19,7 +19,7 @@ include($PWD/cmake/AlidadeAddPlugin.cmake)
 END
 echo 'set(PACKAGE_VERSION_COMPATIBLE TRUE)' >"$work/package/alidadeConfigVersion.cmake"
 
-# levels OPTION...: the levels of optimisation that the plugin is compiled with.
+# levels OPTION...: prints the optimisation levels used to compile the plugin.
 levels() {
   rm -rf "$work/build"
   "$cmake" -S tests/install/echo -B "$work/build" -G Ninja -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \

@@ -3,10 +3,11 @@
 #
 # tests/install/estimation_test.sh CMAKE BUILD COMPILER OPTIONS [CXXFLAG...] INCLUDE...
 #
-# Installs the component `estimation` of BUILD into an empty folder, which then has no header of another
-# room, and builds the C++ examples, and the program of late measurements, against it and Eigen (INCLUDE)
-# alone. They must give what they estimate. Then installs the component `testing` too, and builds the tests
-# of tests/install/testing against both. Last, ALIDADE_ESTIMATION_ONLY configures without any other package.
+# Installs the component `estimation` of BUILD into an empty folder, which then has no header of
+# another room. Builds the C++ examples, and the program of late measurements, against only this
+# folder and Eigen (INCLUDE). They must print the expected estimates. Then installs the component
+# `testing` too, and builds the tests of tests/install/testing against both. Finally, configures
+# with ALIDADE_ESTIMATION_ONLY, without any other package.
 set -euo pipefail
 cmake=$1 build=$2 compiler=$3
 IFS=',' read -ra options <<<"$4"
@@ -36,7 +37,7 @@ for argument in "$@"; do
   [[ $argument == -* ]] && only_flags+=("$argument") || flags+=(-isystem "$argument")
 done
 flags+=("${only_flags[@]}")
-# run FOLDER: what the program there prints.
+# run FOLDER: prints the output of the program there.
 run() {
   "$compiler" "${flags[@]}" "${options[@]}" "$1/main.cc" -o "$work/program" \
     "$library" -Wl,-rpath,"$(dirname "$library")"

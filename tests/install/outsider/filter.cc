@@ -53,7 +53,8 @@ alidade::Problem WalkSystem() {
   return problem;
 }
 
-/// Whether memory that the library allocates is grown and freed here, and the other way round.
+/// Returns whether the program can resize and free memory of the library, and the library memory of
+/// the program.
 bool SharesTheHeap(const alidade::Ekf& ekf) {
   for (int rows = 1; rows <= 3; ++rows) {
     Eigen::MatrixXd block = ekf.state().covariance().Block(0, rows, 0, 3);
@@ -72,8 +73,8 @@ bool SharesTheHeap(const alidade::Ekf& ekf) {
 
 }  // namespace
 
-// 0 where a filter of the library gives the numbers of the scalar Kalman filter, whatever the flags
-// this program was compiled with: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
+// Returns 0 if a filter of the library equals the scalar Kalman filter, for all flags of this
+// program: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
 int main() {
   alidade::Ekf ekf(WalkSystem(), {}, {{"seen", 3}});
   double x = 0.0, p = 1.0;

@@ -15,7 +15,8 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-/// A point at cos t, measured with a wobble but for every fourth frame; one outlier where asked.
+/// A point at cos t. Its measurements have an oscillating error, except in every fourth frame;
+/// optionally one is an outlier.
 class Swing : public Source {
  public:
   explicit Swing(bool with_outlier = false) : with_outlier_(with_outlier) {}
@@ -50,7 +51,7 @@ void Add(Experiment& experiment, const std::string& name, EstimatorKind kind,
   named.accepted_by = accepted_by;
 }
 
-/// A filter, and all that its error decomposition takes.
+/// Returns a filter and all estimators that its error decomposition needs.
 Experiment MakeLinear(bool with_outlier) {
   const Problem problem = LinearSystem();
   EkfOptions options;
@@ -91,7 +92,7 @@ double ValueOf(const std::map<std::string, Spread>& values, const std::string& k
   return found == values.end() ? std::nan("") : found->second.mean;
 }
 
-// Where all is linear a filter loses nothing by linearising, and the smoother is the batch.
+// In a linear problem a filter has no linearisation error, and the smoother equals the batch.
 TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   const auto [run, comparison] = CompareLinear(false);
   ASSERT_EQ(comparison.decomposition.size(), 3u);
@@ -130,7 +131,7 @@ TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
   EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "full_information accepted");
 }
 
-// At the end filter and batch have the same data.
+// At the last frame the filter and the batch have the same data.
 TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   const Comparison comparison = CompareLinear(false).comparison;
   const ComparedEstimator& ekf = comparison.estimators[0];
@@ -141,7 +142,8 @@ TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   EXPECT_NEAR(ekf.ratios.at("final_error:p.x").value(), 1.0, 1e-7);
 }
 
-/// x of the smoother and of the filter, and sigma^2 of p.x and p.v of the smoother, by frame.
+/// Positions of the smoother and of the filter, and sigma^2 of p.x and p.v of the smoother, by
+/// frame.
 struct ByHand {
   std::vector<Eigen::Vector2d> filter, smoother;
   std::vector<Eigen::Matrix2d> p;
@@ -167,7 +169,7 @@ ByHand RunByHand() {
   return run;
 }
 
-// The distance of a filter from a smoother, in the joint sigmas of position and velocity.
+// The distance between a filter and a smoother, in joint sigmas of position and velocity.
 TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   const ByHand by_hand = RunByHand();
   double squares = 0.0, sigmas = 0.0;
@@ -182,7 +184,7 @@ TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   EXPECT_NEAR(ValueOf(smoothing.values, "rmsd.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
 }
 
-// The batch takes the outlier for true, the filter and what it lends its gate to do not.
+// The batch uses the outlier; the filter, and the estimators that use its accepted data, do not.
 TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
   const Comparison comparison = CompareLinear(true).comparison;
   EXPECT_LT(ValueOf(comparison.decomposition[0].values, "rmsd:p.x"), 1e-9);
@@ -203,7 +205,7 @@ TEST(CompareLinear, ANamedReferenceServesAll) {
   }
 }
 
-// ---- what is added to a config ------------------------------------------------------------------
+// ---- estimators that a comparison adds to a config ----------------------------------------------
 
 Config Depth(const std::vector<std::pair<std::string, std::string>>& settings = {}) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
@@ -220,7 +222,7 @@ TEST(BuildComparedExperiment, AddsWhatTheComparisonLacks) {
   EXPECT_EQ(estimators.At("full_information").At("mode").Text(), "filtering");
   EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
   EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
-  // What it gives is the config of a run.
+  // The result is a valid config of a run.
   EXPECT_EQ(BuildExperiment(compared.config, Shipped()).estimators.size(), 5u);
 }
 
@@ -237,7 +239,7 @@ TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
                                {"estimators.ekf.overrides.sensors.stereo.sigma_px", "2"},
                                {"estimators.best", "{type: ceres_batch}"}});
   const ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
-  // `best` has another sensor and another noise.
+  // `best` has a different sensor and a different noise.
   EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
   for (const EstimatorSpec& named : compared.experiment.estimators) {
@@ -307,7 +309,7 @@ Comparison CompareScene(const std::string& more) {
   return comparer.Finish(run, {});
 }
 
-// Beside a full-information filter, which solves at every frame.
+// With a full-information filter, which solves at every frame.
 TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   const DecompositionStep step = CompareScene("").decomposition[0];
   EXPECT_TRUE(step.at_end);
@@ -328,7 +330,7 @@ TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
 
 // ---- over seeds ---------------------------------------------------------------------------------
 
-// Of example 01 the EKF diverges with seed 4, the UKF does not.
+// In example 01 with seed 4 the EKF diverges and the UKF does not.
 TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/01_depth_stereo_only/config.yaml");
   config.Set("estimators.ukf", "{type: ukf}", "--set");

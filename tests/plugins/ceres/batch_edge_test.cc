@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_landmarks_fixture.h"
 
-/// Landmarks of a sparse batch whose optimum is at the edge of where their models are defined.
+/// Landmarks of a sparse batch whose optimum is at the boundary of their model's domain.
 namespace alidade {
 namespace {
 
@@ -13,7 +13,7 @@ using testing::Found;
 constexpr double kOffsetSigma = 0.1, kFirstSigma = 0.3, kPeriod = 0.1, kEdgeSlope = 0.5;
 constexpr int kViews = 4;
 
-/// z = p - r, where a landmark begins only if z_z > z_x / 2.
+/// z = p - r; a landmark is initialised only if z_z > z_x / 2.
 struct OffsetBeyond : testing::Offset {
   OffsetBeyond() : Offset(kOffsetSigma) {}
   template <class T>
@@ -24,8 +24,8 @@ struct OffsetBeyond : testing::Offset {
   }
 };
 
-/// What a camera sees of landmark 7, which seems to come out of its domain, or stays `inside`, and
-/// of landmark 8.
+/// Returns the measurements of landmarks 7 and 8. Landmark 7 seems to leave its domain, or stays
+/// `inside`.
 std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
   std::vector<std::array<Vector3d, 2>> seen;
   for (int k = 0; k < kViews; ++k) {
@@ -36,7 +36,7 @@ std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
   return seen;
 }
 
-/// The problem written out in x = (r_0 .. r_3, p_7, p_8): A x = b, linear as it is.
+/// Computes the linear problem A x = b in x = (r_0 .. r_3, p_7, p_8).
 void WriteOut(const std::vector<std::array<Vector3d, 2>>& seen, MatrixXd& a, VectorXd& b) {
   constexpr int kSize = 3 * (kViews + 2);
   a.setZero(kSize, kSize);
@@ -79,7 +79,8 @@ Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
 
 void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
   ASSERT_FALSE(found.failed);
-  constexpr double kNear = 1e-8;  // of some 0.1 m; it is held at 1e-9 sigma from the edge
+  // relative to about 0.1 m; landmark 7 stays 1e-9 sigma from the boundary
+  constexpr double kNear = 1e-8;
   for (int k = 0; k < kViews; ++k) {
     const auto at = static_cast<std::size_t>(k);
     EXPECT_LT((found.Camera(at) - x.segment<3>(3 * k)).norm(), kNear) << k;
@@ -95,8 +96,9 @@ void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
   }
 }
 
-// The minimum under  p_z - r_0z = (p_x - r_0x) / 2  of landmark 7. It slides along the edge: its x
-// is not what it was where it got there. The covariances are those without the edge.
+// The minimum under the constraint  p_z - r_0z = (p_x - r_0x) / 2  of landmark 7. The landmark
+// slides along the boundary, so its x changes after it reached it. The covariances are those
+// without the boundary.
 TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
   const auto seen = OffsetsOf(false);
   MatrixXd a;
@@ -121,7 +123,7 @@ TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
       << said;
 }
 
-// Landmark 7 comes to the edge by the second frame, and stays there.
+// Landmark 7 reaches the boundary by the second frame and stays there.
 TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   const auto seen = OffsetsOf(false);
   const Found batch = SolveSparse(seen);
@@ -144,7 +146,7 @@ TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   }
 }
 
-/// z = exp(-r_z): Gauss-Newton goes much too far at first, then comes back by 1 m a step.
+/// z = exp(-r_z): Gauss-Newton first goes much too far and then returns by 1 m a step.
 struct Exponential : Sensor<Vec<1>, Vec<3>> {
   static constexpr std::array kRoles{testing::kPosition};
   static constexpr Quantity kMeasurement{"z", "", "", ""};
@@ -160,8 +162,8 @@ struct Exponential : Sensor<Vec<1>, Vec<3>> {
   }
 };
 
-// On the way the camera is so far back that the landmark, 4 m before it, wants to be behind where
-// the camera was first. At the optimum it is 1 m before that, and the dense solver finds the same.
+// During the iterations the camera is so far back that the landmark, 4 m ahead of it, tends to a
+// place behind the first camera. At the optimum the landmark is 1 m ahead, as in the dense solver.
 TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
   Problem problem = testing::MapSystem(OffsetBeyond(), {});
   testing::AddSensor(problem, "e", MakeSensor(Exponential(), "exponential"), {"cam.position"});

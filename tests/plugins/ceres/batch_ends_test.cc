@@ -8,7 +8,7 @@
 #include "support/comma_locale.h"
 #include "support/landmark_models.h"
 
-/// How a batch starts and ends: what it says where it is not at the optimum.
+/// Start and end of a batch, and its reports if it does not reach the optimum.
 namespace alidade {
 namespace {
 
@@ -18,7 +18,7 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-// The velocity is not measured at the first frame: its variance is that of the step before it.
+// The velocity is not measured at the first frame: its variance is that after the first step.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   const Problem problem = LinearSystem();
   const auto so_far = MakeBatch(problem, "mode: filtering\n"), batch = MakeBatch(problem);
@@ -37,8 +37,8 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport&) { expect_equal(state); });
 }
 
-// 4000 inputs fit in a dense system: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x
-// is one more.
+// A dense system may have 4000 inputs: 1 of p.v, 1 of p.x and 3998 of steps. The initial value of
+// c.x exceeds the limit.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   Problem problem = LinearSystem();
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -70,7 +70,7 @@ TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
 
 // ---- a model that fails -------------------------------------------------------------------------
 
-/// A random walk that cannot step any more after `budget` steps.
+/// A random walk that fails after `budget` steps.
 struct Failing : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x", "m"}};
   static inline int budget = 0;
@@ -83,7 +83,7 @@ struct Failing : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// Whether the batch says that it failed, the first `budget` steps of the model apart.
+/// Expects that the batch reports a failure if the model fails after `budget` steps.
 void ExpectSaid(const Problem& problem, int budget, bool so_far) {
   Failing::budget = budget;
   const auto batch = MakeBatch(problem, so_far ? "mode: filtering\n" : "");
@@ -114,15 +114,15 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
     for (int k = 0; k < 4; ++k) batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}}));
     if (!so_far) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
     ASSERT_FALSE(batch->failed());
-    // The last three steps are those of the estimates, three before of their covariances, three of
-    // the noise at the solution.
+    // The last three steps compute the estimates, the three before them the covariances, and the
+    // three before those the noise at the solution.
     const int steps = kMany - Failing::budget;
     for (int missing = 1; missing <= 9; ++missing) ExpectSaid(problem, steps - missing, so_far);
   }
 }
 
-// The filter that goes along cannot step to the second frame; the batch can, later. The block that
-// waits for its first value never gets it, and the events say why, once.
+// The filter of the batch cannot step to the second frame; the batch can, later. A block that waits
+// for its initial value never gets it, and the events report this once.
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -153,7 +153,8 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   EXPECT_EQ(std::ranges::count(outcomes, Outcome::kNotReady), 3);
 }
 
-// What the filter could not predict is left out: landmark 1 lies behind the camera.
+// The batch omits measurements that the filter could not predict: landmark 1 lies behind the
+// camera.
 TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
   LandmarkOptions options = testing::WithPrior();
   options.known = {{1, {0.0, 0.0, -1.0}, 0.1}, {2, {0.0, 0.0, 2.0}, 0.1}};
@@ -173,7 +174,7 @@ TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
   }
 }
 
-// There is nothing to go on with after a gap that is too long; the frames after it change nothing.
+// After a gap that is too long the batch cannot continue; later frames change nothing.
 TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
   for (const bool so_far : {false, true}) {
     const auto batch = MakeBatch(
@@ -188,7 +189,7 @@ TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
   }
 }
 
-// What it could have predicted of landmarks, too, is left out.
+// Landmark measurements that the batch could have predicted are omitted, too.
 TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   Problem problem = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -208,7 +209,7 @@ TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   }
 }
 
-// It ends at its last good state, and says so once.
+// The filter ends at its last good state and reports this once.
 TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -282,8 +283,8 @@ TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
   }
 }
 
-// The steps that a loss asks for beyond the solver's end never raise the cost: with a scale that no
-// residual comes near to they leave the estimates where they are without a loss.
+// The steps that a loss requires after the solver ended never raise the cost. With a scale that
+// exceeds all residuals they leave the estimates at those without a loss.
 TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   const auto last_of = [](const RobustLoss& loss) {
     Problem problem = testing::MovingPoint(0.7);
@@ -302,7 +303,7 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   };
   const auto [expected, none] = last_of({});
   const auto [found, said] = last_of({LossKind::kHuber, 1e9});
-  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // 1e8, and rounding as far off
+  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // 1e8, with relative rounding errors of 1e-4
   EXPECT_EQ(said.find("not_converged: the weights of the losses did not settle in 0 steps: "), 0u)
       << said;
   EXPECT_NE(said.find("it does not lower the cost\n"), std::string::npos) << said;
@@ -335,8 +336,8 @@ struct Seen : Sensor<UnitVector, UnitVector> {
   }
 };
 
-// The basis of the tangent turns over at z = 0, which this walk crosses. The smoother linearises
-// about the filter: at z = 0.6 too the two differ by 5e-6 sigma, and by up to 8e-4 in P.
+// The tangent basis changes at z = 0, which this walk crosses. The smoother linearises at the
+// filter's estimates: at z = 0.6, too, the two differ by 5e-6 sigma, and by up to 8e-4 in P.
 TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
   Problem problem;
   const SharedMotion wander = MakeMotion(Wander(), "wander");
@@ -387,7 +388,7 @@ TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
 
 // ---- stopped ------------------------------------------------------------------------------------
 
-// Example 05 has 152 frames, after each of which the run asks.
+// Example 05 has 152 frames; the batch checks for a stop request after each.
 TEST(CeresBatchEnds, AStopWhileItSolvesKeepsTheOthers) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
   config.Set("estimators.batch.type", "ceres_batch", "--set");

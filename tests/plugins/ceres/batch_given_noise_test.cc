@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch and the fixed lag with a noise that is given in place of the models'.
+// The batch and the fixed-lag smoother with a given noise instead of the models' noise.
 #include <cmath>
 
 #include "batch_fixture.h"
@@ -11,8 +11,8 @@ namespace {
 
 using testing::FrameAt;
 
-/// An acceleration of 0.7 m/s^2, held, and a sensor of 0.3 m: by the models themselves, or in place
-/// of others of theirs.
+/// Returns a problem with a held acceleration of 0.7 m/s^2 and a sensor of 0.3 m. The noises are
+/// those of the models, or they are `given` and replace other noises of the models.
 Problem HeldNoise(bool given) {
   Problem problem = testing::HeldPoint(given ? 5.0 : 0.7);
   if (given) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Batch and fixed lag over gaps that are split: noise that a model holds is one input of each gap.
+// Batch and fixed lag over gaps that are split into steps: held noise is one input of each gap.
 #include <cmath>
 
 #include "alidade/estimation/rts.h"
@@ -17,7 +17,7 @@ struct Estimate {
   Eigen::MatrixXd p;
 };
 
-/// Every estimate of a frame that `wanted` holds for.
+/// Returns the estimates of all frames for which `wanted` is true.
 template <class Wanted>
 std::vector<Estimate> EstimatesOf(Estimator& estimator, const std::vector<Frame>& frames,
                                   const Wanted& wanted) {
@@ -57,7 +57,8 @@ Problem HeldSystem() {
   return problem;
 }
 
-/// 10 frames a second with a measurement, `parts` - 1 without one before each.
+/// Returns frames with 10 measurements a second, each after `parts` - 1 frames without a
+/// measurement.
 std::vector<Frame> Frames(int count, int parts) {
   std::vector<Frame> frames;
   for (int k = 0; k <= (count - 1) * parts; ++k) {
@@ -92,12 +93,12 @@ TEST(CeresBatchHeldNoise, AGapIsAGapHoweverItIsSplit) {
     const auto whole = EstimatesOf(*Make(c.type, c.options), Frames(25, 1), All);
     const std::string parts = std::string(c.options) + "max_dt_s: 0.021\n";
     ExpectNear(EstimatesOf(*Make(c.type, parts), Frames(25, 1), All), whole, 1e-9);
-    // The oldest frame of a window sees as many seconds, but for the frames that lie between.
+    // The data of a window span the same time, except for the frames in between.
     ExpectNear(EstimatesOf(*Make(c.type, c.options), Frames(25, 4), Measured), whole, 1e-9);
   }
 }
 
-// Also at the frames inside a gap, whose noise is still being held.
+// Also compares the frames inside a gap, over which the noise is held.
 TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
   const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(12, 3);
@@ -106,7 +107,7 @@ TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
              EstimatesOf(rts, frames, All), 1e-9);
 }
 
-// The window is the filter; its edge lies inside a gap at most frames.
+// The window equals the filter; at most frames the start of the window lies inside a gap.
 TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(20, 4);
@@ -117,7 +118,7 @@ TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   }
 }
 
-// 1000 gaps of 10 parts: 2 inputs of the prior and one of each gap, where 4000 are the most.
+// 1000 gaps of 10 parts: 2 inputs of the prior and one of each gap, below the limit of 4000.
 TEST(CeresBatchHeldNoise, HasOneInputForEachGap) {
   const auto batch = Make("ceres_batch", "max_dt_s: 0.011\n");
   const std::vector<Frame> frames = Frames(1001, 2);

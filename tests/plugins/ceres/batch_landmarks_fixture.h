@@ -11,7 +11,7 @@
 #include "batch_fixture.h"
 #include "support/landmark_models.h"
 
-/// What the tests of the batch with landmarks share.
+/// Helpers of the tests of the batch with landmarks.
 namespace alidade::testing {
 
 using Eigen::MatrixXd;
@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// What a batch says of a run: the camera frame by frame, the map, the events.
+/// Results of a batch: the camera of each frame, the map and the events.
 struct Found {
   std::vector<State> states;
   std::vector<LandmarkEstimate> map;
@@ -33,7 +33,7 @@ struct Found {
   const LandmarkEstimate& Landmark(std::int64_t id) const {
     return *std::ranges::find(map, id, &LandmarkEstimate::id);
   }
-  /// The number behind `cost` in the event of the solve.
+  /// Returns the number after `cost` in the event of the solve.
   double Cost() const { return std::stod(events.back().text.substr(5)); }
 };
 
@@ -55,8 +55,8 @@ inline Found Solve(const Problem& problem, const std::vector<Frame>& frames,
 
 inline constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;
 
-/// A camera that walks before points, and what it sees of them: the problem of MapSystem in its
-/// positions r_1.. and the points p_0.., all of them 3 numbers, side by side in one vector x.
+/// A camera that moves in front of points, and its measurements: the problem of MapSystem. The
+/// vector x holds its positions r_1.. and the points p_0.., 3 numbers each.
 struct MapProblem {
   int steps, points;
   std::vector<Frame> frames;
@@ -98,7 +98,7 @@ struct MapProblem {
   Vector2d Pixel(const VectorXd& x, int k, std::int64_t i) const {
     return (Point(x, i) - Camera(x, k)).hnormalized();
   }
-  /// All residuals over their sigma, and after which of them an observation of two ends.
+  /// Returns all residuals divided by their sigma; `ends` receives the ends of the observations.
   VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* ends = nullptr) const {
     std::vector<double> r;
     for (int k = 1; k < steps; ++k) {
@@ -113,7 +113,7 @@ struct MapProblem {
         const auto i = static_cast<std::size_t>(m.landmark);
         if (seen[i]) {
           if (ends != nullptr) ends->push_back(std::ssize(r));
-        } else {  // the first observation and the prior give it its place
+        } else {  // the first observation and the prior initialise the point
           seen[i] = true;
           r.push_back((1.0 / (Point(x, m.landmark) - Camera(x, k)).norm() - kRho) / kRhoSigma);
         }
@@ -131,7 +131,7 @@ struct MapProblem {
     }
     return cost;
   }
-  /// J' J and J' r by central differences, each observation counted with its weight at x.
+  /// Computes J' J and J' r by central differences. Each observation has its weight at x.
   void NormalEquations(const VectorXd& x, MatrixXd& a, VectorXd& b) const {
     std::vector<Eigen::Index> ends;
     const VectorXd r = Residuals(x, &ends);
@@ -163,18 +163,18 @@ struct MapProblem {
     }
     return x;
   }
-  /// At the minimum of the cost written out here, with its covariance.
+  /// Expects the minimum of the cost of this problem, and its covariance.
   void ExpectSolved(const Found& found) const {
     ASSERT_FALSE(found.failed);
     ASSERT_EQ(found.states.size(), frames.size());
     ASSERT_EQ(found.map.size(), static_cast<std::size_t>(points));
     const VectorXd x = Solution(found);
-    EXPECT_NEAR(found.Cost(), Cost(x), 1e-7 * Cost(x));  // nine digits are told
+    EXPECT_NEAR(found.Cost(), Cost(x), 1e-7 * Cost(x));  // nine digits are printed
     EXPECT_LT(Cost(x), Cost(truth));
     MatrixXd a;
     VectorXd b;
     NormalEquations(x, a, b);
-    // What is left to go, in sigma. Third derivatives times 1e-10 leave 1e-8 in J.
+    // The remaining step in sigma. Third derivatives times 1e-10 give errors of 1e-8 in J.
     const MatrixXd p = a.inverse();
     EXPECT_LT(std::sqrt(b.dot(p * b)), 1e-5);
     const auto expect_equal = [&](const MatrixXd& its, Eigen::Index at) {

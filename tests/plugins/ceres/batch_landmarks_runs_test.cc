@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which landmarks a batch has, and how its camera moves.
+// The landmarks of a batch, and the motion of its camera.
 #include <map>
 #include <string>
 
@@ -29,7 +29,7 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   ASSERT_FALSE(found.failed);
   EXPECT_EQ(found.Landmark(4).generation, 1);
   EXPECT_EQ(found.Landmark(3).generation, 0);
-  // The same as if it had come with another id.
+  // The result is the same as with a new id.
   for (std::size_t k = 14; k < frames.size(); ++k) {
     for (Measurement& m : frames[k].measurements) {
       if (m.landmark == 4) m.landmark = 104;
@@ -40,7 +40,7 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
 }
 
-// What waits in the filter whose measurements it uses is not passed on: it would wait twice.
+// Landmarks that wait in the filter are not passed on: the batch would delay them a second time.
 TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
@@ -63,7 +63,7 @@ TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {
   EXPECT_EQ(one.events.back().text, two.events.back().text);
 }
 
-// ---- a camera that turns ------------------------------------------------------------------------
+// ---- a rotating camera --------------------------------------------------------------------------
 
 const std::string kMotion =
     "state: {cam: {model: quaternion_pose, noise: {kind: discrete, linear_acceleration: 0.3, "
@@ -83,7 +83,7 @@ const std::string kDrawn =
     "points: {box: {min: [-0.8, -0.7, 1.6], max: [1.2, 0.7, 3.6]}, count: 40}, trajectory: "
     "{random: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
 
-// Its noise is of rank 6 in 12: v' and omega' are what moves r and q.
+// The noise has rank 6 in 12: v' and omega' determine the changes of r and q.
 TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const testing::MadeScene made = testing::MakeScene(kDrawn);
   const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");
@@ -115,7 +115,7 @@ TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
     UnitQuaternion::Minus(value(k, "cam.orientation"), expected, defect);
     for (const double d : defect) EXPECT_NEAR(d, 0.0, 1e-12);
   }
-  EXPECT_GT(moved, 1e-3);  // there was something to hold
+  EXPECT_GT(moved, 1e-3);  // the constraint is not trivial
   EXPECT_EQ(found.map.size(), 40u);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch of runs with landmarks, against least squares written out in the states themselves.
+// The batch with landmarks, compared with least squares in the states, calculated here.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -22,14 +22,14 @@ using testing::Observation;
 using testing::Offset;
 using testing::Solve;
 
-/// The normal equations of positions x_0, x_1, .., 3 numbers each, of which differences are known.
+/// Normal equations of positions x_0, x_1, .. of 3 numbers each, from measured differences.
 struct Differences {
   MatrixXd information;
   VectorXd right;
 
   explicit Differences(int count)
       : information(MatrixXd::Zero(3 * count, 3 * count)), right(VectorXd::Zero(3 * count)) {}
-  /// x_b - x_a, or x_b where a < 0.
+  /// Adds a measurement of x_b - x_a, or of x_b if a < 0.
   void Add(int a, int b, const Vector3d& difference, double sigma) {
     const double w = 1.0 / (sigma * sigma);
     for (int e = 0; e < 3; ++e) {
@@ -45,7 +45,8 @@ struct Differences {
   }
 };
 
-/// Offsets to points, some of them known to 0.2 m; the first position of the camera to 0.3 m.
+/// Measured offsets to points. The priors of some points have 0.2 m, that of the first position 0.3
+/// m.
 TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   constexpr int kSteps = 12, kPoints = 6;
   constexpr double kNoise = 0.05, kStart = 0.3, kKnown = 0.2;
@@ -95,7 +96,7 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
-// The problem without its landmarks, of which there are none here, against that of all residuals.
+// Compares the problem without landmarks with the one of all residuals, for data without landmarks.
 TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
   const auto expect_equal = [](const Problem& problem, const std::vector<Frame>& frames,
                                double tolerance) {
@@ -124,9 +125,9 @@ TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
   }
   expect_equal(testing::LinearSystem(), point, 1e-9);
   Problem robust = testing::DepthFilter();
-  expect_equal(robust, depth, 1e-6);  // the noise that depends on the state settles to 1e-9
+  expect_equal(robust, depth, 1e-6);  // the state-dependent noise settles to 1e-9
   robust.sensors[0].loss = {LossKind::kHuber, 1.0};
-  expect_equal(robust, depth, 1e-5);  // steps of 1e-6 sigma are small enough
+  expect_equal(robust, depth, 1e-5);  // steps end below 1e-6 sigma
 }
 
 // ---- inverse depth ------------------------------------------------------------------------------
@@ -163,8 +164,8 @@ TEST(CeresBatchLandmarks, AnchorsGiveTheSameAsSixNumbers) {
   expect_equal(testing::AnchoredPixels<0>(kPixel));
 }
 
-// The solve of all data starts at a filter's estimates, the last of the data so far at the solution
-// of the frame before.
+// The solve of all data starts at a filter's estimates; the last solve of the filtering mode starts
+// at the previous frame's solution.
 TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
   const MapProblem map(12, 8);
   const Found all = Solve(map.Filter(), map.frames);
@@ -179,7 +180,7 @@ TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
   }
 }
 
-// Points known exactly give the scale; what is seen without noise then gives the truth.
+// Exactly known points fix the scale. Noiseless measurements then give the truth.
 TEST(CeresBatchLandmarks, WhatIsSeenWithoutNoiseGivesTheTruth) {
   constexpr double kPixelSigma = 1e-7;
   MapProblem map(12, 12);

@@ -47,7 +47,7 @@ Problem PointWith(const RobustLoss& loss) {
   return problem;
 }
 
-/// 2 cos t with a wobble of 0.3 m, and every ninth 4 m off.
+/// Returns 2 cos t with an oscillating error of 0.3 m, and an outlier of 4 m in every ninth value.
 std::vector<Frame> FramesWithOutliers(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -58,8 +58,8 @@ std::vector<Frame> FramesWithOutliers(int count) {
 }
 
 /// Iteratively reweighted least squares by normal equations. The unknowns u are the prior's two
-/// deviations from the mean and the acceleration of each step, all scaled to N(0, 1);
-/// x_k = c_k + M_k u.
+/// deviations from the mean and the acceleration of each step, all scaled to N(0, 1): x_k = c_k +
+/// M_k u.
 Solution Reweighted(const RobustLoss& loss, const std::vector<Frame>& frames) {
   const auto count = std::ssize(frames), n = count + 1;
   std::vector<Eigen::MatrixXd> m;
@@ -103,7 +103,7 @@ Solution Reweighted(const RobustLoss& loss, const std::vector<Frame>& frames) {
   return solution;
 }
 
-// An independent solve of the same: 60 measurements, 7 of them 13 sigma off.
+// An independent solution of the same problem: 60 measurements, 7 of them outliers of 13 sigma.
 TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
   const std::vector<Frame> frames = FramesWithOutliers(60);
   const double plain = SmoothOver(PointWith({}), frames).x[5](0);
@@ -117,11 +117,11 @@ TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
       EXPECT_LT((found.p[k] - expected.p[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
     }
     EXPECT_NEAR(found.cost, expected.cost, 1e-8 * expected.cost);  // printed with nine digits
-    EXPECT_GT(std::abs(found.x[5](0) - plain), 0.05);              // the loss tells
+    EXPECT_GT(std::abs(found.x[5](0) - plain), 0.05);              // the loss has an effect
   }
 }
 
-// The estimate of the last frame is the same, be it smoothed or solved for at that frame.
+// The estimate of the last frame is the same with smoothing and with filtering.
 TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
   const Problem problem = PointWith({LossKind::kHuber, 1.345});
   const std::vector<Frame> frames = FramesWithOutliers(30);
@@ -132,8 +132,8 @@ TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
   EXPECT_NEAR(testing::CovarianceOf(batch->state(), "p.x", "p.v"), smoothed.p.back()(0, 1), 1e-8);
 }
 
-// Two values that contradict each other cost 1e11 wherever the point is, so that the solver's end,
-// at 1e-14 of the cost, comes early, and much is left to the weights.
+// Two contradictory values cost 1e11 for every position of the point. The solver ends early, at
+// 1e-14 of the cost, so the weights have to settle afterwards.
 TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   Problem problem = PointWith({LossKind::kHuber, 0.3});
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -179,7 +179,7 @@ TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   expect_said();
 }
 
-// Its square is beyond any number: the cost is no cost.
+// The square of the residual overflows, so the cost is not finite.
 TEST(CeresBatchLoss, AResidualWithoutAFiniteSquareIsNoSolution) {
   const Problem problem = PointWith({LossKind::kCauchy, 2.0});
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
@@ -227,7 +227,7 @@ struct DirectPair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
-// d^2 = r' R^-1 r of both elements together, R correlated and of each measurement itself.
+// d^2 = r' R^-1 r of both elements together, with a correlated R of each measurement.
 TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   const RobustLoss loss{LossKind::kHuber, 1.5};
   Problem problem;
@@ -266,7 +266,7 @@ TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
 
 // ---- a run --------------------------------------------------------------------------------------
 
-/// A source in which every eighth value of either stream is too large, by 20 px or a fifth.
+/// A source in which every eighth value of each stream is too large, by 20 px or by a fifth.
 class WithOutliers : public Source {
  public:
   explicit WithOutliers(std::unique_ptr<Source> source) : source_(std::move(source)) {}
@@ -285,7 +285,8 @@ class WithOutliers : public Source {
   int count_ = 0;
 };
 
-/// RMSE of the depth, m, of an ungated ekf and of the batch in example 05 with outliers.
+/// Returns the RMSE of the depth in m of an ungated ekf and of the batch, in example 05 with
+/// outliers.
 std::vector<double> DepthErrors(bool robust) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
   config.Set("estimators", "{ekf: {type: ekf}, batch: {type: ceres_batch}}", "--set");
@@ -305,7 +306,7 @@ std::vector<double> DepthErrors(bool robust) {
   return errors;
 }
 
-// Noise that depends on the state settles next to a loss.
+// State-dependent noise also settles together with a loss.
 TEST(CeresBatchLoss, OfAConfigServesFilterAndBatch) {
   const std::vector<double> plain = DepthErrors(false), robust = DepthErrors(true);
   // Measured: ekf 26.5 and 6.0 mm, batch 25.7 and 3.7 mm.

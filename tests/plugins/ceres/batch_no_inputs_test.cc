@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Problems without a noise input: no prior, no process noise. There is nothing to solve for.
+// Problems without a noise input: neither prior nor process noise, so there is nothing to solve
+// for.
 #include <cmath>
 
 #include "alidade/experiment/estimator_plugin.h"
@@ -31,7 +32,7 @@ Problem StartsFromItsSensor() {
   return problem;
 }
 
-/// The estimates, those of each frame or of a smoother, and what the events say.
+/// The estimates of each frame or of a smoother, and the events' texts.
 struct Estimated {
   std::vector<State> states;
   std::string said;
@@ -65,7 +66,7 @@ const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\nmode: filter
                                        "fixed_lag\nlag_s: 0.15",
                                        "fixed_lag\nlag_s: 0.15\noutput: lagged"};
 
-// Its value is the mean of what was measured, z / gain: P = sigma^2 / (gain^2 n).
+// The value is the mean of the measurements z / gain: P = sigma^2 / (gain^2 n).
 TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
   const std::vector<double> z = {3.1, 2.8, 3.3, 2.9};
   std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.1, {})};
@@ -78,7 +79,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
     for (std::size_t k = 0; k < found.size(); ++k) {
       EXPECT_EQ(found[k].layout()[0].present, k >= 2) << k;
       EXPECT_EQ(found[k].layout()[0].has_covariance(), k >= 2) << k;
-      EXPECT_EQ(found[k].covariance().size(), 1) << k;  // it has its row from the start
+      EXPECT_EQ(found[k].covariance().size(), 1) << k;  // it has a row from the start
     }
     EXPECT_NEAR(*found.back().value(0), 12.1 / 4.0 / kScale, 1e-9);
     EXPECT_NEAR(found.back().covariance().Variance(0), kNoise * kNoise / (kScale * kScale * 4.0),
@@ -86,7 +87,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
   }
 }
 
-// Their model has noise, of which nothing is seen.
+// The model of the blocks has noise, but the noise has no effect.
 TEST(CeresBatchNoInputs, AllBlocksMayBeConstantThoughTheyMove) {
   const Problem problem = testing::WithStatus(testing::DepthFilter(), "", BlockStatus::kConstant);
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.1, {{0, 80.0}}),
@@ -108,7 +109,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
   }
 }
 
-// What is left of three measurements is the cost: r = (z - 3) / 0.3 = 1, -2 and 4.
+// Three measurements give only the cost: r = (z - 3) / 0.3 = 1, -2 and 4.
 TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
                                      FrameAt(0.3, {{0, 4.2}})};
@@ -124,7 +125,7 @@ TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
             "cost 5.5, 0 iterations in 1 solve: converged");
 }
 
-// Offsets from a camera that stands still: each point is their mean.
+// Offsets from a camera at rest: each point is their mean.
 TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   Problem problem = testing::MapSystem(testing::Offset(kNoise), {});
   problem.layout = {};

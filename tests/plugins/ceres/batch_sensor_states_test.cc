@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch of sensors that bring states of their own, known numbers and several parts: on a
-// problem that is as good as linear it is the smoother.
+// The batch with sensors that have their own states, known numbers and several parts. On a nearly
+// linear problem it equals the smoother.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -27,7 +27,7 @@ void ExpectSmootherIsBatch(const RunResult& run, const std::string& block, doubl
   EXPECT_NEAR(run.estimators.at(1).metrics.at(metric), smoother, relative * smoother) << block;
 }
 
-// Satellites are so far that the ranges are linear to 1e-5 m.
+// Satellites are so far away that the ranges are linear to 1e-5 m.
 TEST(BatchSensorStates, OfAClockAmongSatellitesIsTheSmoother) {
   const RunResult run = RunOf(
       "alidade: 1\n"
@@ -46,8 +46,8 @@ TEST(BatchSensorStates, OfAClockAmongSatellitesIsTheSmoother) {
   ExpectSmootherIsBatch(run, "gnss.clock_bias", 1e-4);
 }
 
-// The errors of the orientation are some 0.006 rad, and turn by 0.3 rad: the smoother, which
-// linearises at the filter's estimates, is off the optimum by a few thousandths of them.
+// The orientation has errors of about 0.006 rad, rotated by 0.3 rad. The smoother linearises at the
+// filter's estimates, so it differs from the optimum by a few thousandths of the errors.
 TEST(BatchSensorStates, OfPosesIsTheSmoother) {
   const RunResult run = RunOf(
       "alidade: 1\n"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The sparse solver of the batch gives what the dense one gives.
+// The sparse solver of the batch has the same results as the dense solver.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -27,7 +27,7 @@ double CostOf(const Found& found) {
   return std::stod(text.substr(text.find("cost ") + 5));
 }
 
-/// x (-) y of two states, in the tangent.
+/// Returns x (-) y of two states in the tangent space.
 Eigen::VectorXd Apart(const State& x, const State& y) {
   Eigen::VectorXd d = Eigen::VectorXd::Zero(y.covariance().size());
   for (std::size_t i = 0; i < y.layout().blocks().size(); ++i) {
@@ -53,7 +53,7 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
     const Eigen::MatrixXd p = expected.states[k].covariance().Dense();
     const Eigen::MatrixXd e = found.states[k].covariance().Dense() - p;
     for (Eigen::Index i = 0; i < d.size(); ++i) {
-      // What is exact has a sigma of rounding at most.
+      // The sigma of an exact value is at most a rounding error.
       const double sigma = std::max(std::sqrt(p(i, i)), 1e-5);
       worst_x = std::max(worst_x, std::abs(d[i]) / sigma);
       for (Eigen::Index j = 0; j < d.size(); ++j) {
@@ -76,12 +76,12 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
     worst_c = std::max(worst_c, llt.solve(e).norm());
     if (!std::isnan(b.sigma)) worst_c = std::max(worst_c, std::abs(a.sigma / b.sigma - 1.0));
   }
-  // The dense solver stops to move a landmark once its cost no longer falls by rounding.
+  // The dense solver stops moving a landmark once rounding hides the decrease of the cost.
   EXPECT_LT(worst_y, 10.0 * states);
   EXPECT_LT(worst_c, covariances);
 }
 
-/// The dense solver goes on below Ceres' tolerances where there is a loss: one that is none.
+/// With a loss the dense solver continues below Ceres' tolerances: adds a loss without effect.
 Problem WithLoss(Problem problem) {
   for (SensorBinding& sensor : problem.sensors) {
     if (sensor.loss.kind == LossKind::kNone) sensor.loss = {LossKind::kHuber, 1e9};
@@ -110,7 +110,7 @@ void SetPrior(Problem& problem, std::size_t prior, double sigma) {
   problem.priors[prior].covariance.setConstant(sigma * sigma);
 }
 
-/// The two batches of a config, over its whole source.
+/// Runs the two batches of a config over its whole source.
 struct Both {
   Found sparse, dense;
 };
@@ -138,7 +138,7 @@ Config Example(const std::string& name) {
   return Config::FromFile(ALIDADE_SOURCE_DIR "/examples/" + name + "/config.yaml");
 }
 
-// Of rank 1 in 2, and 0; a prior that is exact in part and in all.
+// Noise of rank 1 in 2 and of rank 0; a prior that is exact partly or entirely.
 TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   for (const double acceleration : {0.7, 0.0}) {
     for (const double sigma_x : {2.0, 0.0}) {
@@ -154,8 +154,8 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   }
 }
 
-// The covariance of the first rate is 1e10 times smaller than its prior's, which is not to be taken
-// as the difference of two such.
+// The covariance of the first rate is 1e10 times smaller than its prior, so it must not be computed
+// as a difference of two numbers of the prior's size.
 TEST(SparseBatch, AVagueStartCostsNoDigits) {
   Problem problem = testing::LinearSystem();
   for (std::size_t i = 0; i < problem.priors.size(); ++i) SetPrior(problem, i, 1e4);
@@ -172,7 +172,7 @@ TEST(SparseBatch, WhereAllIsKnownNothingIsSolved) {
   EXPECT_EQ(testing::ValueOf(found.states.back(), "p.x"), 2.0);
 }
 
-// The noise is held over frames without a measurement: they lie inside a node.
+// The noise is held over frames without a measurement, so these frames lie inside a node.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
   Problem problem = testing::HeldPoint(0.7);
   testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
@@ -210,8 +210,8 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   }
 }
 
-/// A body with an inertial unit at 100 Hz and a position, +- 0.1 m, at 2 Hz: the readings of a
-/// path that the model makes from its own readings, with biases and noise.
+/// A body with an inertial unit at 100 Hz and a position sensor, +- 0.1 m, at 2 Hz. The model
+/// generates its trajectory from the readings, which have biases and noise.
 struct InertialRun {
   Problem problem;
   std::vector<Frame> frames;
@@ -273,7 +273,7 @@ struct InertialRun {
   }
 };
 
-// 0.8 s of it are enough for the dense solver; a minute has 72 015 inputs.
+// 0.8 s of data suit the dense solver; a minute has 72 015 inputs.
 TEST(SparseBatch, SolvesInertialReadings) {
   const InertialRun little(80);
   ExpectSame(little.Solve("solver: sparse\n"), little.Solve("solver: dense\n"));
@@ -295,7 +295,7 @@ TEST(SparseBatch, SolvesInertialReadings) {
   expect("b.force_bias", minute.bias);
 }
 
-// Where a position has seven digits before the point, rounding alone makes steps of 1e-6 sigma.
+// If a position has seven digits before the point, rounding alone causes steps of 1e-6 sigma.
 TEST(SparseBatch, ConvergesFarFromTheOrigin) {
   Config config = Example("21_poses");
   config.Set("state.body.initial.position.mean", "[5e5, 5e6, 0]", "--set");
@@ -321,7 +321,7 @@ TEST(SparseBatch, ConvergesFarFromTheOrigin) {
       ASSERT_FALSE(estimators[i].estimator->failed());
     }
   }
-  // At the last frame the data so far are all data.
+  // At the last frame, smoothing and filtering use the same data.
   const State& last = sparse.states.back();
   for (std::size_t i = 2; i < 4; ++i) {
     const Eigen::VectorXd d = Apart(estimators[i].estimator->state(), last);
@@ -347,21 +347,21 @@ TEST(SparseBatch, SolvesTheSlamExamples) {
   }
 }
 
-// Driven by odometry, with fewer landmarks than there are frames.
+// Driven by odometry, with fewer landmarks than frames.
 TEST(SparseBatch, SolvesADriveWithControlInputs) {
   const Both both = SolveBoth(Example("15_slam_representations"), 60);
   ExpectSame(both.sparse, both.dense);
 }
 
-// A pair of pixels has four numbers, one more than a point.
+// A stereo measurement has four numbers, one more than a point.
 TEST(SparseBatch, SolvesWithStereoPairs) {
   const Both both = SolveBoth(
       Config::FromFile(ALIDADE_SOURCE_DIR "/examples/26_slam_three_sensors/stereo.yaml"), 30);
   ExpectSame(both.sparse, both.dense);
 }
 
-// Of four frames the depths are prior and little else: a Gauss-Newton step there goes more than
-// twice as far as it should, and comes back as far. Extrapolated from the last few, steps converge.
+// With four frames the prior dominates the depths: a Gauss-Newton step is more than twice too long,
+// and the next one returns as far. Extrapolation from the last few steps makes it converge.
 TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   Config config = Example("16_slam_room");
   config.Set("source.seed", "1001", "--set");
@@ -380,7 +380,8 @@ TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   EXPECT_LT(std::stoi(solution.substr(at + 2)), 60) << solution;
 }
 
-// An observation is not defined where the dense solver starts, which cannot go on then.
+// At the dense solver's initial estimate an observation is not defined, so that solver cannot
+// continue.
 TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   Config config = Example("15_slam_representations");
   config.Set("estimators", "{batch: {type: ceres_batch, solver: sparse}}", "--set");
@@ -401,7 +402,7 @@ TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   EXPECT_EQ(undefined, 0);
 }
 
-// Every frame's estimate of the data so far.
+// Solves at every frame with the data so far.
 TEST(SparseBatch, SolvesForTheDataSoFar) {
   const testing::MapProblem map(8, 10);
   const Problem problem = map.Filter();
@@ -419,7 +420,7 @@ TEST(SparseBatch, SolvesForTheDataSoFar) {
   }
 }
 
-// A twentieth of the measurements is wrong.
+// A twentieth of the measurements are outliers.
 TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {
     SCOPED_TRACE(ToString(loss.kind));
@@ -437,7 +438,7 @@ TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   }
 }
 
-// The states are rolled out by the models: x' = x + v dt + a dt^2 / 2, v' = v + a dt for some a.
+// The models propagate the states: x' = x + v dt + a dt^2 / 2, v' = v + a dt for some a.
 TEST(SparseBatch, TheMotionHoldsToRounding) {
   Problem problem = testing::HeldPoint(0.7);
   testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
@@ -450,7 +451,7 @@ TEST(SparseBatch, TheMotionHoldsToRounding) {
   }
 }
 
-// 5002 inputs, more than a dense system may have; a Kalman filter has the last estimate too.
+// 5002 inputs exceed the limit of a dense system; a Kalman filter has the same last estimate.
 TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
   const Problem problem = testing::LinearSystem();
   const std::vector<Frame> frames = Wobble(5001);

@@ -18,7 +18,7 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-/// The estimates of a smoother: values and covariances, frame by frame, and its last events.
+/// Estimates of a smoother: values and covariances of each frame, and its last events.
 struct Smoothed {
   std::vector<Eigen::VectorXd> x;
   std::vector<Eigen::MatrixXd> p;
@@ -45,7 +45,7 @@ std::vector<Frame> LinearFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
     const double t_s = 0.05 * k, wobble = 0.3 * std::sin(37.0 * k);
-    frames.push_back(k % 4 == 3 ? FrameAt(t_s, {})  // nothing measured
+    frames.push_back(k % 4 == 3 ? FrameAt(t_s, {})  // without a measurement
                                 : FrameAt(t_s, {{0, 2.0 * std::cos(t_s) + wobble}}));
   }
   return frames;
@@ -57,9 +57,9 @@ struct LinearRow {
   double z, r;
 };
 
-/// Kalman filter and Rauch-Tung-Striebel smoother, written out: P' = F P F' + Q, C = P F' P'^-1,
-/// x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first two elements move with constant
-/// velocity, the others stay.
+/// Kalman filter and Rauch-Tung-Striebel smoother, calculated here: P' = F P F' + Q, C = P F'
+/// P'^-1, x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first two elements move with
+/// constant velocity; the others are constant.
 Smoothed WrittenOut(Eigen::VectorXd x, Eigen::MatrixXd p, double acceleration,
                     const std::vector<Frame>& frames,
                     const std::vector<std::vector<LinearRow>>& rows) {
@@ -104,7 +104,7 @@ void ExpectNear(const Smoothed& found, const Smoothed& expected, double toleranc
   }
 }
 
-// The process noise is of rank 1 in 2: G = (dt^2/2, dt).
+// The process noise has rank 1 in 2: G = (dt^2/2, dt).
 TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
   const std::vector<Frame> frames = LinearFrames(60);
   std::vector<std::vector<LinearRow>> rows(frames.size());
@@ -140,7 +140,7 @@ std::vector<Frame> DepthFrames(int count) {
   return frames;
 }
 
-// At the optimum, the smoother of the problem linearised there, with R there, gives the optimum.
+// The smoother of the problem linearised at the optimum, with R there, gives the optimum.
 TEST(CeresBatch, IsAFixedPointOfTheLinearisedSmootherWithItsNoise) {
   const std::vector<Frame> frames = DepthFrames(60);
   const auto batch = MakeBatch(testing::DepthFilter());
@@ -222,12 +222,11 @@ TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
   std::vector<Frame> frames = LinearFrames(20);
   frames.push_back(FrameAt(1.7, {{0, 0.4}}));
   expect_equal(frames, 0.04);
-  // In doubles 0.3 / 0.1 is more than 3.
+  // In double precision 0.3 / 0.1 is more than 3.
   expect_equal({FrameAt(0.0, {{0, 2.1}}), FrameAt(0.3, {{0, 0.4}})}, 0.1);
 }
 
-// The first value of p.x comes from the third frame; the Kalman filter has the same, and its
-// correlation.
+// The third frame initialises p.x; the Kalman filter has the same initial value and correlation.
 TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
   problem.priors[0].sensor = "z";
@@ -264,7 +263,8 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   EXPECT_EQ(emitted, frames.size());
 }
 
-// A block that is known for certain stays: its sigma is zero and nothing moves it, or it is fixed.
+// A block that is known exactly stays constant: its sigma is zero without process noise, or it is
+// fixed.
 TEST(CeresBatch, WhatIsKnownStays) {
   Problem zero = LinearSystem();
   zero.priors[1].covariance.setZero();
@@ -294,7 +294,7 @@ TEST(CeresBatch, WhatIsKnownStays) {
 
 // ---- manifolds ----------------------------------------------------------------------------------
 
-/// A value on a manifold that stays.
+/// A constant value on a manifold.
 template <class G>
 struct Still : Motion<0, G> {
   static constexpr std::array kBlocks{Quantity{"x"}};
@@ -306,7 +306,11 @@ struct Still : Motion<0, G> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// At the estimate x the derivative of |x (-) m|^2 / 0.25 + sum |z (-) x|^2 / 0.16 vanishes.
+/// At the estimate x the derivative of
+/// x (-) m
+/// ^2 / 0.25 + sum
+/// z (-) x
+/// ^2 / 0.16 must vanish.
 template <class G>
 void ExpectStationary(const Geometry& geometry) {
   const std::vector<double> mean = geometry.Identity();
@@ -319,7 +323,7 @@ void ExpectStationary(const Geometry& geometry) {
   problem.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
   AddSensor(problem, "z", MakeSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   std::vector<Frame> frames;
-  for (int k = 0; k < 3; ++k) {  // far from the mean and from one another
+  for (int k = 0; k < 3; ++k) {  // far from the mean and from each other
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};
     Measurement m{TimestampFromSeconds(k), 0, -1, std::vector<double>(G::kAmbient), {}};
     geometry.Plus(mean.data(), d, m.values.data());
@@ -341,8 +345,8 @@ void ExpectStationary(const Geometry& geometry) {
     }
     return sum;
   };
-  // Ceres stops where the cost, 20, falls by less than 1e-14 of itself: 45 d^2 / 2 = 2e-13 puts the
-  // gradient at 45 d = 4e-6, of which the last step takes the most. Central differences: 2e-9.
+  // Ceres stops if the cost, 20, falls by less than 1e-14 of itself: 45 d^2 / 2 = 2e-13 means a
+  // gradient of 45 d = 4e-6, and the last step removes most of it. Central differences: 2e-9.
   for (int i = 0; i < t; ++i) EXPECT_NEAR((cost(i, 1e-5) - cost(i, -1e-5)) / 2e-5, 0.0, 1e-6);
 }
 

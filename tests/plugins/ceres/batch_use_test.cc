@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A batch over what a filter accepted, and a batch in the place of truth.
+// A batch that uses the measurements accepted by a filter, and a batch as the truth.
 #include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/recording.h"
@@ -13,7 +13,7 @@ using testing::SwingingTarget;
 
 bool IsOutlier(int k) { return k % 13 == 6; }
 
-/// A swinging target whose disparity is 40 px off on some frames; or those measurements left out.
+/// A swinging target. On some frames the disparity is 40 px off, or these measurements are omitted.
 class WithOutliers : public SwingingTarget {
  public:
   explicit WithOutliers(bool outliers) : SwingingTarget(80), outliers_(outliers) {}
@@ -34,7 +34,7 @@ class WithOutliers : public SwingingTarget {
   int next_ = 0;
 };
 
-/// A batch that tells its estimates.
+/// A batch with recorded estimates.
 struct Told : Estimator {
   explicit Told(const Problem& problem) : batch(testing::MakeBatch(problem)) {}
   void Start(Timestamp timestamp) override { batch->Start(timestamp); }
@@ -57,7 +57,7 @@ struct Told : Estimator {
   std::vector<Eigen::MatrixXd> p;
 };
 
-/// An ekf with a gate, and a batch that sees all, or what the ekf accepted.
+/// Returns an ekf with a gate, and a batch that uses all data or the data accepted by the ekf.
 Experiment MakeWithBatch(bool outliers, bool accepted) {
   Experiment experiment;
   experiment.source = std::make_unique<WithOutliers>(outliers);
@@ -83,7 +83,7 @@ TEST(CeresBatchUse, OfWhatAFilterAcceptedIsTheBatchWithoutTheOutliers) {
              spoiled = MakeWithBatch(true, false);
   const RunResult run = alidade::Run(filtered, {});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
-  // Frames 6, 32 and 58: of the outliers, these have a disparity.
+  // Of the frames with outliers, 6, 32 and 58 have a disparity.
   EXPECT_EQ(run.estimators[0].counts.at("gated:disparity"), 3);
   EXPECT_EQ(run.estimators[0].counts.count("gated:inverse_scale"), 0u);
   ASSERT_EQ(alidade::Run(clean, {}).status, RunStatus::kOk);
@@ -111,7 +111,7 @@ RunResult RunDepth(const std::vector<std::pair<std::string, std::string>>& setti
 }
 
 TEST(CeresBatchUse, IsReadFromTheConfig) {
-  // A narrow gate: the batch is to count what that let through.
+  // A narrow gate: the batch must have the measurements that passed it.
   const RunResult run = RunDepth({{"estimators.ekf.gate", "0.5"},
                                   {"estimators.batch.type", "ceres_batch"},
                                   {"estimators.batch.use.accepted_by", "ekf"}});
@@ -127,7 +127,8 @@ TEST(CeresBatchUse, AsTheReferenceGivesErrorsWithoutTruth) {
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   EXPECT_EQ(run.reference, "batch");
   EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
-  // The filter is 1.95 mm from truth and the batch 1 mm: between them lies what is left.
+  // The RMSE of the filter is 1.95 mm and that of the batch 1 mm; the remaining error lies in
+  // between.
   const double rmse = run.estimators[0].metrics.at("rmse:target.depth");
   EXPECT_GT(rmse, 0.8e-3);
   EXPECT_LT(rmse, 2.5e-3);

@@ -16,11 +16,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Pairs (x_k, lambda_k) along a chain, and points that some of the x_k see:
+/// Pairs (x_k, lambda_k) along a chain, and points that some of the x_k observe:
 ///
 ///   [H A'; A -Q],   A x = (x_k - F_k x_{k-1}),   Q_k of rank 0, 1 or full
 ///
-/// x_k has no information of its own but what the points and some rows give.
+/// The points and some rows are the only information on x_k.
 class Chain {
  public:
   Chain(int steps, int points, int span = 4) {
@@ -45,7 +45,7 @@ class Chain {
   BlockLdl& ldl() { return ldl_; }
   const Groups& time() const { return time_; }
 
-  /// Sets an order, the values, and the dense matrix that they are.
+  /// Sets an elimination order, the values, and the equal dense matrix.
   void Fill(const Groups& order) {
     ldl_.Use(Elimination(ldl_.graph(), order));
     Random random(3);
@@ -128,7 +128,7 @@ TEST(BlockLdl, EqualsTheDenseInverseInAnyOrderOfWholePairs) {
   chain.ExpectSolvesAndInverts();
 }
 
-// Many points that go on being seen border all pairs of a chain.
+// Many points that stay in view border all pairs of a chain.
 TEST(Elimination, ChainsWithAWideBorderAreMerged) {
   Chain chain(60, 60, 60);
   const Groups& time = chain.time();
@@ -149,7 +149,7 @@ TEST(BlockLdl, ASingularPivotIsSaidNotPerturbed) {
   EXPECT_FALSE(ldl.Factorise());
 }
 
-// A point seen from everywhere ties all steps together where it goes first.
+// A point that all steps observe connects all of them if it is eliminated first.
 TEST(MinimumDegree, PutsAHubLast) {
   Chain chain(200, 1, 200);
   Groups hub_first = chain.time();
@@ -162,7 +162,7 @@ TEST(MinimumDegree, PutsAHubLast) {
 TEST(MinimumDegree, LeavesTheLastWhereItIs) {
   Chain chain(50, 1, 50);
   Groups groups = chain.time();
-  std::ranges::reverse(groups);  // the end of a chain, which has one neighbour, comes last
+  std::ranges::reverse(groups);  // the end of a chain, with one neighbour, comes last
   const Groups ordered = MinimumDegree(chain.ldl().graph(), groups);
   EXPECT_EQ(ordered.back(), groups.back());
   EXPECT_EQ(ordered.size(), groups.size());

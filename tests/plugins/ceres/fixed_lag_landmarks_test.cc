@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The fixed-lag smoother with landmarks against the Kalman filter on a linear map, and against the
-// batch, from which it differs by where it linearises what has left the window.
+// The fixed-lag smoother with landmarks, compared with the Kalman filter on a linear map and with
+// the batch. It differs from the batch in the linearisation of data that left the window.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -21,7 +21,7 @@ using testing::MapSystem;
 using testing::Observation;
 using testing::Solve;
 
-/// Whether two covariances, and what they are of, agree to so many sigmas.
+/// Expects that two estimates and their covariances agree to within `sigmas`.
 void ExpectNear(const Vector3d& found, const MatrixXd& found_p, const Vector3d& expected,
                 const MatrixXd& p, double sigmas, const std::string& what) {
   const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
@@ -61,7 +61,8 @@ TEST(FixedLagLandmarks, OverAllFramesIsTheBatchOfTheDataSoFar) {
   EXPECT_FALSE(lag->failed());
 }
 
-/// Offsets to points that come and go, two of them known to 0.2 m and one exactly.
+/// Offsets to points that leave and return. The priors of two points have 0.2 m; one point is known
+/// exactly.
 struct LinearMap {
   Problem problem;
   std::vector<Frame> frames;
@@ -86,7 +87,7 @@ struct LinearMap {
     for (int k = 0; k < steps; ++k, r += vector(0.1 * std::sqrt(0.1))) {
       std::vector<Observation> observations;
       for (int i = 0; i < kPoints; ++i) {
-        const int phase = (k + 5 * i) % 17;  // away for 10 frames: the filter drops it meanwhile
+        const int phase = (k + 5 * i) % 17;  // absent for 10 frames: the filter then removes it
         if (phase >= 7 || (phase == 2 && i % 3 == 0) || k % 9 == 4) continue;
         const Vector3d z = points[static_cast<std::size_t>(i)] - r + vector(kNoise);
         observations.push_back({i, {z[0], z[1], z[2]}});
@@ -116,13 +117,13 @@ TEST(FixedLagLandmarks, OfALinearMapIsTheKalmanFilterWhateverTheWindow) {
   }
 }
 
-/// Frames, and a last one without measurements, before which all others leave the window.
+/// Appends a late frame without measurements: all earlier frames leave the window before it.
 std::vector<Frame> WithLateFrame(std::vector<Frame> frames) {
   frames.push_back(FrameOf(100.0, {}));
   return frames;
 }
 
-/// What leaves is linearised at the solution of all data: it loses nothing.
+/// Data leave the window linearised at the solution of all data, so no information is lost.
 void ExpectNothingIsLost(const Problem& problem, const std::vector<Frame>& frames) {
   const std::vector<Frame> all = WithLateFrame(frames);
   const auto batch = MakeBatch(problem, "solver: sparse\n");
@@ -164,13 +165,13 @@ TEST(FixedLagLandmarks, WhatLeavesHasTheWeightOfTheSolution) {
   ExpectNothingIsLost(map.Filter(), map.frames);
 }
 
-/// How far the estimates of the newest frames are from those of the batch of the data so far, in
-/// the mean, in its sigmas.
+/// Returns the mean distance between the estimates of the newest frames and those of the filtering
+/// batch, in sigmas of the batch.
 double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<State>& batch) {
   double sum = 0.0;
   for (std::size_t k = 0; k < map.frames.size(); ++k) {
     filter.Process(map.frames[k]);
-    if (k == 0) continue;  // known exactly
+    if (k == 0) continue;  // this state is known exactly
     const Eigen::Map<const Vector3d> expected(batch[k].values().data());
     const Vector3d apart = testing::PositionOf(filter) - expected;
     sum += std::sqrt(apart.dot(batch[k].covariance().Dense().ldlt().solve(apart)));
@@ -179,7 +180,7 @@ double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<
   return sum / static_cast<double>(map.frames.size() - 1);
 }
 
-// What has left is linearised where it was known less well: the later it leaves, the better.
+// Data that left the window were linearised at a less accurate estimate: a longer window helps.
 TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
   const MapProblem map(40, 20);
   std::vector<State> states;
@@ -200,8 +201,8 @@ TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
                                std::to_string(longest));
 }
 
-// A camera goes along points that come and go. Where it is in the world it knows less and less: a
-// prior of points that stays where it was linearised, as with anchors that do not move, would tell.
+// A camera passes points that enter and leave its view, so the uncertainty of its position grows. A
+// prior with old linearisation points, as of fixed anchors, would reduce it wrongly.
 TEST(FixedLagLandmarks, OnAWayAlongPointsItKnowsNoMoreThanTheFilter) {
   constexpr int kSteps = 120, kPoints = 240;
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);

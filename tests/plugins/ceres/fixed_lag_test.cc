@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The fixed-lag smoother against the batch, the Kalman filter, and itself before frames left it.
+// The fixed-lag smoother, compared with the batch, with the Kalman filter, and with its own
+// estimates before frames leave the window.
 #include <cmath>
 
 #include "alidade/experiment/run.h"
@@ -16,14 +17,14 @@ using testing::MakeBatch;
 using testing::MakeFixedLag;
 using testing::Shipped;
 
-/// An estimate of one frame.
+/// Estimate of one frame.
 struct Estimate {
   std::vector<double> x;
   Eigen::MatrixXd p;
 };
 
-/// Of the blocks that have a value, in the order of the layout: an estimator may keep places for
-/// others between them.
+/// Returns the blocks that have a value, in the order of the layout. The state may have unused
+/// places between them.
 Estimate EstimateOf(const State& state) {
   Estimate estimate;
   std::vector<int> rows;
@@ -60,14 +61,14 @@ std::vector<Estimate> SmoothOver(Estimator& estimator, const std::vector<Frame>&
 
 // ---- linear -------------------------------------------------------------------------------------
 
-/// A point (process noise of rank 1), of which one sensor sees the place and one the rate.
+/// A point with process noise of rank 1; one sensor measures its position and one its rate.
 Problem LinearSystem() {
   Problem problem = testing::LinearSystem();
   AddSensor(problem, "rate", testing::LinearSensor(1.5, 0.8), {"p.v"});
   return problem;
 }
 
-/// 20 frames a second; the two sensors miss some of them.
+/// Returns 20 frames a second; each of the two sensors misses some of them.
 std::vector<Frame> LinearFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -96,7 +97,7 @@ TEST(FixedLag, OverAllFramesIsTheBatchOfTheDataSoFar) {
   EXPECT_FALSE(lag->failed());
 }
 
-/// Expects the newest estimates of a window of three frames to be those of the Kalman filter.
+/// Expects the newest estimates of a three-frame window to equal those of the Kalman filter.
 void ExpectTheKalmanFilter(const Problem& problem, const std::vector<Frame>& frames,
                            const std::string& options = kThreeFrames) {
   const auto lag = MakeFixedLag(problem, options);
@@ -112,15 +113,15 @@ void ExpectTheKalmanFilter(const Problem& problem, const std::vector<Frame>& fra
 TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
   const std::vector<Frame> frames = LinearFrames(60);
   ExpectTheKalmanFilter(LinearSystem(), frames);
-  ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.04\n");  // less than a frame
+  ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.04\n");  // shorter than a frame
   ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.7\n");
-  std::vector<Frame> gap = LinearFrames(10);  // all of the window leaves at once
+  std::vector<Frame> gap = LinearFrames(10);  // the whole window leaves at once
   gap.push_back(FrameAt(4.0, {{0, 1.2}}));
   gap.push_back(FrameAt(4.05, {{1, 0.3}}));
   ExpectTheKalmanFilter(LinearSystem(), gap);
 }
 
-// Each frame with two more: the batch of the first k + 3 frames.
+// The estimate of each frame uses two later frames, as the batch of the first k + 3 frames does.
 TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
   const std::vector<Frame> frames = LinearFrames(30);
   const auto lag = MakeFixedLag(LinearSystem(), std::string(kThreeFrames) + "output: lagged\n");
@@ -136,7 +137,7 @@ TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
   }
 }
 
-// P_0 has a zero, Q none at all: what is known stays known, exactly.
+// P_0 has a zero, and Q is zero: exactly known values stay exactly known.
 TEST(FixedLag, WhatIsKnownStays) {
   Problem problem = LinearSystem();
   problem.priors[1].covariance.setZero();
@@ -148,7 +149,7 @@ TEST(FixedLag, WhatIsKnownStays) {
   ExpectTheKalmanFilter(problem, LinearFrames(40));
 }
 
-// The first value of p.x comes from the third frame, after two have left no trace of it.
+// The third frame initialises p.x, after two frames without information on it.
 TEST(FixedLag, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
   problem.priors[0].sensor = "z";
@@ -190,8 +191,8 @@ std::vector<Frame> DepthFrames(int count) {
   return frames;
 }
 
-/// Whole windows leave at the last solution, and a frame that tells nothing comes: what was
-/// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
+/// Whole windows leave at the last solution, before a frame without information. So the window was
+/// linearised at the optimum, and the estimate equals that of the batch of all data.
 void ExpectLeavingChangesNothing(const Problem& problem, std::vector<Frame> frames) {
   const double lag_s = Seconds(frames.back().timestamp - frames.front().timestamp);
   frames.push_back({frames.back().timestamp + TimestampFromSeconds(lag_s + 0.1), {}});
@@ -227,7 +228,7 @@ Problem OnManifold(const Geometry& geometry) {
   return problem;
 }
 
-/// Measurements far from the mean and from one another.
+/// Returns measurements far from the mean and from each other.
 std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
   std::vector<Frame> frames;
   const std::vector<double> mean = geometry.Identity();
@@ -240,8 +241,8 @@ std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
   return frames;
 }
 
-/// And with frames that leave one by one the estimate stays near that of the batch: `tolerance` of
-/// its sigmas.
+/// Expects that the estimate stays within `tolerance` sigmas of the batch's if frames leave one by
+/// one.
 template <class G>
 void ExpectNearTheBatch(const Geometry& geometry, double tolerance) {
   const Problem problem = OnManifold<G>(geometry);
@@ -271,7 +272,7 @@ TEST(FixedLag, IsNearTheBatchOnManifolds) {
 
 // ---- runs ---------------------------------------------------------------------------------------
 
-/// Example 08 with these estimators, and what else is set.
+/// Runs example 08 with these estimators and settings.
 RunResult RunDepth(const std::string& estimators,
                    const std::vector<std::pair<std::string, std::string>>& settings = {}) {
   Config config =
@@ -282,7 +283,7 @@ RunResult RunDepth(const std::string& estimators,
   return Run(experiment, {});
 }
 
-/// Means over the seeds of one metric of each estimator, in their order.
+/// Returns the means over the seeds of one metric, for each estimator in their order.
 std::vector<double> Means(const std::vector<RunResult>& runs, const std::string& metric) {
   std::vector<double> means;
   for (const RunResult& run : runs) {
@@ -294,7 +295,7 @@ std::vector<double> Means(const std::vector<RunResult>& runs, const std::string&
   return means;
 }
 
-// Process noise of rank 1, and a template whose size is known for certain.
+// Process noise of rank 1, and a template of exactly known size.
 TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
   std::vector<RunResult> runs;
   for (int seed = 1001; seed <= 1012; ++seed) {
@@ -315,15 +316,15 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
     EXPECT_GT(rmse[1], rmse[3]) << block;
     EXPECT_NEAR(rmse[2] / rmse[3], 1.0, 0.01) << block;
   }
-  // The target swings, more gently than the process noise allows for: 0.727 of what is expected for
-  // the filter and the window, 0.530 for the two smoothed.
+  // The target swings less than the process noise allows: NEES is 0.727 for the filter and the
+  // window and 0.530 for the two smoothers.
   const std::vector<double> nees = Means(runs, "nees.mean:target");
   EXPECT_NEAR(nees[1], nees[0], 0.02);
   EXPECT_NEAR(nees[2], nees[3], 0.02);
   for (const double share : Means(runs, "nees.within95:target")) EXPECT_GT(share, 0.97);
 }
 
-// It has no gate; but its stereo sees nothing nearer than 0.3 m, where the target is half the time.
+// The estimator has no gate, but its stereo rejects distances below 0.3 m, half of the time.
 TEST(FixedLag, LendsWhatItAccepted) {
   const RunResult run = RunDepth(
       "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {min_range_m: 0.3}}}}, "

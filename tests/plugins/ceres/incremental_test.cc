@@ -9,10 +9,10 @@ using Eigen::Vector3d;
 using testing::MakeBatch;
 using testing::MapProblem;
 
-/// How many sigmas two estimates are apart, and by how much of theirs the covariances are.
+/// Distance of two estimates in sigmas, and the relative distance of their covariances.
 struct Apart {
   double state = 0.0, covariance = 0.0;
-  std::ptrdiff_t whole = 0;  ///< frames that were solved as a whole
+  std::ptrdiff_t whole = 0;  ///< frames that were solved from scratch
 };
 Apart Compare(const Estimator& found, const Estimator& expected) {
   const MatrixXd p = expected.state().covariance().Dense().topLeftCorner(3, 3);
@@ -22,7 +22,7 @@ Apart Compare(const Estimator& found, const Estimator& expected) {
   return {d.norm() / std::sqrt(p.trace()), (its - p).norm() / p.norm(), 0};
 }
 
-/// The largest over the frames, and of the map at their end.
+/// Returns the largest distance over the frames and of the final map.
 Apart LargestOf(const Problem& problem, const std::vector<Frame>& frames,
                 const std::string& above) {
   const auto incremental =
@@ -60,7 +60,7 @@ Apart LargestOf(const MapProblem& map, const std::string& above) {
   return LargestOf(map.Filter(), map.frames, above);
 }
 
-// All is linearised where it is: the whole batch of the data so far.
+// Everything is relinearised: the result equals the batch of the data so far.
 TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
   const Apart apart = LargestOf(MapProblem(20, 12), "1e-10");
   EXPECT_LT(apart.state, 1e-7);
@@ -68,7 +68,7 @@ TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Weights settle slowly in the first frames, which are solved as a whole then.
+// In the first frames the weights settle slowly, so these frames are solved from scratch.
 TEST(IncrementalBatch, OfARobustLossToo) {
   MapProblem map(16, 12, 20);
   map.loss = {LossKind::kHuber, 1.345};
@@ -78,7 +78,8 @@ TEST(IncrementalBatch, OfARobustLossToo) {
   EXPECT_LE(apart.whole, 2);
 }
 
-// What has moved by less than a share of its sigma stays: near, and not the same.
+// Blocks that moved by less than a share of their sigma are not relinearised: the result is close
+// but not equal.
 TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
   const Apart apart = LargestOf(MapProblem(20, 12), "0.03");
   EXPECT_LT(apart.state, 0.1);
@@ -87,8 +88,8 @@ TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Landmarks follow their first cameras where nothing is linearised anew. Of a linear map that is
-// exact, but for what is too little to be told to the frames before.
+// Without relinearisation, landmarks follow their first cameras. For a linear map this is exact,
+// except for changes too small to be propagated to earlier frames.
 TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   Random random(3);
   std::vector<Frame> frames;
@@ -107,7 +108,7 @@ TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Landmarks that nothing has seen for a while leave the last matrix, and come back to it.
+// Landmarks that were not seen for a while leave the last matrix and return to it later.
 TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   MapProblem map(45, 9);
   for (std::size_t k = 12; k < map.frames.size(); ++k) {
@@ -120,7 +121,8 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
-  EXPECT_LT(LargestOf(map, "0.3").state, 0.5);  // what they come back to is eliminated again
+  // the old variables of a landmark are eliminated again
+  EXPECT_LT(LargestOf(map, "0.3").state, 0.5);
 }
 
 // The full-information filter of a linear system is the Kalman filter, at every frame.
@@ -146,7 +148,7 @@ TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
   }
 }
 
-// One that is known exactly is no variable, and what is measured of it is told all the same.
+// An exactly known landmark is not a variable, but its measurements still count.
 TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   LandmarkOptions options;
   options.known = {{0, {0.5, -0.2, 2.0}, 0.0}, {1, {-0.4, 0.1, 1.5}, 0.1}};
@@ -169,7 +171,7 @@ TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   }
 }
 
-// What is known exactly has no variance, not that of rounding.
+// Exactly known values have zero variance, not a rounding error.
 TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
   Problem problem = testing::DepthFilter();
   for (Prior& prior : problem.priors) {
@@ -185,7 +187,7 @@ TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
   }
 }
 
-// Steps forward in time would lose digits: all frames are solved as a whole.
+// Steps forward in time would lose digits, so all frames are solved from scratch.
 TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
   Problem problem = testing::LinearSystem();
   for (Prior& prior : problem.priors) prior.covariance *= 1e10;
@@ -211,7 +213,7 @@ TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
       "time lose digits; so are all frames from here on");
 }
 
-// A batch that is stopped has no map, not that of the filter that it starts from.
+// A stopped batch has no map; it does not report that of its filter.
 TEST(CeresBatchEnds, AStoppedBatchHasNoMap) {
   const MapProblem map(6, 8);
   for (const char* solver : {"sparse", "dense"}) {

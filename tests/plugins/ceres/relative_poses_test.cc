@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Keyframes: landmarks that are where the body was, to which later measurements tell the way.
+// Keyframes: landmarks at earlier positions of the body, and later measurements relative to them.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -17,8 +17,8 @@ using testing::Solve;
 
 constexpr double kStart = 0.3, kNoise = 0.05;
 
-/// A walk whose every frame k is a keyframe, and offsets z = r_j - r_k + n from some frames to
-/// keyframes before them: least squares in the positions alone, written out.
+/// A walk in which every frame k is a keyframe, and offsets z = r_j - r_k + n from some frames to
+/// earlier keyframes: least squares in the positions only, calculated here.
 struct Walked {
   std::vector<Frame> frames;
   MatrixXd covariance;
@@ -54,7 +54,7 @@ struct Walked {
       if (k > 0) see(k - 1);
       if (k >= loop && k % 4 == 0) see(k - loop);
       frame.measurements.push_back(
-          {frame.timestamp, 0, k, {0, 0, 0}, std::vector<double>(9, 0.0)});  // k itself
+          {frame.timestamp, 0, k, {0, 0, 0}, std::vector<double>(9, 0.0)});  // keyframe k itself
       frames.push_back(std::move(frame));
     }
     covariance = information.inverse();
@@ -82,7 +82,7 @@ TEST(RelativePoses, TheBatchIsLeastSquaresOfThePositionsAlone) {
   }
 }
 
-// An EKF has the clones in its state; at the end it knows of all of them what the batch does.
+// An EKF has the clones in its state: at the end its estimates of all of them equal the batch's.
 TEST(RelativePoses, TheFilterWithClonesKnowsTheSameAtTheEnd) {
   const int steps = 30;
   const Walked walked(steps, 15);
@@ -108,15 +108,15 @@ TEST(RelativePoses, TheFilterWithClonesKnowsTheSameAtTheEnd) {
   expect(*window);
 }
 
-/// Flops of an iteration, as the event `solution` tells them.
+/// Returns the flops of an iteration from the event `solution`.
 double FlopsOf(const Found& found) {
   const std::string& text = found.events.back().text;
   const std::size_t end = text.rfind(" flops"), begin = text.rfind(' ', end - 1);
   return std::stod(text.substr(begin, end - begin));
 }
 
-// One loop over 2000 frames ties the last one to the first: the fronts between carry its rows
-// too, and no more.
+// A single loop over 2000 frames connects the last frame with the first. The fronts in between
+// contain only the additional rows of the loop.
 TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   constexpr int kFrames = 2000;
   const auto frames = [&](bool closed) {
@@ -137,7 +137,7 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   };
   LandmarkOptions forgetful;
   forgetful.max_missed_frames = 3;
-  forgetful.known.push_back({0, {0.0, 0.0, 0.0}, 0.1});  // never dropped by the filter
+  forgetful.known.push_back({0, {0.0, 0.0, 0.0}, 0.1});  // the filter never drops it
   const Problem problem = MapSystem(testing::Offset(kNoise), forgetful, kStart);
   const Found open = Solve(problem, frames(false), "solver: sparse\n");
   const Found closed = Solve(problem, frames(true), "solver: sparse\n");
@@ -145,7 +145,7 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   RecordProperty("flops", std::to_string(FlopsOf(open)) + ' ' + std::to_string(FlopsOf(closed)));
   EXPECT_LT(FlopsOf(closed), 2.0 * FlopsOf(open));
   EXPECT_LT(FlopsOf(closed), 2e3 * kFrames);
-  // It tells of the end: 2000 steps of 0.1 m/sqrt(s) against one offset of 0.05 m.
+  // The loop improves the end: 2000 steps of 0.1 m/sqrt(s), compared with one offset of 0.05 m.
   const auto sigma = [](const Found& found) {
     return std::sqrt(found.states.back().covariance().Variance(0));
   };

@@ -19,7 +19,7 @@ using Values = std::vector<std::vector<double>>;
 template <class G>
 using Seen = testing::ManifoldSensor<G, 1.0>;
 
-/// z = x + b, where b may lack.
+/// z = x + b; the bias b is optional.
 struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"},
                                      Quantity{"b", "", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -47,7 +47,7 @@ std::vector<double> ResidualAt(const ceres::CostFunction& cost, const Values& va
   return r;
 }
 
-/// Residual and Jacobians of a cost, its buffers full of rubbish before.
+/// Residual and Jacobians of a cost, written to buffers that held garbage.
 struct Evaluated {
   std::vector<double> r;
   Values j;
@@ -62,7 +62,8 @@ Evaluated At(const ceres::CostFunction& cost, const Values& values) {
   return out;
 }
 
-/// [J | 0] [I; 0], as Ceres forms it, against central differences through the manifold.
+/// Compares [J
+/// 0] [I; 0], as Ceres forms it, with central differences through the manifold.
 void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
                          const std::vector<GeometryManifold>& manifolds, double tolerance) {
   const Evaluated at = At(cost, values);
@@ -106,7 +107,7 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const CostKind<SensorModel> behind(*by_abi, {{0, 0}}, {1}, w);
   const SensorCost<StereoDisparity> a(direct, &z);
   const SensorCost<SensorModel> b(behind, &z);
-  z = 77.0;  // they have their own
+  z = 77.0;  // the costs have their own measurement
   for (const ceres::CostFunction* cost :
        {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
     const Evaluated at = At(*cost, {{2.0}});
@@ -118,7 +119,7 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   }
 }
 
-/// Pose and intrinsics in one block, in another order than the roles; correlated noise.
+/// Pose and intrinsics in one block, not in the order of the roles; correlated noise.
 TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SelfCalibratingFeature<RadialLens> model(1.0);
   const SharedSensor by_abi = MakeSensor(model, "self_calibrating_feature");
@@ -136,7 +137,7 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
       Of(Geometry::Vector(3)), GeometryManifold({{Geometry::Vector(3), false},
                                                  {Geometry::Vector(3), false},
                                                  {Geometry::UnitQuaternion(), false}})};
-  // Rounding of pixels, 1e-13 px, over the step.
+  // Rounding errors of pixels, 1e-13 px, divided by the step.
   ExpectTrueJacobians(a, values, manifolds, 1e-6);
   ExpectTrueJacobians(b, values, manifolds, 1e-6);
   ExpectTrueJacobians(c, values, manifolds, 1e-6);
@@ -203,7 +204,7 @@ TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
   EXPECT_THROW(Kind(model, {{0, 0}}, {1}, {1.0, 0.0}), ContractViolation);
 }
 
-// Two roles on one number would leave the other column of the block as it was.
+// If two roles shared a number, the other column of the block would keep its old value.
 TEST(SensorCost, RefusesRolesThatShareAPlace) {
   const SharedSensor sensor = MakeSensor(Biased(), "biased");
   using Kind = CostKind<SensorModel>;
@@ -237,7 +238,7 @@ TEST(GeometryManifold, MovesPartsByTheirGeometryAndHoldsOthers) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(back[i], d[i], 1e-14);
   ASSERT_TRUE(manifold.PlusJacobian(x.data(), j.data()));
   ASSERT_TRUE(manifold.MinusJacobian(x.data(), inverse.data()));
-  const std::size_t rows[4] = {2, 3, 4, 6};  // of each tangent column
+  const std::size_t rows[4] = {2, 3, 4, 6};  // by tangent column
   for (std::size_t r = 0; r < 7; ++r) {
     for (std::size_t c = 0; c < 4; ++c) {
       EXPECT_EQ(j[4 * r + c], r == rows[c] ? 1.0 : 0.0);

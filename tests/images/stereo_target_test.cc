@@ -136,7 +136,7 @@ sensors:
            focal_px: 120, baseline_m: 0.065, sigma_px: 50}
 estimators: {ekf: {type: ekf}}
 )");
-  // The sensor's sigma is 50 px. Without the variances of the measurements the depth hardly changes.
+  // The sensor's sigma is 50 px: without the measurements' variances the depth hardly changes.
   const auto rmse_mm = [&](const char* estimate) {
     const Outcome outcome =
         Call({"run", "run.yaml", "-o", "run", "--force", "--set",

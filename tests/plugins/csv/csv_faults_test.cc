@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tables and configs with a fault; the number of a fault of data is in the comment above its test.
+// Tables and configs with a fault. The comment above a test has the number of its data fault.
 #include <algorithm>
 
 #include "csv_fixture.h"
@@ -81,7 +81,8 @@ TEST_F(Csv, ReciprocalOfZero) {
 
 // FAULTS 33
 TEST_F(Csv, LineTooLong) {
-  // "0,1,2," and a number: 4096 bytes are read, one more is refused, line end not counted.
+  // "0,1,2," and a number: 4096 bytes are accepted, one more is an error; the line end does not
+  // count.
   const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
   for (const std::string end : {"", "\n", "\r\n"}) {
     EXPECT_EQ(Frames(kHeader + row(4096) + end, kDepthConfig).size(), 1u);
@@ -93,8 +94,8 @@ TEST_F(Csv, LineTooLong) {
 }
 
 TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
-  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes: still one
-  // line, of which the next is counted.
+  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes. This is
+  // one line, and the next line has the right number.
   std::string text = kHeader;
   while (text.size() + 4097 + 4000 < 65536) text += '#' + std::string(3998, ' ') + '\n';
   text += '#' + std::string(65536 - 4097 - 2 - text.size(), ' ') + '\n';

@@ -41,7 +41,7 @@ TEST_F(Csv, ReadsAPipeAsItIsWritten) {
   });
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
   SourceFrame frame;
-  EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
+  EXPECT_TRUE(source->Next(frame));  // returns although the pipe is still open
   writer.join();
   EXPECT_EQ(write(descriptor, ",2\n", 3), 3);
   EXPECT_TRUE(source->Next(frame));
@@ -52,7 +52,7 @@ TEST_F(Csv, ReadsAPipeAsItIsWritten) {
 
 TEST_F(Csv, ASignalEndsTheWaitForAPipe) {
   ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
-  const int both_ends = open(File().c_str(), O_RDWR);  // never at its end
+  const int both_ends = open(File().c_str(), O_RDWR);  // never reaches the end of file
   ASSERT_EQ(write(both_ends, "t_s,z\n", 6), 6);
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
   struct sigaction action {

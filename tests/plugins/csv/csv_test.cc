@@ -13,7 +13,7 @@
 namespace alidade::testing {
 namespace {
 
-// ---- what is read -------------------------------------------------------------------------------
+// ---- reading tables ---------------------------------------------------------------------------
 
 TEST_F(Csv, ReadsNamedColumns) {
   const auto frames =
@@ -52,7 +52,7 @@ TEST_F(Csv, GainAndReciprocalScaleTheColumn) {
   EXPECT_DOUBLE_EQ(frames[0].measurements[1].values[0], 0.75);
 }
 
-// A satellite's place comes with its range; where a part of it is missing there is no measurement.
+// A range has the satellite's position as known numbers; if one is missing there is no measurement.
 TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   const std::string config =
       "path: a.csv\nstreams: {range: {columns: r, gain: 1e3, known: [x, y]}, other: r}\n";
@@ -69,8 +69,8 @@ TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   EXPECT_TRUE(frames[1].measurements[0].known.empty());
 }
 
-// Satellites in rows of their own, two at the first time and one at the second; truth is that of
-// the first row that has it.
+// One row for each satellite: two at the first time and one at the second. The truth is that of the
+// first row that has it.
 TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   const std::string config =
       "path: a.csv\ntime: {column: t_s, repeats: true}\n"
@@ -94,7 +94,8 @@ TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   EXPECT_FALSE(source->Next(frame));
 }
 
-// A bad value does not cost the frame before it; a row whose time cannot be read may be part of it.
+// A bad value does not invalidate the previous frame. A row with an unreadable time may belong to
+// that frame, so the frame is withheld.
 TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   Write("t_s,r\n0,21\n0,22\n1,x\n");
   const auto source =
@@ -122,7 +123,8 @@ TEST_F(Csv, AcceptsCommentsCarriageReturnsAndByteOrderMark) {
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].measurements[0].values[0], 1.5);
   EXPECT_EQ(frames[1].measurements[0].values[0], -2.0);
-  EXPECT_EQ(frames[2].measurements[0].values[0], 0.5);  // complete, though no line feed ends it
+  // complete, although the last line has no line feed
+  EXPECT_EQ(frames[2].measurements[0].values[0], 0.5);
 }
 
 TEST_F(Csv, IgnoresColumnsThatNobodyNames) {
@@ -200,7 +202,7 @@ TEST_F(Csv, TimeSince1970KeepsEveryNanosecond) {
 
 TEST_F(Csv, RateStandsInForTime) {
   const std::string config = "path: a.csv\nrate_hz: 30\nstreams: {z: z}\n";
-  const auto frames = Frames("z\n1\n\n2\n", config);  // the blank line is a missing value
+  const auto frames = Frames("z\n1\n\n2\n", config);  // a blank line is a missing value
   EXPECT_EQ(Timestamps(frames), (std::vector<Timestamp>{0, 33'333'333, 66'666'667}));
   EXPECT_EQ(Held(frames[1]), "|");
   ExpectBadData("z,w\n1,2\n\n2,3\n", "FILE:3:1: 1 column; expected 2 columns, as in line 1",
@@ -215,7 +217,7 @@ TEST_F(Csv, NumbersDoNotDependOnTheLocale) {
 }
 
 TEST_F(Csv, LinesAcrossTheBufferAreWhole) {
-  // 20000 rows of about 30 bytes: some ten times the buffer.
+  // 20000 rows of about 30 bytes: about ten times the buffer size.
   std::string text = "t_s,z\n";
   for (int i = 0; i < 20000; ++i) {
     text += std::to_string(i) + "," + std::to_string(i) + ".000000000000000000\n";
@@ -237,17 +239,18 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
     int count = 0;
     bool ended = false;
     const auto source = Open(kDepthConfig + ("blind_after: " + share + "\n"));
-    EXPECT_EQ(source->size(), share == "1" ? -1 : 7);  // 1 drops nothing: no need to count
+    // 1 drops nothing, so the rows need not be counted
+    EXPECT_EQ(source->size(), share == "1" ? -1 : 7);
     for (SourceFrame frame; source->Next(frame);) {
       const std::string held = Held(frame);
       EXPECT_TRUE(held == "0 1 | 0" || held == "1 | 0") << held;
       ended |= held == "1 | 0";
-      EXPECT_EQ(held == "1 | 0", ended);  // once blind, blind
+      EXPECT_EQ(held == "1 | 0", ended);  // once blind, always blind
       count += ended ? 0 : 1;
     }
     return count;
   };
-  // Rows k = 0 .. 6 are seen while k < 7 F.
+  // Rows k = 0 .. 6 are not blind while k < 7 F.
   EXPECT_EQ(seen("0"), 0);
   EXPECT_EQ(seen("0.1"), 1);
   EXPECT_EQ(seen("0.5"), 4);
@@ -255,7 +258,7 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
 }
 
 TEST_F(Csv, BlindAfterIsExactWhereTheShareIs) {
-  // 0.07 * 100 is 7.000000000000001 in doubles.
+  // In double precision 0.07 * 100 is 7.000000000000001.
   std::string text = "t_s,z\n";
   for (int i = 0; i < 100; ++i) text += std::to_string(i) + ",1\n";
   Write(text);

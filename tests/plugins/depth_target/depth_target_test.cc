@@ -19,7 +19,7 @@ constexpr double kBfPxM = 400.0 * 0.065;
 
 using Values = std::map<std::string, double>;
 
-/// Lends a source its parameters: `values`, else the defaults. Choices are given by index.
+/// Provides a source with parameters: `values`, else the defaults. Choices are indices.
 class Host {
  public:
   explicit Host(Values values = {}) : values_(std::move(values)) {
@@ -79,7 +79,7 @@ std::vector<double> Series(const Values& values, Stream stream, std::uint64_t se
   return series;
 }
 
-/// The samples of noise, undone from the formulas of the source; all N(0, 1).
+/// Noise samples, recovered with the formulas of the source; all are N(0, 1).
 struct Noise {
   std::vector<double> disparity, scale;
 };
@@ -88,7 +88,7 @@ Noise NoiseOf(const std::vector<SourceFrame>& frames, double sigma_d, double sig
   Noise noise;
   for (const SourceFrame& frame : frames) {
     const double depth_m = frame.truth[0][0];
-    const double scale = 0.3 / depth_m;  // of the target, with Z0 = 0.3 m and w = 300 px
+    const double scale = 0.3 / depth_m;  // of the target, for Z0 = 0.3 m and w = 300 px
     noise.disparity.push_back((*Value(frame, kDisparityAll) - kBfPxM / depth_m) / sigma_d);
     noise.scale.push_back((1.0 / *Value(frame, kInverseScale) - scale) * scale * 300.0 /
                           (2.0 * sigma_e));
@@ -136,7 +136,7 @@ TEST(DepthTarget, NamesItsStreamsAndTruths) {
 }
 
 TEST(DepthTarget, LastSampleSurvivesRounding) {
-  // 0.3 / 0.1 is 2.9999999999999996 in doubles; t = 0, 0.1, 0.2, 0.3 s.
+  // In double precision 0.3 / 0.1 is 2.9999999999999996; t = 0, 0.1, 0.2, 0.3 s.
   EXPECT_EQ(AllFrames({{"duration_s", 0.3}, {"rate_hz", 10.0}}).size(), 4u);
   EXPECT_EQ(AllFrames({{"duration_s", 0.299999}, {"rate_hz", 10.0}}).size(), 3u);
   EXPECT_EQ(AllFrames({{"duration_s", 0.0}}).size(), 1u);
@@ -153,7 +153,7 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
   const double inverse_scale[] = {1.0, 4.0 / 3.0, 1.0, 2.0 / 3.0};
   ASSERT_EQ(frames.size(), 4u);
   for (std::size_t k = 0; k < 4; ++k) {
-    const bool sees = k < 3;  // 0.3 m is not nearer than 0.3 m
+    const bool sees = k < 3;  // the limit is 0.3 m, and 0.3 m is not below it
     EXPECT_NEAR(*Value(frames[k], kDisparityAll), disparity_px[k], 1e-12);
     EXPECT_NEAR(*Value(frames[k], kInverseScale), inverse_scale[k], 1e-15);
     EXPECT_EQ(Value(frames[k], kDisparity).has_value(), sees);
@@ -163,7 +163,8 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
 }
 
 TEST(DepthTarget, TemplateDepthScalesTheImage) {
-  // Z = 0.3 m and a template from 0.6 m: the target looks twice as large; its truth is 1 / 0.6 m.
+  // Z = 0.3 m and a template recorded at 0.6 m: the target looks twice as large; the truth is 1 /
+  // 0.6 m.
   const std::vector<SourceFrame> frames =
       AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"sigma_edge_px", 0.0}});
   EXPECT_NEAR(*Value(frames[0], kInverseScale), 0.5, 1e-15);
@@ -198,8 +199,8 @@ TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
 }
 
 TEST(DepthTarget, ThresholdOnTheNoisyDisparitySelects) {
-  // At rest at the limit: of N(0, 1) only the lower half passes, its mean is -sqrt(2/pi) and its
-  // variance 1 - 2/pi; on the exact disparity all pass. 5 sigma.
+  // At rest at the limit, only the lower half of N(0, 1) passes: its mean is -sqrt(2/pi) and its
+  // variance 1 - 2/pi. All samples pass if the test uses the exact disparity. 5 sigma.
   Values values{{"frequency_hz", 0.0}, {"rate_hz", 1000.0}, {"duration_s", 20.0}};
   const std::vector<double> measured = Series(values, kDisparity);
   values["blind_test"] = 1;
@@ -217,8 +218,8 @@ TEST(DepthTarget, NearZeroIsNeverBlind) {
 }
 
 TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
-  // Undone, both noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
-  // depths, and no correlation; 5 sigma of N samples.
+  // Both recovered noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
+  // depths, no correlation. 5 sigma of N samples.
   const std::vector<SourceFrame> frames = AllFrames({{"rate_hz", 10000.0},
                                                      {"duration_s", 5.0},
                                                      {"sigma_disparity_px", 0.5},
@@ -271,7 +272,7 @@ TEST(DepthTarget, PoorTextureLosesDisparitiesOrMakesThemAnything) {
     values[key] = value;
     return AllFrames(values);
   };
-  // Stream 1, disparity_all: 52 px, noise 1 px; the largest there can be is 52 px.
+  // Stream 1, disparity_all: 52 px with a noise of 1 px; the maximum is 52 px.
   const auto disparities = [](const std::vector<SourceFrame>& frames) {
     std::vector<double> found;
     for (const SourceFrame& frame : frames) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Control inputs from a config: tests/plugins/driven/config.yaml, all estimators on one table.
+// Control inputs from a config: tests/plugins/driven/config.yaml with all estimators on one table.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -23,11 +23,11 @@ struct Gaussian {
   double x, p;
 };
 
-/// The Kalman filter and the smoother of drive.csv written out, speed by speed: each acts until the
-/// next, that of 2.5 s until 4 s (it may be 1.5 s old), and none before 0.5 s.
+/// Returns the Kalman filter or the smoother of drive.csv, calculated here. Each speed acts until
+/// the next one; that of 2.5 s acts until 4 s, as its timeout is 1.5 s; there is none before 0.5 s.
 std::vector<Gaussian> WrittenOut(bool smoothed) {
   struct Row {
-    double t_s, distance, fix;  // since the row before, m; 0: no fix
+    double t_s, distance, fix;  // distance since the previous row, m; fix 0: none
   };
   const std::vector<Row> rows = {
       {0.0, 0.0, 1.2},       {0.5, 0.0, 0.0},        {1.0, 2.0 * 0.5, 2.3}, {1.7, 1.5 * 0.7, 0.0},
@@ -68,7 +68,7 @@ class DrivenTest : public HostTest {
     recorder.Finish(result);
     return result;
   }
-  /// The first line of the refusal of the config with `key` set to `value`.
+  /// Returns the first line of the error of the config with `key` set to `value`.
   std::string Refusal(const std::string& key, const std::string& value) {
     std::string text;
     const Config config = Read({{key, value}});
@@ -100,7 +100,7 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
         EXPECT_NEAR(std::stod(cells[1]), expected[k].x, 1e-9) << one.name << k;
         EXPECT_NEAR(std::stod(cells[2]), std::sqrt(expected[k].p), 1e-9) << one.name << k;
       }
-      // An input is no innovation, but it is counted.
+      // An input has no innovation, but it is counted.
       EXPECT_EQ(testing::Lines(folder / one.name / "innovations.csv").size(), 8u) << one.name;
       EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
       EXPECT_EQ(one.counts.at("accepted:gps"), 7) << one.name;
@@ -118,7 +118,7 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
   }
 }
 
-// No sensor measures the odometry: a filter neither accepts nor refuses it.
+// The odometry belongs to no sensor, so a filter neither accepts nor rejects it.
 TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
   const RunResult run =
       RunInto(Read({{"estimators",
@@ -147,7 +147,8 @@ TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
             "inputs; expected a filter without a sensor on that stream");
 }
 
-// Not even where it follows a filter that does not have the sensor, but follows one that has.
+// The stream of a control input must not belong to a sensor of any filter in the chain of
+// `accepted_by`.
 TEST_F(DrivenTest, NorIsAStreamThatAnyLenderOnTheWayMeasures) {
   const Config config = Read(
       {{"source.streams", "{gps: gps_m, odometry: speed_m_s, none: {columns: [gps_m]}}"},
@@ -183,7 +184,7 @@ TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
 }
 
 TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
-  // The batch of the data so far cannot go back.
+  // The batch with mode: filtering cannot process late frames.
   const std::string estimators =
       "{ekf: {type: ekf}, iekf: {type: iekf}, root: {type: square_root_ekf}, ukf: {type: ukf}, "
       "rts: {type: rts}, batch: {type: ceres_batch}}";

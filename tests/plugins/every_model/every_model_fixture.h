@@ -13,21 +13,22 @@
 #include "support/manifold_models.h"
 #include "support/systems.h"
 
-/// A shipped model from its one struct, as a plugin under the engine and the batch, and composed at
-/// compile time. Each composition takes seconds to compile: the rows stand in several sources.
+/// Tests a shipped model, defined by one struct: as a plugin in the engine and in the batch, and
+/// composed at compile time. Each composition takes seconds to compile, so several sources share
+/// the rows.
 namespace alidade::testing {
 
-/// Moves the roles of a sensor.
+/// Motion model of the blocks that a sensor uses.
 template <class G>
 using Wander = ManifoldWalk<G, 0.01>;
-/// Sees the blocks of a motion model.
+/// Sensor of the blocks of a motion model.
 template <class G>
 using Seen = ManifoldSensor<G, 0.05>;
 
 using Means = std::vector<std::vector<double>>;
 
-/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05. A
-/// control input comes on the stream `NAME.input`.
+/// Adds the state entry `name` with blocks at `means` and a sigma of 0.05 for each element. Its
+/// control input has the stream `NAME.input`.
 inline void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                       const Means& means) {
   MotionBinding binding{name, model, {}};
@@ -56,7 +57,7 @@ void AddAllSeen(Problem& problem, std::tuple<G...>*) {
   (AddSeen<G>(problem), ...);
 }
 
-/// The streams of the sensors, then those of the control inputs.
+/// Returns the streams of the sensors, followed by those of the control inputs.
 inline std::vector<StreamInfo> AllStreams(const Problem& problem) {
   std::vector<StreamInfo> streams = StreamsOf(problem);
   for (const MotionBinding& motion : problem.motions) {
@@ -66,15 +67,15 @@ inline std::vector<StreamInfo> AllStreams(const Problem& problem) {
   return streams;
 }
 
-/// A control input of `size` elements that goes on for ever.
+/// Returns a constant control input of `size` elements.
 inline std::vector<double> InputOf(int size) {
   std::vector<double> u;
   for (int i = 0; i < size; ++i) u.push_back(0.03 - 0.01 * i);
   return u;
 }
 
-/// Frames in which every sensor sees the means of the priors, with noise of about its own size, and
-/// the control inputs come.
+/// Returns frames in which every sensor measures the means of the priors with about its own noise.
+/// The frames also contain the control inputs.
 inline std::vector<Frame> FramesOf(const Problem& problem, int count) {
   std::vector<Frame> frames(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) {
@@ -112,8 +113,8 @@ inline std::vector<Frame> FramesOf(const Problem& problem, int count) {
   return frames;
 }
 
-/// The engine and `filter`, whose blocks are seen one by one, then by `last`, over the same frames;
-/// `inputs` are the control inputs that `filter` takes.
+/// Expects equal results of the engine and of `filter` for the same frames. Each block has its own
+/// sensor, followed by the sensor `last`; `inputs` are the control inputs of `filter`.
 template <class Filter, class Last, class... Inputs>
 void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs... inputs) {
   EkfOptions options;
@@ -152,13 +153,13 @@ void ExpectSame(const Problem& problem, Filter filter, const Last& last, Inputs.
   }
 }
 
-/// A model with parameters, and what the tests below need of it.
+/// A model, its parameters, and the data that the tests below need.
 struct Row {
   std::string model, parameters;
-  /// Around the plugin.
+  /// Creates a problem with the plugin's model.
   std::function<Problem(const PluginHost&, const Node&)> problem;
   std::function<void(const Problem&)> expect_static_is_engine;
-  double nonlinearity;  ///< by which batch and filter may differ at the end, in sigmas
+  double nonlinearity;  ///< allowed final difference between batch and filter, in sigmas
 };
 inline void PrintTo(const Row& row, std::ostream* out) { *out << row.model << row.parameters; }
 
@@ -227,13 +228,13 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
   return {name, parameters, problem, expect, 0.05};
 }
 
-/// A landmark 2 m before a camera on whose image the uncertainties here, of 0.05, are a pixel.
+/// A camera with large pixels: for a landmark 2 m ahead, an uncertainty of 0.05 is about a pixel.
 inline const std::string kSmallCameraKeys = "width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12";
 inline const std::string kSmallCameraText = "camera: {" + kSmallCameraKeys + '}';
 inline const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
 inline const std::vector<double> kPosition{0.1, -0.1, 0.2}, kOrientation{1, 0, 0, 0};
 
-/// The plugins of this build.
+/// Returns the plugins of this build.
 inline const std::filesystem::path& ShippedFolder() {
   static const std::filesystem::path folder =
       std::filesystem::path(ALIDADE_BINARY_DIR) / "lib/alidade/plugins";
@@ -244,7 +245,7 @@ inline const PluginHost& Shipped() {
   return host;
 }
 
-/// Its tests are in every_model_test.cc, its rows in every_model_*_test.cc.
+/// The tests are in every_model_test.cc, the rows in every_model_*_test.cc.
 class EveryModel : public ::testing::TestWithParam<Row> {
  protected:
   const Row& row_ = GetParam();
@@ -253,7 +254,8 @@ class EveryModel : public ::testing::TestWithParam<Row> {
   Problem system_;
 };
 
-/// `stereo_disparity_0`: the model, and which of the rows of its source.
+/// Returns the name of a row: the model and the index of the row in its source,
+/// `stereo_disparity_0`.
 inline std::string RowName(const ::testing::TestParamInfo<Row>& row) {
   return row.param.model + '_' + std::to_string(row.index);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every shipped model, from its one struct: as a plugin under the engine and the batch, composed at
-// compile time, and under the checker. A model without a row fails.
+// Tests every shipped model: as a plugin in the engine and in the batch, composed at compile time,
+// and with the checker. A model without a row fails.
 #include "alidade/check/check.h"
 #include "alidade/experiment/estimator_plugin.h"
 #include "every_model_fixture.h"
@@ -13,8 +13,8 @@ TEST_P(EveryModel, IsTheSameAsAPluginAndComposedAtCompileTime) {
   row_.expect_static_is_engine(system_);
 }
 
-// The last estimate of the batch is the filter's where models are linear, as motions are here.
-// Without the measurements of its sensor a batch would be off by 0.1 to 0.6 sigma.
+// For linear models the last estimate of the batch equals the filter's; the motion models here are
+// linear. Without the measurements of the sensor a batch would be off by 0.1 to 0.6 sigma.
 TEST_P(EveryModel, GivesTheBatchItsFactors) {
   const auto& entries = Shipped().entries();
   if (std::none_of(entries.begin(), entries.end(),
@@ -58,7 +58,7 @@ TEST_P(EveryModel, PassesTheChecker) {
   }
 }
 
-// The rows are those that have become tests: `Scalars/EveryModel.PassesTheChecker/constant_0`.
+// The rows are read from the test names, such as `Scalars/EveryModel.PassesTheChecker/constant_0`.
 TEST(Models, HaveARow) {
   std::set<std::string> rows, shipped;
   const ::testing::UnitTest& all = *::testing::UnitTest::GetInstance();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every model of tests/faults/plugins/bad_models.cc has one fault: the check that is made for it
-// must find it and say so, and no other may.
+// Every model of tests/faults/plugins/bad_models.cc has one fault. The corresponding check must
+// report it, and no other check may fail.
 #include "alidade/check/check.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 using Verdict = Finding::Verdict;
 
-/// `check: words` of every failure.
+/// Returns `check: text` of every failure.
 std::vector<std::string> Failures(const std::vector<Finding>& findings) {
   std::vector<std::string> failures;
   for (const Finding& finding : findings) {
@@ -42,7 +42,7 @@ class CheckTest : public HostTest {
 };
 
 struct Fault {
-  int number;  ///< in the project's list of faults, 0: none
+  int number;  ///< in the table of faults; 0: none
   const char* model;
   const char* check;
   std::vector<const char*> words;
@@ -55,7 +55,7 @@ std::string Name(const ::testing::TestParamInfo<Fault>& info) {
 class OneFault : public CheckTest, public ::testing::WithParamInterface<Fault> {};
 
 TEST_P(OneFault, IsFoundByItsCheckAlone) {
-  // The sanitizer ends such a process in its own way, and has a stack of its own.
+  // A sanitizer ends such a process itself, and its stack differs.
   const std::string model = GetParam().model;
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
   if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends it in its own way";
@@ -258,14 +258,14 @@ TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
   EXPECT_EQ(FindModels(host_, "gravity").size(), 1u);
   ExpectError(ExitCode::kPlugin, {"no plugin 'scale_2' with", "did you mean 'scale_2d'?"},
               [&] { FindModels(host_, "scale_2"); });
-  // Near a source, which is nothing to check.
+  // The name is close to a source, which has no model to check.
   ExpectError(ExitCode::kPlugin, {"no plugin 'depth_targe' with a sensor or motion model\n"},
               [&] { FindModels(host_, "depth_targe"); });
   ExpectError(ExitCode::kPlugin, {"offers no model 'righ'", "did you mean 'right'?"},
               [&] { FindModels(host_, "bad_models", "righ"); });
 }
 
-/// Adds sensors of landmarks: every form, and every lens.
+/// Adds landmark sensors with every representation and every lens.
 void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   const std::string camera = "camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240";
   const std::pair<std::string, std::string> sensors[] = {
@@ -287,8 +287,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   }
 }
 
-// At these seeds differences over long steps agree on the mean slope of a camera that is turned
-// round and round by 1e6 rad/s.
+// With these seeds, differences over long steps agree on the mean slope, although the camera
+// rotates many times at 1e6 rad/s.
 TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   const PluginEntry odometry = FindModels(host_, "odometry_pose").at(0);
   const Config config = Parse("{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}");
@@ -299,7 +299,7 @@ TEST_F(CheckTest, AMotionThatTurnsManyTimesInAStepPasses) {
   }
 }
 
-/// Every shipped model passes, with the parameters of its row.
+/// Every shipped model passes with the parameters of its row.
 TEST_F(CheckTest, ShippedModelsPass) {
   std::multimap<std::string, std::string> parameters = {
       {"constant", "{}"},

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The noise of an entry as a covariance: `covariance` of a sensor, `noise.covariance` of a state
-// entry.
+// Noise given as a covariance: `covariance` of a sensor, `noise.covariance` of a state entry.
 #include <cmath>
 
 #include "alidade/experiment/read_problem.h"
@@ -22,7 +21,7 @@ const PluginHost& ShippedModels() {
 Values RootOfR(const SharedSensor& sensor) {
   const int m = sensor->measurement().geometry.tangent;
   Values l(static_cast<std::size_t>(m) * static_cast<std::size_t>(m), std::nan(""));
-  // A given noise needs neither states nor a measurement.
+  // A given noise depends neither on states nor on the measurement.
   EXPECT_EQ(sensor->SqrtNoise(nullptr, nullptr, l.data()), Status::kOk);
   return l;
 }
@@ -66,7 +65,7 @@ TEST_F(GivenNoise, IsThatOfEveryModelOfTheSensor) {
   EXPECT_EQ(RootOfR(problem.sensors[0].model), expected);
   ASSERT_TRUE(problem.sensors[0].xyz != nullptr);
   EXPECT_EQ(RootOfR(problem.sensors[0].xyz), expected);
-  // At another time, too: the sensor is then one of more roles.
+  // The same with a time offset, which adds roles to the sensor.
   const Problem late =
       PixelsWith("covariance: [[1, 0.6], [0.6, 4]]\n    time_offset_s: {mean: 0, sigma: 0.01}");
   EXPECT_GT(late.sensors[0].roles.size(), problem.sensors[0].roles.size());
@@ -91,7 +90,8 @@ TEST_F(GivenNoise, IsRefusedWhereItIsNoCovarianceOfTheMeasurement) {
 }
 
 TEST_F(GivenNoise, TakesNothingButTheNoiseFromAModel) {
-  // The kind is asked for; template_px, which is no sigma, is needed though R does without it.
+  // The kind of noise is still read. template_px, which is not a sigma, is required although R does
+  // not use it.
   const auto scale = [](const std::string& keys) {
     const Config config = Parse("{covariance: [[0.25]], " + keys + "}");
     const SharedSensor model = ShippedModels().CreateSensor("scale_2d", config.root());
@@ -114,13 +114,13 @@ TEST_F(GivenNoise, OfAMotionModelIsThatOfItsInputs) {
   const Config config =
       Parse("{dimensions: 2, noise: {kind: discrete, covariance: [[4, -1], [-1, 1]]}}");
   const SharedMotion model = Motion(config, "constant_velocity");
-  // m/s^2, held: whatever dt is
+  // m/s^2, held: the root does not depend on dt
   for (const double dt_s : {0.1, 3.0}) {
     EXPECT_EQ(RootOfQ(model, dt_s), (Values{2.0, 0.0, -0.5, std::sqrt(0.75)}));
   }
 }
 
-// A body that moves in a plane: 3 of 6 inputs have no noise; two have the same.
+// A body that moves in a plane: 3 of its 6 inputs have no noise, and two depend on the same noise.
 TEST_F(GivenNoise, OfAMotionModelMayBeSingular) {
   const Config config = Parse(
       "noise:\n"

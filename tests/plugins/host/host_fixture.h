@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// A folder of its own for each test, and no plugins of the user's.
+/// Test with its own folder and without the user's plugins.
 class HostTest : public ::testing::Test {
  protected:
   HostTest() {
@@ -23,7 +23,7 @@ class HostTest : public ::testing::Test {
   }
   ~HostTest() override { unsetenv("ALIDADE_PLUGIN_PATH"); }
 
-  /// A plugin that the build made.
+  /// Returns the path of a plugin from the build.
   static std::filesystem::path Built(const std::string& name) {
     return std::filesystem::path(ALIDADE_TEST_PLUGINS) / (name + ".so");
   }
@@ -34,7 +34,7 @@ class HostTest : public ::testing::Test {
   }
   static Config Parse(const std::string& text) { return Config::FromText(text, "test.yaml"); }
 
-  /// f throws an Error with `code` that says all of `words`.
+  /// Expects that f throws an Error with `code` and with all of `words` in its message.
   template <class F>
   static void ExpectError(ExitCode code, const std::vector<std::string>& words, const F& f) {
     try {
@@ -48,7 +48,7 @@ class HostTest : public ::testing::Test {
       }
     }
   }
-  /// Loading `file` alone is an error.
+  /// Expects an error if `file` alone is loaded.
   static void ExpectRefused(const std::filesystem::path& file, std::vector<std::string> words,
                             ExitCode code = ExitCode::kPlugin) {
     words.push_back(file.string());

@@ -60,7 +60,7 @@ TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
 }
 
 TEST_F(HostTest, StructsOfOneNameInTwoPluginsStayApart) {
-  // Both define `struct Probe` with default visibility, and are open at once.
+  // Both plugins define `struct Probe` with default visibility and are open at the same time.
   const PluginHost two({Built("twin_two")}), three({Built("twin_three")});
   const Config config = Parse("model: probe");
   EXPECT_EQ(Predicted(two.CreateSensor("probe", config.root()), 1.0), 2.0);
@@ -92,12 +92,12 @@ TEST_F(HostTest, LeavesPluginsClosedOfWhichNoNameIsAskedFor) {
   };
   const PluginHost host({}, OnRefusal::kThrow, only);
   EXPECT_TRUE(offers(host, "probe"));
-  EXPECT_TRUE(offers(host, "later_sensor"));  // its file lists no names
+  EXPECT_TRUE(offers(host, "later_sensor"));  // this plugin lists no names
   EXPECT_FALSE(offers(host, "range_rate"));
   EXPECT_FALSE(offers(host, "constant"));
   EXPECT_TRUE(offers(host.WithAllPlugins(), "range_rate"));
   EXPECT_TRUE(offers(host.WithAllPlugins(), "constant"));
-  // What is given is opened whole, and an error tells of all that there is.
+  // Explicitly given plugins are opened completely. An error considers the models of all plugins.
   EXPECT_TRUE(offers(PluginHost({folder_ / "path"}, OnRefusal::kThrow, only), "range_rate"));
   const Config config = Parse("model: rate");
   ExpectError(ExitCode::kPlugin, {"no plugin offers the sensor 'range_rat'", "'range_rate'?"},
@@ -356,7 +356,7 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
                            "default_beyond", "later_flag", "reserved_member", "empty_range",
                            "many_choices", "half", "huge", "outside", "text_as_number"}) {
     const Config config = Parse(std::string("{model: ") + name + '}');
-    // A parameter in the config is read by the same declaration.
+    // The same declaration reads a parameter that the config contains.
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");
     for (const Config* one : {&config, &given}) {
       ExpectError(ExitCode::kPlugin,

@@ -6,8 +6,8 @@
 
 #include "alidade/model/plugin.h"
 
-/// One source for every compiler and set of flags of the build matrix: transcendental functions,
-/// quaternions, fixed and heap-allocated Eigen matrices, the standard library.
+/// One source for every compiler and set of flags of the build matrix. It uses transcendental
+/// functions, quaternions, fixed and heap-allocated Eigen matrices, and the standard library.
 namespace {
 
 using alidade::Quantity;

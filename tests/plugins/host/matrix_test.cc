@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-// -march=x86-64-v3 contracts a b + c to one rounding, libm is the same: a few ulp per operation.
+// -march=x86-64-v3 rounds a b + c once; libm is the same: a few ulp for each operation.
 constexpr double kRelative = 1e-12;
 constexpr int kPoints = 100;
 
@@ -48,7 +48,7 @@ void EvaluateMotion(const SharedMotion& motion, const std::vector<double>& x,
   out.insert(out.end(), l, l + 9);
 }
 
-/// Everything both models compute, at fixed random points.
+/// Returns all results of both models at fixed random points.
 std::vector<double> Evaluate(const std::filesystem::path& plugin) {
   const PluginHost host({plugin});
   const Config config = Config::FromText("{gain: 1.7, tau_s: 0.6}", "matrix");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Parameters that sensors and source share: the maps `camera` and `landmarks` at the root.
+// Parameters that sensors and the source share: the maps `camera` and `landmarks` at the root.
 #include "alidade/experiment/source_plugin.h"
 #include "alidade/testing/jacobians.h"
 #include "host_fixture.h"
@@ -64,20 +64,20 @@ TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {
     });
   };
   const std::string sensors = "sensors: {pixels: {sigma_px: 1}}\n";
-  // missing in both: the map at the root, where it is usual
+  // missing in both maps: the error names the map at the root, the usual one
   refused({"test.yaml:2:1 camera.fy: missing; model 'inverse_depth_feature' needs it (px, > 0"},
           sensors + "camera: {width: 640, height: 480, fx: 500, cx: 320, cy: 240}");
   refused({"camera.width: missing; model 'inverse_depth_feature' needs it"}, sensors);
   refused({"test.yaml:2:45 camera.fx: '-5'", "> 0"},
           sensors + "camera: {width: 640, height: 480,       fx: -5, fy: 5, cx: 1, cy: 1}");
-  // unknown, also one that another lens would have
+  // unknown, or a key of another lens
   refused({"test.yaml:2:81 camera.fz: unknown key", "did you mean 'fx'?"},
           sensors + kCamera.substr(0, kCamera.size() - 2) + ",           fz: 3}");
   refused({"camera.k1: unknown key"}, sensors + kCamera.substr(0, kCamera.size() - 2) + ", k1: 3}");
   refused({"landmarks.representation: 'xzy'", "one of inverse_depth, anchored, xyz",
            "did you mean 'xyz'?"},
           sensors + kCamera + "landmarks: {representation: xzy}");
-  // in the entry
+  // in the sensor entry
   refused({"sensors.pixels.camera.fx: '-5'"},
           kCamera + "sensors: {pixels: {sigma_px: 1, camera: {fx: -5}}}");
   refused({"sensors.pixels.camera.fz: unknown key"},

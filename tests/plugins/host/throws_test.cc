@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 58: exceptions of plugins that are written against the C header, which forbids them.
+// FAULTS 58: plugins written against the C header throw, which the header forbids.
 #include "alidade/io/log.h"
 #include "alidade/plugin/create.h"
 #include "host_fixture.h"
@@ -16,7 +16,7 @@ class ThrowsTest : public HostTest {
   SharedMotion Motion(const char* name) {
     return host_.CreateMotion(name, Parse("model: any").root());
   }
-  /// `Predict of model 'NAME' of plugin FILE threw: the dog ate it`
+  /// Returns `Predict of model 'NAME' of plugin FILE threw: the dog ate it`.
   std::string Words(const char* call, const char* name, const char* what = "the dog ate it") {
     return std::string(call) + " of model '" + name + "' of plugin " +
            std::filesystem::canonical(Built("raw_throws")).string() + " threw: " + what;

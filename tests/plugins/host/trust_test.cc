@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr uid_t kStranger = 54321;
 constexpr std::size_t npos = std::string::npos;
 
-/// What someone else could have written is not opened.
+/// A plugin that another user could have written is not opened.
 // FAULTS 70
 class TrustTest : public HostTest {
  protected:
@@ -39,7 +39,8 @@ TEST_F(TrustTest, AFileThatOthersCanWrite) {
 
 TEST_F(TrustTest, AFileThatAGroupCanWrite) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can give files to another group";
-  const passwd* const user = getpwnam("www-data");  // has a group of its own, as users of Ubuntu do
+  // this user has its own group, as users of Ubuntu do
+  const passwd* const user = getpwnam("www-data");
   if (user == nullptr) GTEST_SKIP() << "no such user";
   const uid_t id = user->pw_uid;
   const gid_t own = user->pw_gid;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every model that is shipped or built for the tests under `source: {type: models}`, in the
-// problems of tests/plugins/models/consistent. Each is linear, or so accurate that it is as good as
-// linear, as it says: NEES and NIS of `ekf`, whose models are the truth's, are chi-square. Each
-// other estimator has another h, f or noise than the truth, and is seen.
+// Runs every shipped model and every test model with `source: {type: models}`, in the problems of
+// tests/plugins/models/consistent. Each problem is linear, or linear to the accuracy that its
+// comment states. NEES and NIS of `ekf`, which has the true models, are chi-square. Each other
+// estimator has a wrong h, f or noise, and the test detects it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ constexpr int kRuns = testing::kSanitized ? 10 : 200, kFirstSeed = 1;
 constexpr const char* kProblems = ALIDADE_SOURCE_DIR "/tests/plugins/models/consistent";
 constexpr const char* kShippedPlugins = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
 
-/// The shipped plugins, and those of the tests that are not spoiled on purpose.
+/// Returns the shipped plugins and those test plugins that are not deliberately faulty.
 const PluginHost& AllModels() {
   const auto places = [] {
     std::vector<fs::path> paths{kShippedPlugins};
@@ -46,7 +46,7 @@ const PluginHost& AllModels() {
   return host;
 }
 
-/// A sum of e' P^-1 e over independent e ~ N(0, P) of `dof` elements in all.
+/// A sum of e' P^-1 e over independent e ~ N(0, P) with `dof` elements in total.
 struct ChiSquare {
   double sum = 0.0, dof = 0.0;
 
@@ -54,7 +54,7 @@ struct ChiSquare {
     sum += square;
     dof += elements;
   }
-  /// Where sum / dof lies with that probability.
+  /// Returns the interval that contains sum / dof with this probability.
   Interval Bounds(double probability) const {
     const double tail = 0.5 * (1.0 - probability);
     return {ChiSquareQuantile(tail, dof) / dof, ChiSquareQuantile(1.0 - tail, dof) / dof};
@@ -69,9 +69,9 @@ void PrintTo(const ChiSquare& x, std::ostream* out) {
   *out << x.sum / x.dof << ", 99 % in [" << bounds.low << ", " << bounds.high << "]";
 }
 
-/// NEES and NIS of each estimator over many runs. Each sum is over what is independent: the errors
-/// of the last frame of each run, of all blocks jointly and of a landmark; all innovations of a
-/// sensor, which are white over frames and, as each is an update of its own, within one.
+/// NEES and NIS of each estimator over many runs. Each sum has independent terms: the errors of the
+/// last frame of each run, of all blocks jointly and of a landmark; and all innovations of a
+/// sensor. Innovations are white over frames, and within a frame because each is a separate update.
 class Tally : public RunObserver {
  public:
   using Sums = std::map<std::string, ChiSquare>;
@@ -96,7 +96,8 @@ class Tally : public RunObserver {
     if (frames_ < experiment_->source->size()) return;
     AddState(frame, state, sums["NEES"]);
     const std::vector<LandmarkEstimate> landmarks = named.estimator->landmarks();
-    if (landmarks.empty() || landmarks[0].covariance.isZero()) return;  // known exactly
+    // such a landmark is known exactly
+    if (landmarks.empty() || landmarks[0].covariance.isZero()) return;
     AddLandmark(landmarks.front(), sums["NEES of the first landmark"]);
     AddLandmark(landmarks.back(), sums["NEES of the last landmark"]);
   }
@@ -167,8 +168,8 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
       for (const auto& [what, sum] : sums) {
         EXPECT_TRUE(sum.IsWithin(0.99)) << what << ": " << ::testing::PrintToString(sum);
       }
-    } else if (!testing::kSanitized) {  // in few runs it is not
-      // Chance alone does that once in 1e9 runs of this test.
+    } else if (!testing::kSanitized) {  // few runs do not suffice
+      // By chance this happens once in 1e9 runs of this test.
       const auto far = [](const auto& one) { return !one.second.IsWithin(1.0 - 1e-9); };
       EXPECT_TRUE(std::ranges::any_of(sums, far)) << name << " is not seen";
     }
@@ -178,7 +179,7 @@ TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
 INSTANTIATE_TEST_SUITE_P(Models, ModelsProblem, ::testing::ValuesIn(Problems()),
                          [](const auto& problem) { return problem.param; });
 
-/// The value at `dotted.key` below the map, where there is one.
+/// Returns the value at `dotted.key` below the map, if it exists.
 std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   const std::size_t dot = key.find('.');
   const auto child = map.Find(key.substr(0, dot));
@@ -187,12 +188,12 @@ std::optional<std::string> TextAt(const Node& map, const std::string& key) {
   return child->is_map() ? TextAt(*child, key.substr(dot + 1)) : std::nullopt;
 }
 
-/// `scale_2d`, `scale_2d with noise_model: constant`: a model alone, or with one of its choices.
+/// Returns the name of a model with one of its choices: `scale_2d with noise_model: constant`.
 std::string With(const PluginEntry& model, const ParamInfo& param, const std::string& choice) {
   return model.name + " with " + param.key + ": " + choice;
 }
 
-/// The choices of a model, but for the lens of a camera, which is not its own.
+/// Returns the choices of a model, except for the lens of the camera, which all models share.
 std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
   std::vector<ParamInfo> choices = ModelSchema(model);
   std::erase_if(choices, [](const ParamInfo& param) {
@@ -201,7 +202,7 @@ std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
   return choices;
 }
 
-/// The models of a problem, and what it chooses of them.
+/// Returns the models of a problem with the choices that it uses.
 std::set<std::string> UsedBy(const Config& config) {
   std::set<std::string> used;
   for (const char* kind : {"state", "sensors"}) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A whole R and a whole Q by config, of the simulator and the filters: a Kalman filter written out
-// here does the same, and NIS and NEES are 1.
+// Full matrices R and Q from the config, in the simulator and in the filters. The filters equal a
+// Kalman filter calculated here, and NIS and NEES are 1.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -18,7 +18,7 @@
 namespace alidade {
 namespace {
 
-/// A point in a plane, whose acceleration and measured position have correlated errors.
+/// A point in a plane with correlated errors of its acceleration and of its measured position.
 const std::string kProblem = R"(alidade: 1
 state:
   body:
@@ -61,7 +61,7 @@ const PluginHost& Models() {
   return host;
 }
 
-/// The Kalman filter of the problem. The attitude is known: what is measured of it is noise alone,
+/// The Kalman filter of the problem. The attitude is known, so its measurement contains only noise,
 /// which is correlated with that of the position.
 struct Kalman {
   Vector6 x{0, 0, 0, 1, 0, 0};
@@ -130,8 +130,8 @@ TEST(GivenNoiseRuns, EveryFilterIsTheKalmanFilter) {
   }
 }
 
-/// The mean of a metric over seeds; `true_r`: of the measurements that are drawn, "": that of the
-/// filter.
+/// Returns the mean of a metric over seeds. `true_r` is the R of the simulated measurements; "":
+/// that of the filter.
 double MeanOf(const std::string& metric, const std::string& true_r = "") {
   const int runs = testing::kSanitized ? 2 : 50;
   double sum = 0.0;
@@ -149,11 +149,12 @@ double MeanOf(const std::string& metric, const std::string& true_r = "") {
   return sum / runs;
 }
 
-// NIS per degree of freedom: 50 runs of 41 measurements of 6 have a sd of sqrt(2 / 12300) = 0.013.
-// Of NEES at most 50 runs of 6 independent: 0.08; it correlates over time within a run.
+// NIS per degree of freedom: 50 runs of 41 measurements with 6 elements give a sd of sqrt(2 /
+// 12300) = 0.013. NEES has at most 50 runs of 6 independent elements, 0.08, as it is correlated
+// over time within a run.
 TEST(GivenNoiseRuns, TheSimulatorDrawsWhatTheFilterAssumes) {
   const double nis = MeanOf("nis.mean:poses"), nees = MeanOf("nees.mean:body");
-  // The same variances without the correlations that the filter believes in.
+  // The same variances without the correlations that the filter assumes.
   const double other =
       MeanOf("nis.mean:poses",
              "[[0.25, 0, 0, 0, 0, 0], [0, 0.36, 0, 0, 0, 0], [0, 0, 0.04, 0, 0, 0], "

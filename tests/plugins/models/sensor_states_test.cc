@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What a sensor brings besides its measurement: states of its own, numbers that are known with it,
-// several parts. From a config, through the simulator and every estimator.
+// Sensors with their own states, known numbers or several parts: from a config, in the simulator
+// and in every estimator.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ const PluginHost& TheHost() {
   return host;
 }
 
-/// A receiver that drifts among six satellites. CLOCK: who has the clock.
+/// A receiver that drifts among six satellites. CLOCK: the owner of the clock.
 const std::string kReceiver =
     "alidade: 1\n"
     "state:\n"
@@ -67,7 +67,7 @@ RunResult RunOf(const std::string& text, int seed = 1) {
   return run;
 }
 
-/// Metrics of the receiver, which both problems name alike.
+/// Expects equal metrics of the receiver, which both problems give the same name.
 void ExpectSameReceiver(const RunResult& a, const RunResult& b, double relative) {
   ASSERT_EQ(a.estimators.size(), b.estimators.size());
   int compared = 0;
@@ -133,11 +133,11 @@ TEST(SensorStates, CanBeConsidered) {
                    b.estimators[0].metrics.at("rmse:receiver.position"));
 }
 
-/// Mean over seeds of a metric of each estimator.
+/// Returns the mean over seeds of a metric for each estimator.
 std::map<std::string, double> MeansOf(const std::string& text, const std::string& metric,
                                       int runs) {
   std::map<std::string, double> means;
-  if (testing::kSanitized) {  // once is enough to see that it is sound
+  if (testing::kSanitized) {  // one run shows that no sanitizer reports an error
     RunOf(text);
     return means;
   }
@@ -149,13 +149,13 @@ std::map<std::string, double> MeansOf(const std::string& text, const std::string
   return means;
 }
 
-// Six degrees of freedom that live as long as the run, and the clock: sd of the mean over 40 runs
-// is at most 0.1.
+// Six degrees of freedom that are correlated over the run, and the clock: the sd of the mean over
+// 40 runs is at most 0.1.
 TEST(SensorStates, AFilterThatOwnsItsClockIsConsistent) {
   for (const auto& [name, nees] : MeansOf(Filled("", "", ""), "nees.mean:receiver", 40)) {
     EXPECT_NEAR(nees, 1.0, 0.25) << name;
   }
-  // A bias that returns to its mean within the run, so that its variance is seen.
+  // A bias that returns to its mean within the run, so its variance matters.
   const std::string markov =
       Filled("", "",
              ", initial: {clock_bias: {mean: 0, sigma: 8}}, dynamics: {clock_bias: {gauss_markov: "
@@ -165,7 +165,7 @@ TEST(SensorStates, AFilterThatOwnsItsClockIsConsistent) {
   }
 }
 
-// Stationary where it starts as it goes on: the variance of many draws at the end.
+// The process is stationary from the start: compares the variance of many draws at the end.
 TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
   const Config config =
       testing::Read(Filled("", "",
@@ -218,7 +218,7 @@ TEST(SensorStates, AFilterOfPosesIsConsistent) {
   }
 }
 
-/// Two sensors of a target, of which the second one stamps what it saw up to 50 ms before or after.
+/// Two sensors of a target. The timestamps of the second one are off by up to 50 ms.
 const std::string kLate =
     "alidade: 1\n"
     "state:\n"
@@ -240,7 +240,8 @@ std::string Late(const std::string& offset, const std::string& truth = "") {
   return text.replace(text.find("TRUTH"), 5, truth);
 }
 
-// One degree of freedom a run, and two that live a second: sd of the means 0.14 and 0.06.
+// One degree of freedom a run, and two that are correlated over a second: sd of the means 0.14 and
+// 0.06.
 TEST(SensorStates, ATimeOffsetIsEstimatedConsistently) {
   const std::string text = Late("{mean: 0, sigma: 0.05}");
   for (const auto& [name, nees] : MeansOf(text, "nees.mean:right", 100)) {
@@ -260,8 +261,8 @@ TEST(SensorStates, ATimeOffsetOf20MsIsFound) {
   }
 }
 
-// A constant one is the same as an estimated one that is known exactly; to the spread of sigma
-// points, which goes by the number of states.
+// A constant offset equals an estimated one that is known exactly, except for the spread of sigma
+// points, which depends on the number of states.
 TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
@@ -276,7 +277,7 @@ TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   EXPECT_GT(ignored.estimators[0].metrics.at("nees.mean:target"), 1.5) << "50 ms matter";
 }
 
-// As `explain` shows them.
+// The names that `explain` prints.
 TEST(SensorStates, AreMovedByAModelThatIsNamedAfterItsDynamics) {
   const auto name = [](const std::string& dynamics) {
     const Experiment experiment = BuildExperiment(

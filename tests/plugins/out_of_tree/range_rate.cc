@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/model/plugin.h"
 
-/// Range rate of a point, as a Doppler radar at the origin measures it: all of a third party's
-/// sensor in one file.
+/// Range rate of a point, measured by a Doppler radar at the origin: a third party's sensor in one
+/// file.
 ///
 ///   model      z = p . v / |p| + n,   n ~ N(0, sigma^2)
 ///

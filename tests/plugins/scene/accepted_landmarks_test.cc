@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landmarks of an estimator that uses what a filter before it accepted.
+// Landmarks of an estimator that uses the measurements accepted by an earlier filter.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// When each landmark was initialised, by estimator.
+/// Records when each landmark was initialised, by estimator.
 class Entries : public RunObserver {
  public:
   void OnEstimate(int estimator, const SourceFrame& frame, const State&,
@@ -25,7 +25,7 @@ class Entries : public RunObserver {
   std::map<int, std::map<std::int64_t, Timestamp>> entered;
 };
 
-// The ekf counts to `min_observations`; what it then passes on has waited.
+// The ekf counts up to `min_observations`; the landmarks that it passes on have already waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :

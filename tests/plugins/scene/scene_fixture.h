@@ -21,7 +21,7 @@ inline const std::string kSweep =
 inline const std::string kPoints =
     "points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}";
 
-/// `keys` are those of `source`, in braces.
+/// A scene; `keys` are those of `source`, in braces.
 struct MadeScene {
   Config config;
   std::unique_ptr<Source> scene;

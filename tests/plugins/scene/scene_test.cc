@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the camera sees of the points, and what the config may get wrong.
+// The camera's measurements of the points, and errors in the config.
 #include <Eigen/Core>
 #include <cmath>
 #include <set>
@@ -38,7 +38,8 @@ TEST(Scene, SeesAPointWhereThePinholePutsIt) {
 }
 
 TEST(Scene, SeesNothingBehindOrBesideTheImage) {
-  // Of the six only 1 and 4 are ahead and on the image: half the width is 320.5 px, 1.221 m at 2 m.
+  // Of the six points, only 1 and 4 are ahead and in the image: half the width is 320.5 px, 1.221 m
+  // at 2 m.
   const auto frames = SceneFrames(
       "max_frames: 1, sigma_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
       "[-1.21, 0, 2], [0, 0.93, 2]]}, " +
@@ -124,7 +125,7 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
       EXPECT_FALSE(known.contains(m.landmark));
       continue;
     }
-    // Depth along the axis, 0.5 % of it the standard deviation.
+    // The depth along the axis, with a standard deviation of 0.5 % of it.
     const auto p = *made.scene->TrueLandmark(m.landmark);
     const Vector3d offset = Vector3d(p.data()) - Vector3d(frames[0].truth[0].data());
     Vector3d h;
@@ -139,7 +140,7 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
   for (const std::int64_t id : known) EXPECT_TRUE(Ids(frames[1]).contains(id));
 }
 
-// There and back along x in 9 frames, turned by 90 degrees about y on the way.
+// A motion forth and back along x in 9 frames, with a rotation of 90 degrees about y.
 TEST(Scene, KeyframesTellTheWayToOneAnother) {
   const std::string keys =
       "max_frames: 9, rate_hz: 1, points: {list: [[0, 0, 5], [0, 0, 6]]}, trajectory: {keyframes: "
@@ -158,14 +159,14 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
     }
     return found;
   };
-  // The frame itself is the landmark behind the two points: without noise, and so said.
+  // The keyframe of the frame itself is the landmark after the two points, measured without noise.
   const std::vector<Measurement> first = of_keyframes(0);
   ASSERT_EQ(first.size(), 1u);
   EXPECT_EQ(first[0].landmark, 2);
   EXPECT_EQ(first[0].values, (std::vector<double>{0, 0, 0, 1, 0, 0, 0}));
   EXPECT_EQ(first[0].covariance, std::vector<double>(36, 0.0));
   EXPECT_TRUE(of_keyframes(1).empty());
-  // At the far end: to the one before, as seen from a camera that looks along the world's x.
+  // At the far end: the previous keyframe, seen by a camera that looks along the world's x.
   const std::vector<Measurement> far = of_keyframes(4);
   ASSERT_EQ(far.size(), 2u);
   EXPECT_EQ(far[0].landmark, 3);
@@ -173,7 +174,7 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
   EXPECT_NEAR(far[0].values[0], 0.0, 1e-12);
   EXPECT_NEAR(far[0].values[2], back, 1e-12);
   EXPECT_TRUE(far[0].covariance.empty());
-  // Back at the start: the one before, the first one, and itself.
+  // Back at the start: the previous keyframe, the first one, and the frame itself.
   const std::vector<Measurement> closed = of_keyframes(8);
   ASSERT_EQ(closed.size(), 3u);
   EXPECT_EQ(closed[1].landmark, 2);
@@ -183,14 +184,14 @@ TEST(Scene, KeyframesTellTheWayToOneAnother) {
 }
 
 TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
-  // Point 0 comes into view from the right when two others are being seen already.
+  // Point 0 comes into view from the right when two others are already visible.
   const auto frames = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, "
       "4], "
       "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
       "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
   for (const SourceFrame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
-  // The next to go makes room.
+  // The next point that leaves makes room.
   const auto all = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, "
       "4], "
@@ -219,7 +220,7 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
     EXPECT_EQ(std::min(low.minCoeff(), high.minCoeff()), 0.0);
     for (int i = 0; i < 3; ++i) on[i] += low[i] == 0.0, on[3 + i] += high[i] == 0.0;
   }
-  // Faces of 10, 24 and 15 m^2, twice each; 4 sigma of a binomial.
+  // Faces of 10, 24 and 15 m^2, two of each; 4 sigma of a binomial distribution.
   const double share[3] = {10.0 / 98, 24.0 / 98, 15.0 / 98};
   for (int i = 0; i < 6; ++i) {
     const double p = share[i % 3];

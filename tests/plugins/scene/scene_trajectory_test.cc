@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Curves through way-points and key frames, and the paths made of them.
+// Curves through way-points and key frames, and the trajectories that use them.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // uneven
+const std::vector<double> kTimes{0.0, 0.7, 1.0, 2.5};  // at unequal intervals
 
 Quaternion Turned(double x, double y, double z) {
   const double d[3] = {x, y, z};
@@ -22,7 +22,7 @@ Quaternion Turned(double x, double y, double z) {
   return q;
 }
 
-/// Log(a^-1 b)
+/// Returns Log(a^-1 b).
 Vector3d Difference(const Quaternion& b, const Quaternion& a) {
   Vector3d d;
   UnitQuaternion::Minus(b.data(), a.data(), d.data());
@@ -42,8 +42,8 @@ TEST(CubicSpline, PassesThroughItsPoints) {
 }
 
 TEST(CubicSpline, SlopeAndCurvatureAreContinuousAndVanishAtTheEnds) {
-  // Differences over h on both sides of each knot: a jump of the slope would show as such, one of
-  // the curvature as h^-1 times the third derivative, below 200 here: 0.02 at h = 1e-4.
+  // Differences over h on both sides of each knot. A jump of the slope would appear directly, a
+  // jump of the curvature divided by h. The third derivative is below 200 here: 0.02 at h = 1e-4.
   const CubicSpline spline(kTimes, Points());
   constexpr double h = 1e-4;
   const auto second = [&](double t) {
@@ -54,7 +54,7 @@ TEST(CubicSpline, SlopeAndCurvatureAreContinuousAndVanishAtTheEnds) {
     const Vector3d right = (spline.At(t + h) - spline.At(t)) / h;
     EXPECT_LT((right - left).norm(), 100.0 * h);
     EXPECT_LT((second(t + 2.0 * h) - second(t - 2.0 * h)).norm(), 0.1);
-    EXPECT_GT(second(t).norm(), 5.0);  // else that says nothing
+    EXPECT_GT(second(t).norm(), 5.0);  // else the next checks would be trivial
   }
   EXPECT_LT(second(0.0 + h).norm(), 0.1);
   EXPECT_LT(second(2.5 - h).norm(), 0.1);
@@ -70,7 +70,7 @@ TEST(CubicSpline, IsTheNaturalSplineOfTheTextbook) {
 TEST(CubicSpline, OfTwoPointsIsALineAndOfOneStandsStill) {
   const CubicSpline line({0, 2}, {{0, 0, 0}, {2, 4, 6}});
   EXPECT_LT((line.At(0.5) - Vector3d(0.5, 1, 1.5)).norm(), 1e-15);
-  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // and goes on
+  EXPECT_LT((line.At(-1.0) - Vector3d(-1, -2, -3)).norm(), 1e-14);  // extrapolates linearly
   EXPECT_EQ(CubicSpline({0}, {{1, 2, 3}}).At(7.0), Vector3d(1, 2, 3));
 }
 
@@ -124,21 +124,21 @@ Vector3d Rotated(const std::vector<double>& q, const Vector3d& x) {
 TEST(ScenePath, LooksAtItsTargetWithTheHorizonLevel) {
   const auto frames = SceneFrames("max_frames: 31, " + kPoints + ", " + kSweep);
   const std::vector<double> q = frames.front().truth[1];
-  // From (-0.5, 0, 0) to (0, 0, 4).
+  // The direction from (-0.5, 0, 0) to (0, 0, 4).
   EXPECT_LT((Rotated(q, Vector3d::UnitZ()) - Vector3d(0.5, 0, 4).normalized()).norm(), 1e-14);
   for (const SourceFrame& frame : frames) {
     const Vector3d right = Rotated(frame.truth[1], Vector3d::UnitX());
     const Vector3d down = Rotated(frame.truth[1], Vector3d::UnitY());
     EXPECT_NEAR(right.y(), 0.0, 1e-14);
     EXPECT_GT(right.x(), 0.9);
-    EXPECT_GT(down.y(), 0.9);  // y is down in the world, as in the camera
+    EXPECT_GT(down.y(), 0.9);  // y points down in the world, as in the camera
   }
   const auto& last = frames.back().truth;
   EXPECT_LT((Vector3d(last[0].data()) - Vector3d(0.5, 0.1, 0.2)).norm(), 1e-14);
 }
 
 TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
-  // 90 degrees about y: ahead is x.
+  // Rotated by 90 degrees about y the camera looks along x.
   const auto ahead = [](const std::string& orientation) {
     const auto frames =
         SceneFrames("max_frames: 1, " + kPoints +
@@ -151,7 +151,7 @@ TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
                            "quaternion: {w: 0.70710678, x: 0, y: 0.70710678, z: 0}"}) {
     EXPECT_LT((ahead(form) - Vector3d::UnitX()).norm(), 1e-7) << form;
   }
-  // Rz(90) Ry(0) Rx(90): z -> -y by x, then -y -> x by z.
+  // Rz(90) Ry(0) Rx(90): the x rotation turns z to -y, the z rotation turns -y to x.
   EXPECT_LT((ahead("euler_deg: [90, 0, 90]") - Vector3d::UnitX()).norm(), 1e-15);
 }
 
@@ -216,7 +216,8 @@ TEST(ScenePath, OdometryLeadsAlongTheTruth) {
   const auto& last = frames.back().truth;
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(r[i], last[0][i], 1e-12);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(q[i], last[1][i], 1e-12);
-  for (const Measurement& m : frames.back().measurements) EXPECT_NE(m.stream, 1);  // no way on
+  // the last frame has no odometry
+  for (const Measurement& m : frames.back().measurements) EXPECT_NE(m.stream, 1);
 }
 
 }  // namespace

@@ -6,7 +6,7 @@ namespace {
 
 class CalibrationFileForms : public testing::TracksTest {
  protected:
-  /// What a model would read of the calibration, or the error.
+  /// Returns a model's value of a calibration key, or the error.
   std::string Get(const std::string& text, const std::string& key) {
     Write("tracks.csv", "0,1,0,5\n0,1,1,6\n");
     Write("calibration.yaml", text);

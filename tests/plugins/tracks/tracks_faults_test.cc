@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Files of tracks with a fault, named by its number in the list of faults.
+// Track files with a fault. The test names contain the number of the fault.
 #include "tracks_fixture.h"
 
 namespace alidade::testing {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What is read: forms, times, what lies beside, pipes, real data.
+// Reading of tracks: representations, times, the files next to the tracks, pipes, real data.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -81,7 +81,8 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
       [&] { ids(", start_frame: 4"); });
 }
 
-// The camera of frame 1 stands at (1, 2, 3), turned by 90 degrees about z: its x is the file's y.
+// The camera of frame 1 is at (1, 2, 3), rotated by 90 degrees about z: its x axis is the file's y
+// axis.
 TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
   Write("tracks.csv", "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n2,1,0,4\n2,1,1,4\n");
   Write("truth.tum", "0.1 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n0.2 1 7 3.5 0 0 1 0\n");
@@ -177,7 +178,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
   });
   const auto source = Open();
   SourceFrame frame;
-  EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
+  EXPECT_TRUE(source->Next(frame));  // returns although the pipe is still open
   EXPECT_EQ(frame.measurements.at(0).values, (Values{1, 2}));
   writer.join();
   EXPECT_EQ(write(descriptor, "1,3,1,6\n", 8), 8);
@@ -232,7 +233,7 @@ TEST_F(TracksTest, ReadsRealTracks) {
     EXPECT_EQ(frame.truth.at(0).size(), 3u);
     for (const Measurement& m : frame.measurements) observations += m.stream == 0;
   }
-  EXPECT_EQ(observations, (42005u - 1) / 4);  // rows below the header, four to an observation
+  EXPECT_EQ(observations, (42005u - 1) / 4);  // rows below the header, four for each observation
   EXPECT_EQ(frames[0].measurements[0].values[0], 343.4486);
   const Measurement& odometry = frames[0].measurements.back();
   EXPECT_NEAR(odometry.values[0], 0.5 * (13.172717 + 13.129880), 1e-12);

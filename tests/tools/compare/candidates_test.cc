@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons of runs made by hand: which estimator is compared with which, and where data differ.
+// Comparisons of constructed runs: the reference of each estimator, and runs with different data.
 #include "alidade/compare/candidates.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ EstimatorKind KindOf(const std::string& type) {
   return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
 }
 
-/// An estimator of a block p.x that is off the truth by `error`, nought, at three timestamps.
+/// An estimator of a block p.x with the truth 0 and the error `error` at three timestamps.
 Candidate Entry(const std::string& name, const std::string& type, bool smoothed, double error,
                 const std::vector<std::string>& sensors = {"stereo"}) {
   Candidate entry;
@@ -77,14 +77,15 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
 }
 
-// Only where no batch of the same problem served does one with other overrides, a robust loss, say.
+// A batch with other overrides, such as a robust loss, is a reference only if no batch of the same
+// problem is usable.
 TEST(CompareRuns, OverridesMakeAnotherSystem) {
   Candidate other = Entry("other", "ceres_batch", true, 8.0);
   other.result.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
   ComparedRun run =
       RunOf({other, Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "batch");
-  // Whoever names a reference gets it.
+  // An explicitly named reference is always used.
   EXPECT_EQ(Find(CompareRuns({run}, {"other", "", true}), "ekf").final_reference, "other");
   run.estimators[2].result.failed = true;
   EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "other");
@@ -107,7 +108,7 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
             "no reference: estimator 'failed' failed, the comparison with it is withheld");
 }
 
-// The filter and the batch then agree, about what both were told before.
+// The filter and the batch then agree, as both have only the prior.
 TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
   ComparedRun run =
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
@@ -160,7 +161,7 @@ TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
   EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).decomposed, "ekf");
 }
 
-/// With a map of three landmarks at distance `error` of the true ones, along x.
+/// Adds a map of three landmarks with the error `error` along x.
 Candidate WithMap(Candidate entry, double error) {
   const Eigen::Vector3d places[] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 3}};
   entry.result.landmarks.emplace();
@@ -173,8 +174,8 @@ Candidate WithMap(Candidate entry, double error) {
   return entry;
 }
 
-// With landmarks no batch solves at every frame, but at the last one that of all data is that of
-// the data up to it.
+// With landmarks no batch solves at every frame. At the last frame, the batch of all data equals
+// the batch of the data up to it.
 TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   Candidate ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
   ekf.series.values = {9.0, 9.0, 2.0};
@@ -199,7 +200,7 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   EXPECT_NE(CompareJson(comparison).find("\"at_end\": true"), std::string::npos);
 }
 
-// What the gate kept out is another step's, where both batches are there.
+// If both batches exist, the effect of the gate belongs to another step.
 TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   Candidate accepted = Entry("accepted", "ceres_batch", true, 1.0);
   accepted.result.accepted_by = "ekf";
@@ -213,7 +214,7 @@ TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   EXPECT_FALSE(step.at_end);
 }
 
-/// What is said of two runs whose measurements.csv differ.
+/// Returns the error message for two runs with different measurements.csv.
 std::string Refusal(const std::string& one, const std::string& other) {
   const testing::TemporaryFolder folders[2];
   std::ofstream(folders[0] / "measurements.csv") << one;

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A series of one scalar block and a quaternion, with variances alone.
+/// A series of a scalar block and a quaternion, with variances only.
 internal::Series TwoBlocks() {
   internal::Series series;
   series.blocks = {{"a.x", "m", Geometry::Vector(1)}, {"a.q", "", Geometry::UnitQuaternion()}};
@@ -16,7 +16,7 @@ internal::Series TwoBlocks() {
   return series;
 }
 
-// q and -q are one rotation; distances are taken in the tangent of the reference.
+// q and -q are the same rotation. Distances are those in the reference's tangent space.
 TEST(Series, DistancesAreOfTheTangentAndOfSharedTimestamps) {
   internal::Series series = TwoBlocks(), reference = TwoBlocks();
   series.timestamps = {10, 20, 30};
@@ -42,10 +42,11 @@ TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
   series.covariances = reference.covariances = {1, 1, 1, 1, 0, 1, 1, 1};
   const internal::Distance distance = internal::DistanceBetween(series, reference);
   EXPECT_EQ(distance.rms.at("a.x"), 2.0);
-  EXPECT_FALSE(distance.sigmas.contains("a"));  // one is no number, the other known exactly
+  EXPECT_FALSE(distance.sigmas.contains("a"));  // one value is NaN, the other is known exactly
 }
 
-// What is fixed in both says nothing; what the reference alone fixes has no share in its P.
+// A block that is fixed in both does not count. A block fixed only in the reference has no part in
+// its P.
 TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
   const double nan = std::nan("");
   internal::Series series = TwoBlocks(), reference = TwoBlocks();

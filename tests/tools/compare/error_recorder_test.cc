@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Shows a recorder the estimates of the first estimator.
+/// Passes the estimates of the first estimator to a recorder.
 class ShowsErrors : public RunObserver {
  public:
   explicit ShowsErrors(internal::ErrorRecorder& recorder) : recorder_(recorder) {}
@@ -55,7 +55,8 @@ TEST(ErrorRecorder, HasWhatTheMetricsAreTakenFrom) {
   EXPECT_NEAR(nees, metrics.at("nees.mean:target"), 1e-12);
 }
 
-// 2048 rows are halved at frame 2047, and again at 4094; from then on it is every fourth.
+// 2048 rows are halved at frame 2047 and again at 4094. From then on every fourth frame is
+// recorded.
 TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
   const ErrorSeries all = Follow(1000).series, thinned = Follow(5000).series;
   ASSERT_EQ(thinned.timestamps.size(), 1250u);
@@ -69,7 +70,7 @@ TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
   EXPECT_NEAR(Seconds(thinned.timestamps.back()), 0.033 * 4996, 1e-6);
 }
 
-/// Takes truth for lambda and the rate of depth too.
+/// Adds the truth of lambda and of the depth rate.
 class WithAllTruth : public testing::SwingingTarget {
  public:
   using SwingingTarget::SwingingTarget;
@@ -110,7 +111,7 @@ TEST(ErrorRecorder, HasErrorsByTheirCramerRaoBound) {
     }
     EXPECT_NEAR(series.by_bound.at(series.blocks[i]), sum / 60.0, 1e-12);
   }
-  // The first of them has the prior and one measurement of each sensor.
+  // The first bound uses the prior and one measurement of each sensor.
   const double h = -26.0 / (0.3 * 0.3);
   EXPECT_LT(series.bounds[0], 1.0 / (h * h));
 }

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A run of two estimators, the second one the reference of the first.
+/// A run of two estimators; the second one is the reference of the first.
 Comparison OneRun(double error, bool filter_diverged = false) {
   Comparison one;
   one.decomposed = "ekf";
@@ -31,7 +31,7 @@ Comparison OneRun(double error, bool filter_diverged = false) {
   return one;
 }
 
-// What is lost by a filter that diverged is no figure of the filter.
+// Runs in which a filter diverged do not count in the filter's numbers.
 TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   const Comparison all = Summarise({OneRun(6.0, true), OneRun(1.0), OneRun(2.0)});
   EXPECT_EQ(all.runs, 3);
@@ -48,7 +48,7 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_EQ(all.decomposition[0].values.at("rejected").mean, 1.5);
 }
 
-// That an estimator of one of them failed is told of it.
+// A failed estimator in one of the runs is reported.
 TEST(Summarise, OfSeedsHasTheStatusOfTheSweep) {
   Comparison failed = OneRun(1.0);
   failed.status = RunStatus::kFailed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What an evaluation compares: poses of the same time, after the alignment asked for.
+// The poses that an evaluation compares: equal times, after the requested alignment.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -90,13 +90,13 @@ TEST(Align, RefusesWhatDeterminesNothing) {
 }
 
 TEST(Align, RefusesWhatDeterminesNoScale) {
-  // Of the squares of x and y no one says anything about the other.
+  // The two x coordinates are uncorrelated, so they determine no scale.
   Trajectory reference = Curve(12), estimate = Curve(12);
   for (int i = 0; i < 12; ++i) {
     reference.positions.col(i) << (i % 2 == 0 ? -1.0 : 1.0), 0.0, 0.0;
     estimate.positions.col(i) << (i % 4 < 2 ? -1.0 : 1.0), 0.0, 0.0;
   }
-  for (const double off : {0.0, 0.1}) {  // by 0.1, rounding leaves a scale of 1e-17
+  for (const double off : {0.0, 0.1}) {  // with 0.1, rounding leaves a scale of 1e-17
     estimate.positions.row(0).array() += off;
     for (const Alignment alignment : {Alignment::kSim3, Alignment::kScale}) {
       try {
@@ -124,12 +124,12 @@ Trajectory At(const std::vector<double>& seconds) {
 
 TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
   const Trajectory reference = At({0.0, 1.0, 2.0, 3.0, 4.0});
-  // 0.004 and 0.006 are both nearest to 0; 2.02 is too far; 3.01 just is not.
+  // 0.004 and 0.006 are both nearest to 0; 2.02 is too far away; 3.01 is just close enough.
   const Matches matches = Associate(reference, At({0.004, 0.006, 2.02, 3.01}), 10'000'000, 0);
   EXPECT_EQ(matches.possible, 4);
   EXPECT_EQ(matches.reference, (std::vector<int>{0, 0, 3}));
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 3}));
-  // The shorter one is asked, whichever it is.
+  // The search runs over the shorter trajectory, whichever of the two it is.
   const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
   EXPECT_EQ(other.possible, 2);
   EXPECT_EQ(other.reference, (std::vector<int>{0, 1}));
@@ -137,12 +137,14 @@ TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
 }
 
 TEST(Associate, DuplicatesOfTheShorterAllPairAndOfTheLongerTheFirstDoes) {
-  // The smallest |t - 1| of the longer, at indices 1 and 2, is first met at 1.
+  // The smallest
+  // t - 1
+  // of the longer one occurs at the indices 1 and 2; the first is used.
   const Matches matches =
       Associate(At({0.0, 1.0, 1.0, 2.0, 3.0}), At({1.0, 1.0, 2.0}), 10'000'000, 0);
   EXPECT_EQ(matches.reference, (std::vector<int>{1, 1, 3}));
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2}));
-  // So from above and from below.
+  // The same from above and from below.
   const Trajectory longer = At({0.0, 1.0, 1.0, 2.0, 2.0});
   EXPECT_EQ(Associate(longer, At({0.996, 1.004, 2.004}), 10'000'000, 0).reference,
             (std::vector<int>{1, 1, 3}));
@@ -215,7 +217,7 @@ TEST(Associate, WithoutTimestampsByRow) {
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_THROW(Associate(bare, five, 0, 0), Error);
   EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
-  // KITTI goes by row where either file has no times.
+  // KITTI files are matched by row if either file has no times.
   Trajectory timed = Curve(4);
   timed.format = bare.format = five.format = TrajectoryFormat::kKitti;
   EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);

@@ -20,7 +20,7 @@ using Pairs = std::vector<std::pair<int, int>>;
 constexpr double kPi = 3.14159265358979323846;
 
 TEST(StatisticsOf, AreThoseOfWorkedNumbers) {
-  // mean 4, squares 9 + 1 + 4 + 100, deviations 1 + 9 + 4 + 36
+  // mean 4, squares 9 + 1 + 4 + 100, squared deviations 1 + 9 + 4 + 36
   const ErrorStatistics s = StatisticsOf({3.0, 1.0, 2.0, 10.0});
   EXPECT_DOUBLE_EQ(s.mean, 4.0);
   EXPECT_DOUBLE_EQ(s.median, 2.5);
@@ -60,7 +60,7 @@ TEST(Evaluate, AConstantErrorIsWhatEachRelationSays) {
     EXPECT_NEAR(e.absolute[r].statistics.std, 0.0, 1e-12);
     EXPECT_EQ(e.absolute[r].errors.size(), 20u);
   }
-  EXPECT_NEAR(e.relative[5].statistics.max, 0.0, 1e-12);  // distances are the same
+  EXPECT_NEAR(e.relative[5].statistics.max, 0.0, 1e-12);  // equal distances
 }
 
 TEST(Evaluate, MatricesGiveTheSameRelativeErrors) {
@@ -96,7 +96,7 @@ TEST(Evaluate, MatricesGiveTheSameRelativeErrors) {
 }
 
 TEST(Evaluate, AConstantDriftIsTheRelativeError) {
-  // 2 % too long, and 0.001 rad too much from pose to pose.
+  // 2 % too long, and rotated by 0.001 rad too much from pose to pose.
   const Trajectory reference = Line(101, 0.5);
   Trajectory estimate = Line(101, 0.51);
   for (int i = 0; i <= 100; ++i) {
@@ -108,7 +108,8 @@ TEST(Evaluate, AConstantDriftIsTheRelativeError) {
   EXPECT_EQ(step.pairs.size(), 100u);
   EXPECT_NEAR(step.relative[0].statistics.rmse, 0.01, 1e-12);
   EXPECT_NEAR(step.relative[3].statistics.max, 0.001, 1e-12);
-  options.pairs.delta = 10.0;  // of the estimate's path: the first pose at least that far on is 20
+  // along the estimate's path: pose 20 is the first at least that far away
+  options.pairs.delta = 10.0;
   options.pairs.unit = DeltaUnit::kMetres;
   const Evaluation metres = Evaluate(reference, estimate, options);
   EXPECT_EQ(metres.pairs, (Pairs{{20, 40}, {40, 60}, {60, 80}, {80, 100}}));
@@ -127,7 +128,7 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
-  // Timestamps are exact: 0.3 s are 0.3 s, wherever they begin.
+  // Timestamps are exact: 0.3 s is exactly 0.3 s at any offset.
   EXPECT_EQ(PairsOf(t, {0.3, DeltaUnit::kSeconds}), (Pairs{{0, 3}, {3, 6}, {6, 9}}));
   EXPECT_EQ(PairsOf(t, {0.7, DeltaUnit::kSeconds, true, 0.0}),
             (Pairs{{0, 7}, {1, 8}, {2, 9}, {3, 10}}));
@@ -148,7 +149,7 @@ TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
 TEST(PairsOf, RefusesMorePairsThanAnyoneReads) {
   PairOptions options{0.1, DeltaUnit::kDegrees, true, 1.0};
   EXPECT_EQ(PairsOf(Line(100, 0.0), options).size(), 100u * 99 / 2);
-  constexpr int kPoses = 4480;  // at rest, 4480 * 4479 / 2 > 1e7
+  constexpr int kPoses = 4480;  // at rest, so 4480 * 4479 / 2 > 1e7 pairs
   try {
     PairsOf(Line(kPoses, 0.0), options);
     ADD_FAILURE() << "no error";
@@ -177,7 +178,8 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   Trajectory estimate = reference;
   for (int i = 0; i < 40; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    // In every fourth pose an error of 4 sigma, else of 1, along one axis; the first is known.
+    // The error along one axis is 4 sigma in every fourth pose and 1 sigma in the others. The first
+    // pose is known exactly.
     const double sigmas = i % 4 == 0 ? 4.0 : 1.0;
     Eigen::Matrix3d covariance = Vector3d(0.01, 0.04, 1.0).asDiagonal();
     estimate.positions(1, i) -= 0.2 * sigmas;
@@ -191,7 +193,7 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   ASSERT_TRUE(e.position_nees && e.orientation_nees);
   EXPECT_EQ(e.position_nees->dof, 3);
   EXPECT_EQ(e.position_nees->poses, 39);
-  // 9 of 16 / 3, 30 of 1 / 3; chi2(0.95, 3) = 7.8
+  // 9 values of 16 / 3 and 30 of 1 / 3; chi2(0.95, 3) = 7.8
   EXPECT_NEAR(e.position_nees->mean, (9.0 * 16.0 + 30.0) / 3.0 / 39.0, 1e-9);
   EXPECT_NEAR(e.position_nees->within95, 30.0 / 39.0, 1e-12);
   EXPECT_EQ(e.orientation_nees->poses, 40);
@@ -200,14 +202,14 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
 }
 
 TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
-  // x, y and the heading are uncertain in one pose or more; z, roll and pitch are in none.
+  // x, y and the heading are uncertain in at least one pose; z, roll and pitch in none.
   Trajectory estimate = Curve(10);
   Eigen::Matrix3d position = Eigen::Matrix3d::Zero(), orientation = position;
   position.topLeftCorner<2, 2>() << 0.05, 0.03, 0.03, 0.05;
   orientation(2, 2) = 0.0025;
   estimate.position_covariances.assign(10, position);
   estimate.orientation_covariances.assign(10, orientation);
-  estimate.position_covariances[0].setZero();  // known
+  estimate.position_covariances[0].setZero();  // known exactly
   for (int i = 0; i < 10; ++i) {
     estimate.positions.col(i) -= Vector3d(0.2, -0.2, 7.0);
     estimate.orientations[static_cast<std::size_t>(i)] *=
@@ -273,12 +275,12 @@ TEST(Evaluate, ScaleAndItsDriftAreOfThePath) {
 TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   const testing::TemporaryFolder folder;
   std::string text = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
-  // r / s alternates 1, -1: the products of neighbours are -1.
+  // r / s alternates between 1 and -1, so the products of neighbours are -1.
   for (int i = 0; i < 10; ++i) {
     text += "0,a,range,,accepted,1,1,0,0,2," + std::string(i % 2 == 0 ? "2" : "-2") + "\n";
   }
   text += "0,a,range,,gated,1,100,0,0,2,20\n";
-  // Of two landmarks, each always the same.
+  // Two landmarks, each with constant residuals.
   for (int i = 0; i < 10; ++i) {
     text += "0,b,pixel," + std::to_string(i % 2) + ",accepted,1,6,0,0,1," +
             std::to_string(1 - 2 * (i % 2)) + "\n";
@@ -299,7 +301,7 @@ TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   EXPECT_DOUBLE_EQ(all[1].white_within, 1.96 / 3.0);
   std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";
   EXPECT_THROW(ReadInnovations(folder / "innovations.csv"), Error);
-  // More than there are columns, and more than an int holds.
+  // A dof above the number of columns, and above the range of an int.
   const std::string header = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
   for (const char* dof : {"2", "2147483648", "4294967297", "9223372036854775807"}) {
     std::ofstream(folder / "innovations.csv")

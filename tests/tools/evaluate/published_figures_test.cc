@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// Figures of other programs on trajectories that are public, skipped where ALIDADE_DATA has none.
+/// Results of other programs on public trajectories; skips if ALIDADE_DATA does not have them.
 class PublicFigures : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -32,14 +32,14 @@ class PublicFigures : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-/// With six decimals, as the figures are published.
+/// Returns six decimals, as in the published results.
 std::string Printed(double value) {
   char text[64];
   std::snprintf(text, sizeof text, "%.6f", value);
   return text;
 }
 
-/// n, scale and rmse, m, of the positions.
+/// Expects n, scale and RMSE (m) of the positions.
 void ExpectFigures(const Evaluation& evaluation, std::size_t n, const std::string& scale,
                    const std::string& rmse) {
   EXPECT_EQ(evaluation.absolute[0].errors.size(), n);

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using testing::Curve;
 
-/// The curve, moved by 5 cm and measured against itself.
+/// Returns the evaluation of the curve, shifted by 5 cm, against the curve.
 Evaluation Moved(Alignment alignment, const std::string& label, EvaluateOptions options = {}) {
   Trajectory estimate = Curve(30);
   estimate.positions.row(0).array() += 0.05;

@@ -19,13 +19,13 @@ class TrajectoryFiles : public ::testing::Test {
     fs::create_directories((folder_ / name).parent_path());
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
-  /// Of a file of that text.
+  /// Reads a file with this text.
   Trajectory Read(const std::string& text,
                   TrajectoryFormat format = TrajectoryFormat::kDetect) const {
     Write("poses.txt", text);
     return ReadTrajectory(folder_ / "poses.txt", format);
   }
-  /// What Read says, behind the folder; "" where it says nothing.
+  /// Returns the error message of Read after the folder's path, or "" without an error.
   std::string Refusal(const std::string& text,
                       TrajectoryFormat format = TrajectoryFormat::kDetect) const {
     try {
@@ -36,7 +36,7 @@ class TrajectoryFiles : public ::testing::Test {
     }
     return {};
   }
-  /// The warnings of a file of that text, one below the other, behind the folder.
+  /// Returns the warnings for a file with this text, one a line, after the folder's path.
   std::string WarningsOf(const std::string& text) const {
     std::string all;
     for (const std::string& warning : Read(text).warnings) {
@@ -82,7 +82,7 @@ TEST_F(TrajectoryFiles, TwentyColumnsAreTumWithCovariancesRotationFirst) {
 }
 
 TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
-  // A quarter turn about z.
+  // A rotation of 90 degrees about z.
   const std::string rows = "0 -1 0 7 1 0 0 8 0 0 1 9\n1 0 0 0 0 1 0 0 0 0 1 0\n";
   const Trajectory bare = Read(rows);
   EXPECT_EQ(bare.format, TrajectoryFormat::kKitti);
@@ -97,7 +97,7 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   Write("poses_times.txt", "5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
   EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
-  // A times.txt that others share says how this file comes to its own.
+  // The error for a times.txt that several files share describes how to give this file its own.
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
   EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
@@ -205,7 +205,7 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   EXPECT_EQ(Refusal("1e20" + pose),
             "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as in TUM");
   EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);
-  // No difference of two timestamps may be beyond either.
+  // Differences of timestamps must not overflow either.
   EXPECT_EQ(
       Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose + "9000000000" +
               pose),
@@ -227,7 +227,7 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
   EXPECT_EQ(
       refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
       "poses.txt:2: the covariance of the orientation" + none + "1e-09; expected a covariance");
-  // Singular is none of it, nor is what six digits make of it.
+  // A singular covariance is valid, and so is one rounded to six digits.
   EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }
@@ -250,7 +250,7 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
             "each timestamp once; all poses are kept\n");
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).timestamps.size(), 4u);
-  // Where poses are sorted, those of one timestamp stay as they were.
+  // Sorting keeps the order of poses with equal timestamps.
   EXPECT_EQ(
       WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
       "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their timestamps; "
@@ -269,7 +269,8 @@ TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
             "poses.txt:1 qw: the first pose is the identity if its quaternion is written w last; "
             "expected qw qx qy qz, as in EuRoC\n");
   EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
-  EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");  // half a turn somewhere else
+  // a rotation of 180 degrees at another position
+  EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");
 }
 
 TEST_F(TrajectoryFiles, AFolderIsARunAnEstimatorOrASequenceOfEuroc) {

@@ -14,7 +14,7 @@ using testing::Curve;
 using testing::Inverse;
 using testing::Turn;
 
-/// The warnings, one below the other.
+/// Returns the warnings, one a line.
 std::string WarningsOf(const Trajectory& reference, const Trajectory& estimate,
                        const EvaluateOptions& options = {}) {
   std::string all;
@@ -30,7 +30,7 @@ EvaluateOptions Aligned(Alignment alignment) {
   return options;
 }
 
-/// With errors of about 1 cm and 0.6 degrees, as an estimate has them.
+/// Adds errors of about 1 cm and 0.6 degrees, typical for an estimate.
 Trajectory Estimate(Trajectory t) {
   for (int i = 0; i < t.size(); ++i) {
     t.positions.col(i) += 0.01 * Vector3d(std::sin(5.0 * i), std::cos(3.0 * i), std::sin(7.0 * i));
@@ -105,7 +105,7 @@ TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
   Trajectory estimate = Estimate(Curve(60));
   for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(1.5);
   const std::string warnings = WarningsOf(Curve(60), estimate);
-  // 1.5 rad, to the wobble
+  // 1.5 rad, up to the oscillating error
   EXPECT_TRUE(warnings.starts_with("estimate.tum: all orientations are turned by the same 85."))
       << warnings;
   EXPECT_TRUE(
@@ -129,7 +129,7 @@ TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
 TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   Trajectory estimate = Estimate(Curve(60));
   Trajectory swapped = estimate;
-  // As a file of TUM with qw qx qy qz is read.
+  // The result of reading a TUM file with the order qw qx qy qz.
   for (Eigen::Quaterniond& q : swapped.orientations) {
     q = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
   }
@@ -138,11 +138,11 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations fit to 0.")) << warnings;
   EXPECT_NE(warnings.find(" deg if quaternions are read w first, but to "), std::string::npos);
   EXPECT_TRUE(warnings.ends_with(" deg as read; expected qx qy qz qw\n")) << warnings;
-  // So is the reference.
+  // The same for the reference.
   swapped.name = "reference.tum";
   warnings = WarningsOf(swapped, Curve(60));
   EXPECT_TRUE(warnings.starts_with("reference.tum:7: the orientations fit to 0.")) << warnings;
-  // A file of EuRoC with w last.
+  // The result of reading a EuRoC file with w last.
   for (Eigen::Quaterniond& q : estimate.orientations) {
     q = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
   }

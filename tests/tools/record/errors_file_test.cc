@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The error of each element with truth: in errors.csv and in the figures of it.
+// The error of each element with truth, in errors.csv and in its figures.
 #include "alidade/record/errors_file.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,7 @@
 namespace alidade::testing {
 namespace {
 
-/// A camera of position, orientation and heading, of which the first two are estimated and the
-/// third is known; and a bias without truth.
+/// A camera with estimated position and orientation and a known heading, and a bias without truth.
 class ErrorsOfACamera : public ::testing::Test {
  protected:
   ErrorsOfACamera() {
@@ -33,14 +32,14 @@ class ErrorsOfACamera : public ::testing::Test {
 
   void AddBlocks() {
     const double position[] = {1.25, 2.0}, heading = 3.1;
-    // A turn by 0.2 rad about x.
+    // A rotation of 0.2 rad about x.
     const double orientation[] = {std::cos(0.1), std::sin(0.1), 0.0, 0.0};
     state_.Add(position_, position, Eigen::Vector2d(0.25, 4.0).asDiagonal().toDenseMatrix());
     state_.Add(orientation_, orientation, 1e-4 * Eigen::Matrix3d::Identity());
     state_.Add(heading_, &heading, Eigen::MatrixXd(0, 0));
   }
 
-  /// Truth of position, orientation, heading.
+  /// Adds a frame with the truth of position, orientation and heading.
   void Add(internal::ErrorsFile& file, bool has_position = true) {
     const std::vector<double> position = {1.0, 2.5};
     file.Add({FrameAt(0.5, {}),
@@ -85,7 +84,7 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // rad, in the body
   EXPECT_EQ(cells[6] + cells[7], "00");
   EXPECT_EQ(cells[9], "0.01");
-  EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);  // wrapped
+  EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);  // wrapped to (-pi, pi]
   EXPECT_EQ(cells[12], "");
   EXPECT_EQ(Cells(lines[3])[1] + ' ' + Cells(lines[3])[3], " 0.5");
 }
@@ -113,7 +112,7 @@ TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {
         "(column('cam.heading') * 180 / pi) with lines"}) {
     EXPECT_NE(script.find(part), std::string::npos) << part << '\n' << script;
   }
-  EXPECT_EQ(script.find("sigma:cam.heading"), std::string::npos);  // it has none
+  EXPECT_EQ(script.find("sigma:cam.heading"), std::string::npos);  // a known value has no sigma
 }
 
 TEST_F(ErrorsOfACamera, WithoutTruthIsNoFile) {

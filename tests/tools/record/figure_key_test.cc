@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The keys of the figures, as gnuplot draws them.
+// The keys of the figures drawn by gnuplot.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kWidth = 960.0;
 
-/// Where the texts of an svg file stand, in pixels: text -> x of each.
+/// Returns the positions of the texts in an svg file, in pixels: text -> x of each occurrence.
 std::map<std::string, std::vector<double>> TextsOf(const std::string& svg) {
   std::map<std::string, std::vector<double>> texts;
   const std::string open = "<text>", place = "translate(";
@@ -28,7 +28,7 @@ std::map<std::string, std::vector<double>> TextsOf(const std::string& svg) {
 
 class FigureKey : public ::testing::TestWithParam<int> {};
 
-// Beside every panel of the comparison stand all estimators, one below the other.
+// Next to every panel of the comparison are all estimators in one column.
 TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
@@ -54,15 +54,15 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
       EXPECT_LT(x + 7.0 * static_cast<double>(name.size()), kWidth);
     }
   }
-  // One panel has the measurements of two sensors besides.
+  // One panel also has the measurements of two sensors.
   texts = TextsOf(Read(folder / "out/figures/measurements.svg"));
   for (int i = 0; i < GetParam(); ++i) {
     EXPECT_EQ(texts["an_estimator_" + std::to_string(i)].size(), 1u) << i;
   }
-  EXPECT_EQ(texts["truth"].size(), 2u);  // one of each stream
+  EXPECT_EQ(texts["truth"].size(), 2u);  // one for each stream
 }
 
-// The last panel is lower than the others, by what stands below its axis.
+// The last panel is lower than the others by the height of the texts below its axis.
 TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();

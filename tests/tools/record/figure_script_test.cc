@@ -20,7 +20,7 @@ TEST(FigureScript, CountsFromTheFirstSecondWhereTimestampsAreFarFromZero) {
 }
 
 TEST(FigureScript, TakesTheWholeRangeOfTimestamps) {
-  // The span, 1.82e10 s, does not fit a timestamp. A line bridges four of its hundredths.
+  // The span of 1.82e10 s overflows a timestamp. A line bridges four hundredths of it.
   const std::string script = ScriptOver(-9.1e9, 9.1e9);
   EXPECT_NE(script.find("t0 = 0.0\n"), std::string::npos) << script;
   EXPECT_NE(script.find("set xrange [-9100000000.000000000:9100000000.000000000]"),

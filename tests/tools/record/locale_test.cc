@@ -54,7 +54,7 @@ TEST(CommaLocale, ChangesNoByteOfWhatIsWritten) {
   EXPECT_EQ(Read(folder / "comma/run/timing.json").find("\"wall_s\": 0,"), std::string::npos);
 }
 
-/// Why a run of kConfig ended that its filter cannot step over the first gap of.
+/// Returns the failure reason of a run of kConfig whose filter cannot step over the first gap.
 std::string ReasonOfAFailure() {
   std::string text = kConfig;
   const std::string entry = "gate: 0.999";

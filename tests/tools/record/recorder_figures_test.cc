@@ -59,12 +59,12 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
             std::string::npos);
   EXPECT_NE(script.find("title 'other: thing.depth'"), std::string::npos);
   EXPECT_NE(script.find("column('own.bias')"), std::string::npos);
-  // One truth, one panel: that of the depth which the others name target.depth.
+  // There is one truth and one panel: the depth that the other estimators call target.depth.
   EXPECT_EQ(script.find("set label 1 'thing.depth'"), std::string::npos);
   EXPECT_NE(script.find("set label 1 'target.depth'"), std::string::npos);
 }
 
-/// An angle that grows by 1 rad a step.
+/// An angle that grows by 1 rad per step.
 struct Spinning : Motion<0, Angle> {
   static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
   template <class T>
@@ -97,7 +97,7 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   }
 }
 
-/// The scripts of the figures of a run; gnuplot need not be there.
+/// The scripts of a run's figures; gnuplot need not be installed.
 class ScriptsOf {
  public:
   explicit ScriptsOf(Experiment& experiment) {
@@ -125,7 +125,8 @@ TEST(Recorder, ErrorsOfAllEstimatorsAreDrawnInOnePanel) {
                             "with lines ls 2 title 'alone'"}) {
     EXPECT_NE(script.find(curve), std::string::npos) << curve << '\n' << script;
   }
-  EXPECT_EQ(script.find("'template.inverse_distance'"), std::string::npos) << script;  // no truth
+  // it has no truth
+  EXPECT_EQ(script.find("'template.inverse_distance'"), std::string::npos) << script;
   experiment = MakeExperiment();
   experiment.estimators.pop_back();
   EXPECT_FALSE(ScriptsOf(experiment).Has("comparison.errors"));
@@ -167,12 +168,12 @@ TEST(Recorder, AConstantBlockHasNoPanel) {
 TEST(Recorder, AGainHasItsUnit) {
   Experiment experiment = MakeExperiment();
   const std::string script = ScriptsOf(experiment)["ekf.gain"];
-  // Of a disparity in px, and of a scale, which has no unit.
+  // A gain for a disparity in px, and one for a scale, which has no unit.
   EXPECT_NE(script.find("title 'target.depth_rate [(m/s)/px]'"), std::string::npos) << script;
   EXPECT_NE(script.find("title 'target.depth_rate [m/s]'"), std::string::npos) << script;
 }
 
-/// A target with streams that never come.
+/// A target with streams that never have a measurement.
 class SilentStreams : public SwingingTarget {
  public:
   SilentStreams() : SwingingTarget(60), streams_(SwingingTarget::streams()) {
@@ -240,7 +241,7 @@ TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
     experiment.estimators.push_back(std::move(more));
   }
   const int code = InChild([&] {
-    ::setenv("PATH", "/nowhere", 1);  // the script tells
+    ::setenv("PATH", "/nowhere", 1);  // without gnuplot the test reads the script
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     recorder.Finish(RunInto(recorder, experiment));
   });
@@ -262,10 +263,12 @@ TEST(Recorder, DoesWithoutGnuplot) {
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
   EXPECT_EQ(SvgsOf(folder / "out"), Names{});
-  EXPECT_TRUE(fs::exists(folder / "out/figures/alone.innovation.gp"));  // to be drawn elsewhere
+  // for drawing on another machine
+  EXPECT_TRUE(fs::exists(folder / "out/figures/alone.innovation.gp"));
 }
 
-/// A gnuplot on PATH that draws the first figure and its PNG, and then sleeps over half a one.
+/// Puts a gnuplot on PATH that draws the first figure and its PNG, then writes half of the next one
+/// and sleeps.
 void UseSlowGnuplot(const TemporaryFolder& folder) {
   const fs::path program = folder / "bin/gnuplot";
   fs::create_directory(program.parent_path());
@@ -279,7 +282,8 @@ void UseSlowGnuplot(const TemporaryFolder& folder) {
   ::setenv("PATH", (program.parent_path().string() + ":/usr/bin:/bin").c_str(), 1);
 }
 
-/// Records with the slow gnuplot in a child; `note` is what must have been left out.
+/// Records with the slow gnuplot in a child process; `note` is the expected note on missing
+/// figures.
 int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const char* note) {
   return InChild([&] {
     UseSlowGnuplot(folder);
@@ -293,7 +297,7 @@ int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const
 TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
-  options.stop = [&] {  // once it sleeps
+  options.stop = [&] {  // once gnuplot sleeps
     return fs::exists(folder / "out.partial/figures/comparison.svg");
   };
   EXPECT_EQ(RecordSlowly(folder, options, "1 of 14 figures drawn: the drawing was stopped"), 0);

@@ -43,7 +43,7 @@ TEST(Recorder, WritesEveryFile) {
                                                                          "timing.csv",
                                                                          "timing.json",
                                                                          "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 22u);  // nothing next to it
+  EXPECT_EQ(FilesIn(folder.path()).size(), 22u);  // no files outside the run's folder
 }
 
 TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {
@@ -97,13 +97,14 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
   SourceFrame frame;
   ASSERT_TRUE(source.Next(frame));
   const std::vector<std::string> lines = Lines(folder / "out/implied_states.csv");
-  ASSERT_EQ(lines.size(), 3u);  // of disparity alone: a scale tells no distance by itself
+  // only from the disparity: a scale alone does not determine a distance
+  ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0], "t_s,sensor,target.depth");
   EXPECT_EQ(lines[1], "0.000000000,disparity," +
                           internal::NumberText(400.0 * 0.065 / frame.measurements[1].values[0]));
 }
 
-/// The estimator of a report made by hand.
+/// The estimator of a constructed report.
 class NoEstimator : public Estimator {
  public:
   void Start(Timestamp) override {}
@@ -118,7 +119,7 @@ class NoEstimator : public Estimator {
   UpdateReport report_;
 };
 
-/// A report of one update by hand, on a problem with a block that waits and one that is fixed.
+/// A constructed report of one update: a block waits for its initial value, and one is fixed.
 struct HandMade {
   Experiment experiment;
   State state;
@@ -146,7 +147,7 @@ struct HandMade {
     state.Add(2, attitude, Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal().toDenseMatrix());
     experiment.estimators.push_back(std::move(named));
     static_cast<Frame&>(frame) =
-        testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, nearer than stereo sees
+        testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, below the stereo sensor's range
     MeasurementReport accepted;
     accepted.sensor = 0;
     accepted.dof = 1;
@@ -192,12 +193,12 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
             "a.attitude.rz<-disparity\n"
             "0.000000005,disparity,,0.1,0,-0.3\n");
   EXPECT_EQ(Read(folder / "out/implied_states.csv"),
-            "t_s,sensor,a.waits\n");  // invalid: implies nothing
+            "t_s,sensor,a.waits\n");  // an invalid measurement implies no state
 }
 
 TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   const TemporaryFolder folder;
-  Experiment experiment = MakeExperiment(6);  // one frame each 33 ms
+  Experiment experiment = MakeExperiment(6);  // a frame every 33 ms
   EstimatorSpec& ekf = experiment.estimators[0];
   ekf.problem.initial_time_s = 0.066;
   ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
@@ -217,7 +218,7 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
 TEST(Recorder, QuotesTextsInEvents) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"));
-  // The wobble is less than the noise that the filter expects.
+  // The variation of the measurements is smaller than the noise of the filter.
   const std::string events = Read(folder / "out/ekf/events.csv");
   EXPECT_TRUE(events.starts_with("t_s,kind,text\n,nis_bounds,\"NIS mean 0.")) << events;
   EXPECT_TRUE(
@@ -230,7 +231,7 @@ TEST(Recorder, TellsPluginsOfOneNameApart) {
   const TemporaryFolder folder;
   std::string expected = "\"plugins\": [";
   std::vector<fs::path> plugins;
-  for (const char* where : {"b", "a"}) {  // in their order, whatever the folders are
+  for (const char* where : {"b", "a"}) {  // in the given order, independent of the folders' names
     fs::create_directory(folder / where);
     const fs::path plugin = folder / where / "models.so";
     std::ofstream(plugin) << "bytes of " << where;

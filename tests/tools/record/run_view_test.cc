@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What of a frame is shown: its features, and the map from above.
+// The displayed parts of a frame: its features, and the map from above.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -54,7 +54,7 @@ TEST(FeatureTrails, WhatIsNotSeenAnyMoreIsLostOnce) {
   EXPECT_TRUE(trails.Add(PixelsOf({}), nullptr).empty());
 }
 
-// Without a report a feature waits: it is new. Once it was accepted, it is left out by a choice.
+// A feature without a report is new until its first accepted measurement; afterwards it is unused.
 TEST(FeatureTrails, WithoutAReportAFeatureIsNewUntilItIsAccepted) {
   FeatureTrails trails;
   UpdateReport none, accepted;
@@ -80,7 +80,7 @@ TEST(FeatureTrails, ThePredictionIsHAndTheFirstTwoOfS) {
   UpdateReport report;
   AddReport(report, 4, Outcome::kAccepted);
   MeasurementReport& one = report.measurements()[0];
-  one.dof = 3;  // u, v and a depth
+  one.dof = 3;  // u, v and depth
   one.h = report.Copy(std::vector{11.0, 21.0, 5.0});
   one.s = report.Copy(std::vector{4.0, 1.0, 0.1, 1.0, 9.0, 0.2, 0.1, 0.2, 0.3});
   FeatureTrails trails;
@@ -100,7 +100,7 @@ TEST(FeatureTrails, WhatIsNoPixelIsNoFeature) {
 
 const Eigen::Matrix3d kNoTurn = Eigen::Matrix3d::Identity();
 
-// A camera looks along z, y down: from above x goes to the right and z up.
+// The camera looks along z, and y points down: from above, x points right and z up.
 TEST(MapFromAbove, ACameraIsSeenFromAbove) {
   MapFromAbove above;
   Eigen::Matrix3d p;
@@ -116,7 +116,7 @@ TEST(MapFromAbove, ACameraIsSeenFromAbove) {
   EXPECT_EQ(map.position.yy, 9);
 }
 
-// Its y axis along -z of the world: z is up there, and it looks along y.
+// The camera's y axis points along -z of the world, so z is up, and the camera looks along y.
 TEST(MapFromAbove, TheWorldMayHaveZUp) {
   Eigen::Matrix3d world_from_body;
   world_from_body << 1, 0, 0, 0, 0, 1, 0, -1, 0;
@@ -127,14 +127,14 @@ TEST(MapFromAbove, TheWorldMayHaveZUp) {
   EXPECT_EQ(above.map()->heading, (std::array<double, 2>{0.0, 1.0}));
 }
 
-// Of 101 landmarks at x = 0 to 99 m and one at 10 km, the farthest are outside of what is shown.
+// Of 101 landmarks, at x = 0 to 99 m and at 10 km, the farthest ones are outside of the view.
 TEST(MapFromAbove, OneFarLandmarkDoesNotHideTheOthers) {
   std::vector<LandmarkEstimate> landmarks(101);
   for (int i = 0; i <= 100; ++i) {
     landmarks[static_cast<std::size_t>(i)].position = {i == 100 ? 1e4 : i, 0.0, 5.0};
     landmarks[static_cast<std::size_t>(i)].covariance.setIdentity();
   }
-  landmarks.emplace_back();  // not known yet
+  landmarks.emplace_back();  // not initialised yet
   MapFromAbove above;
   above.Add({0, 0, 0}, kNoTurn, kNoTurn, nullptr, landmarks);
   EXPECT_EQ(above.map()->landmarks.size(), 101u);
@@ -142,7 +142,7 @@ TEST(MapFromAbove, OneFarLandmarkDoesNotHideTheOthers) {
   EXPECT_LE(above.map()->bounds[1], 99.0);
   landmarks.resize(1);
   above.Add({0, 0, 0}, kNoTurn, kNoTurn, nullptr, landmarks);
-  EXPECT_GE(above.map()->bounds[1], 97.0);  // what is shown never shrinks
+  EXPECT_GE(above.map()->bounds[1], 97.0);  // the view never shrinks
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ TEST(RunInputs, NameWhatDiffers) {
   const std::string before = InputsOf(data, {plugin});
   EXPECT_EQ(Differences(before, InputsOf(data, {plugin})), std::vector<std::string>{});
   Written(folder / "own.so", "two");
-  // SHA-256 of `two` and `one`.
+  // The SHA-256 hashes of `two` and `one`.
   EXPECT_EQ(Differences(before, InputsOf(data, {plugin})),
             (std::vector<std::string>{"plugin own.so: now 3fc4ccfe7458..., was 7692c3ad3540..."}));
   EXPECT_EQ(Differences(before, InputsOf(data)),
@@ -91,7 +91,7 @@ TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
   EXPECT_EQ(text.find("/b.csv\"", first + 1), text.npos) << text;
 }
 
-// A file that cannot be read has no hash to compare with.
+// An unreadable file has no hash to compare.
 TEST(RunInputs, AFileThatCannotBeReadIsAnError) {
   const testing::TemporaryFolder folder;
   std::string text;

@@ -33,7 +33,7 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
 
 using Metrics = std::map<std::string, double>;
 
-/// A run that has these metrics besides.
+/// Returns the run `to` with additional metrics.
 SweepRow Add(const SweepRow& to, const Metrics& more) {
   EstimatorResult one;
   one.name = to.name;
@@ -54,7 +54,7 @@ SweepRow Result(double rmse, bool diverged = false, bool inconsistent = false) {
   return Add(one, {{"rmse:x", rmse}});
 }
 
-/// Three runs that count, one of them inconsistent, two that diverged, one that failed (and was
+/// Three runs that count, one of them inconsistent; two that diverged; and one that failed (and was
 /// inconsistent).
 SweepResult SixRuns() {
   SweepResult result;
@@ -88,7 +88,7 @@ TEST(Summarise, LeavesOutWhatIsNotANumber) {
   SweepRow& first = result.done[0].estimators[0];
   first = Add(first, {{"rmse:x", std::numeric_limits<double>::quiet_NaN()}});
   SweepRow& second = result.done[1].estimators[0];
-  second = Add(second, {{"rmse:a", 7.0}});  // of one run, before the others' keys
+  second = Add(second, {{"rmse:a", 7.0}});  // in one run, and before the other runs' keys
   const std::vector<SweepSummary> summaries = Summarise(result);
   EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 4.0);
@@ -115,7 +115,7 @@ TEST(SweepFolder, RunsHaveTheirValuesInTheColumnsOfAll) {
   EXPECT_EQ(lines[3], "3,ekf,true,false,7,100,,8");
 }
 
-// What it wrote when it was stopped is of the runs until then.
+// The results written at a stop cover only the runs before it, so a resumed sweep removes them.
 TEST(SweepFolder, AStoppedOneIsContinuedWithoutItsResults) {
   const testing::TemporaryFolder temporary;
   const Config config = Config::FromText("{}", "config.yaml");
@@ -185,7 +185,7 @@ TEST(SweepTable, FoldsAsAComparisonDoes) {
       run.estimators.back().name = name;
     }
   }
-  // 12 of the label and three times 29 are 99 characters; the fourth goes below.
+  // 12 characters of the label and three times 29 are 99 characters; the fourth column goes below.
   const std::string table = TableOf(result);
   EXPECT_EQ(table.find('\n'), 99u) << table;
   EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;

@@ -13,8 +13,8 @@
 #             full path, "alidade/ROOM/FILE.h"
 #   order     a room of core or tools includes itself and earlier rooms in the order of `rooms`;
 #             none includes testing, which is only for tests
-#   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
-#             their own stem
+#   model     motion_models and sensors include only alidade/model/, Eigen, the standard library
+#             and their own stem
 #   plugin    only a plugin's own folder, tests/plugins and tests/fuzz, which test the library
 #             behind the export, include from plugins/; bench includes the costs of plugins/ceres
 #   upward    lower layers do not include cli, bench, tests or examples

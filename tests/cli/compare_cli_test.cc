@@ -15,7 +15,7 @@ using testing::Contains;
 using testing::Outcome;
 namespace fs = std::filesystem;
 
-/// Comparisons need the batch, which a build without the Ceres solver does not have.
+/// Comparisons need the batch, which is missing in a build without the Ceres solver.
 class CompareFolderCli : public testing::ProgramTest {};
 
 TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {

@@ -198,7 +198,7 @@ TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
   EXPECT_EQ(bad.code, 65);
   EXPECT_EQ(bad.err, "error: bad.tum:2:13 qz: 'nan' is not finite; expected a finite number\n");
   EXPECT_EQ(Call({"eval", "truth.tum", "missing.tum"}).code, 66);
-  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // truth.tum of the folder
+  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // uses the folder's truth.tum
   const Outcome none = Call({"eval", "truth.tum", "."});
   EXPECT_EQ(none.code, 66);
   EXPECT_TRUE(none.err.starts_with("error: .: no trajectory in this folder; expected NAME/"))

@@ -21,13 +21,13 @@
 namespace alidade {
 namespace {
 
-/// The pixel of a landmark, whose u and v have noises of their own, and correlated ones.
+/// The pixel of a landmark. u and v have different noises, which are correlated.
 template <class Representation>
 struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>, Representation> {
   static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
   static constexpr int kPrior = 1;
 
-  InverseDepthFeature<Representation> pixel;  // its h, its limits and its inverse
+  InverseDepthFeature<Representation> pixel;  // provides h, the valid domain and the inverse model
   double sigma_u_px, sigma_v_px, correlation;
 
   CorrelatedPixel(const Camera& camera, double sigma_u, double sigma_v, double rho)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/13_slam_odometry_tracks on real drives, against a published filter and dead reckoning.
+// examples/13_slam_odometry_tracks on real drives, compared with a published filter and with dead
+// reckoning.
 #include <cmath>
 
 #include "drives.h"

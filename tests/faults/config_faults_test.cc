@@ -24,7 +24,7 @@ Change After(const std::string& text, const std::string& lines) {
 }
 
 struct Fault {
-  std::string name;  ///< begins with the number in the table of README.md, if it has one
+  std::string name;  ///< begins with the number in the table of README.md, if the fault has one
   std::string base;  ///< empty: an empty config
   std::vector<Change> changes;
   int line = 0;  ///< 0: the message names the file only

@@ -415,8 +415,7 @@ TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
   EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n19,1.950000000\n"))
       << Read("found/timestamps.csv");
 
-  // With timestamps in the file names a missing image does no harm; a missing timestamp is an
-  // error.
+  // If file names are timestamps, a missing image does no harm; a missing timestamp is an error.
   std::filesystem::remove(folder_ / "tum/rgb/000019.png");
   EXPECT_EQ(track("tum/rgb").code, 0);
   std::string back = tum;
@@ -505,7 +504,7 @@ class ExactTracks {
       Eigen::Quaterniond& q = pose.q;
       if (std::sscanf(row.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &t, &r[0], &r[1], &r[2],
                       &q.x(), &q.y(), &q.z(), &q.w()) != 8) {
-        poses_.pop_back();  // the header
+        poses_.pop_back();  // the file's header
       }
     }
   }

@@ -177,7 +177,7 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
 }
 
 TEST_F(SimulateImages, SurfacesAreSeenWhereTheyAre) {
-  // A plate 1 m wide and 0.5 m high, 2 m ahead, whose edges a pinhole sees at known places.
+  // A plate 1 m wide and 0.5 m high, 2 m ahead; a pinhole camera sees its edges at known pixels.
   const Outcome outcome = Simulate(R"(alidade: 1
 camera: {model: pinhole, width: 160, height: 120, fx: 100, fy: 100, cx: 80, cy: 60,
          baseline_m: 0.4}

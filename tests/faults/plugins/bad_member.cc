@@ -24,7 +24,7 @@ struct Base : alidade::Sensor<Vec<1>, Vec<1>, Vec<2>> {
 };
 
 #if BAD_MEMBER == 20
-struct Seen : alidade::Sensor<Vec<1>, Vec<1>> {  // no kRoles, no kMeasurement
+struct Seen : alidade::Sensor<Vec<1>, Vec<1>> {  // without kRoles and kMeasurement
   explicit Seen(Params&) {}
   template <class T>
   bool Predict(const T* a, T* z) const {
@@ -85,7 +85,7 @@ struct Seen : Base {
     l[0] = T(1.0);
   }
 #elif BAD_MEMBER == 21
-  bool Predict(const double* a, const double*, double* z) const {  // no template
+  bool Predict(const double* a, const double*, double* z) const {  // not a template
     z[0] = a[0];
     return true;
   }
@@ -114,11 +114,11 @@ struct Moved : MotionBase {
                     MatrixRef) const {}
 #elif BAD_MEMBER == 15
   template <class T>
-  void Step(const T* x, double, T* next) const {  // no noise
+  void Step(const T* x, double, T* next) const {  // the noise is missing
     next[0] = x[0];
   }
 #elif BAD_MEMBER == 23
-  void Step(const double* x, const double* w, double, double* next) const {  // no template
+  void Step(const double* x, const double* w, double, double* next) const {  // not a template
     next[0] = x[0] + w[0];
   }
 #else
@@ -134,11 +134,11 @@ struct Moved : MotionBase {
   bool Stationary() const { return false; }
   static constexpr int kStepOrder = 2;
 #elif BAD_MEMBER == 10
-  void StepJacobian(const double*, double, MatrixRef, MatrixRef) const {}  // no noise
+  void StepJacobian(const double*, double, MatrixRef, MatrixRef) const {}  // the noise is missing
 #elif BAD_MEMBER == 12
   bool Stationary(double) const { return false; }
 #elif BAD_MEMBER == 16
-  void SqrtQ(MatrixRef l) const { l(0, 0) = 1.0; }  // no dt
+  void SqrtQ(MatrixRef l) const { l(0, 0) = 1.0; }  // dt is missing
 #elif BAD_MEMBER == 17
   static constexpr int kStepOrder = 9;
 #elif BAD_MEMBER == 18

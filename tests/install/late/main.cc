@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Late measurements: the disparity of an image is there 0.1 s after the image, the apparent size at
+// Late measurements: the disparity of an image arrives 0.1 s after the image, the apparent size at
 // once.
 #include <alidade/estimation.h>
 #include <alidade/motion_models/constant.h>

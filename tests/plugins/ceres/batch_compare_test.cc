@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons with the batch.
+// Comparisons with the batch estimator.
 #include <Eigen/LU>
 #include <cmath>
 

@@ -126,7 +126,8 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
       << found.events[0].text;
 }
 
-/// Depth 0.3 + 0.1 sin(2.5 t) m, its disparity (BF = 26 px m) on most frames, 1 / scale on all.
+/// Returns depth 0.3 + 0.1 sin(2.5 t) m: its disparity (BF = 26 px m) in most frames, and 1 / scale
+/// in all.
 std::vector<Frame> DepthFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -188,7 +189,7 @@ TEST(CeresBatch, EndsWhereTheKalmanFilterDoes) {
   EXPECT_LT((found.p.back() - ekf.state().covariance().Dense()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
-// On a linear system the full-information filter is the Kalman filter, at every frame.
+// On a linear system the full-information filter equals the Kalman filter at every frame.
 TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
   const Problem problem = LinearSystem();
   const auto batch = MakeBatch(problem, "mode: filtering\n");

@@ -175,7 +175,8 @@ TEST(FixedLag, ABlockMayStartFromAMeasurement) {
 
 // ---- nonlinear ----------------------------------------------------------------------------------
 
-/// Depth 0.3 + 0.1 sin(2.5 t) m, its disparity (BF = 26 px m) on most frames, 1 / scale on all.
+/// Returns depth 0.3 + 0.1 sin(2.5 t) m: its disparity (BF = 26 px m) in most frames, and 1 / scale
+/// in all.
 std::vector<Frame> DepthFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {

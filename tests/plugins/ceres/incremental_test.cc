@@ -125,7 +125,7 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(LargestOf(map, "0.3").state, 0.5);
 }
 
-// The full-information filter of a linear system is the Kalman filter, at every frame.
+// The full-information filter of a linear system equals the Kalman filter at every frame.
 TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
   const Problem problem = testing::LinearSystem();
   for (const char* mode : {"filtering", "incremental"}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Files, pipes and standard input.
+// Tables from files, from pipes and from standard input.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>

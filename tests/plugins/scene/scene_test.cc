@@ -69,7 +69,7 @@ TEST(Scene, MeasuresStereoAndDepthToo) {
 }
 
 TEST(Scene, NoiseIsThatOfTheConfig) {
-  // 500 points seen 20 times: 10000 samples of each, their variance to 1.4 %; 4 sigma.
+  // 500 points seen 20 times give 10000 samples of each, with variances accurate to 1.4 %; 4 sigma.
   const std::string keys =
       "max_frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
       "measures: depth, sigma_depth_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "

@@ -179,7 +179,8 @@ TEST(ScenePath, VelocitiesLeadFromFrameToFrameAsQuaternionPoseHasIt) {
 }
 
 TEST(ScenePath, DrawnFromTheModelHasItsAccelerations) {
-  // Second differences of 5000 steps: standard deviations to 1 / sqrt(2 * 5000) = 1 %; 4 sigma.
+  // The second differences of 5000 steps give standard deviations accurate to 1 / sqrt(2 * 5000) =
+  // 1 %; 4 sigma.
   const auto frames = SceneFrames("max_frames: 5001, rate_hz: 10, " + kPoints +
                                   ", trajectory: {random: {linear_acceleration: [0.3, 0.6, 0], "
                                   "angular_acceleration: 0.05}}");

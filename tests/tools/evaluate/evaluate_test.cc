@@ -217,7 +217,8 @@ TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
   }
   const Evaluation e = Evaluate(Curve(10), estimate, {});
   ASSERT_TRUE(e.position_nees && e.orientation_nees);
-  // (0.2, -0.2) lies along the eigenvector of 0.05 - 0.03 = 0.02: 0.08 / 0.02 = 4, over 2.
+  // (0.2, -0.2) is along the eigenvector with eigenvalue 0.05 - 0.03 = 0.02: 0.08 / 0.02 = 4,
+  // divided by 2.
   EXPECT_EQ(e.position_nees->dof, 2);
   EXPECT_EQ(e.position_nees->poses, 9);
   EXPECT_NEAR(e.position_nees->mean, 2.0, 1e-9);

@@ -123,8 +123,8 @@ TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
   EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
 }
 
-/// Calculated by hand: the reference has t = 0, 1, 2, 3 at x = 0, 1, 2, 3, the estimate t = 0, 1,
-/// 1, 2 at x = 0, 1, 1.5, 2. The pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
+/// Calculated by hand. The reference has t = 0, 1, 2, 3 at x = 0, 1, 2, 3; the estimate has t = 0,
+/// 1, 1, 2 at x = 0, 1, 1.5, 2. The pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
 ///
 ///   ATE errors 0, 0, 0.5, 0                                   rmse 0.25
 ///   RPE of steps 1, 0, 1 against 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)

@@ -216,8 +216,8 @@ TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   EXPECT_GE(apart, 1e-5) << "the second update is linearised at what the first one left";
 }
 
-/// Returns sigma of the depth of example 18 after `updates`, by the scalar form of the Riccati
-/// equation for x' = A x + G a, z = Z / Z0 + n, starting from P = 100 I.
+/// Returns sigma of the depth of example 18 after `updates`. Uses the scalar form of the Riccati
+/// equation for x' = A x + G a, z = Z / Z0 + n, from P = 100 I.
 double RiccatiSigma(double r, int updates) {
   const double t = 0.033, h = 1.0 / 0.3;
   double p = 100.0, c = 0.0, v = 100.0;  // var(Z), cov(Z, rate), var(rate)

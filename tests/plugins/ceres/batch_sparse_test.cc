@@ -154,8 +154,8 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   }
 }
 
-// The covariance of the first rate is 1e10 times smaller than its prior, so it must not be computed
-// as a difference of two numbers of the prior's size.
+// The covariance of the first rate is 1e10 times smaller than its prior. It must not be computed as
+// a difference of two numbers of the prior's size.
 TEST(SparseBatch, AVagueStartCostsNoDigits) {
   Problem problem = testing::LinearSystem();
   for (std::size_t i = 0; i < problem.priors.size(); ++i) SetPrior(problem, i, 1e4);

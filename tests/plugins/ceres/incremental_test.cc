@@ -121,7 +121,7 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
-  // the old variables of a landmark are eliminated again
+  // the part of the matrix to which they return is eliminated again
   EXPECT_LT(LargestOf(map, "0.3").state, 0.5);
 }
 

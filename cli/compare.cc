@@ -170,8 +170,8 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   comparison.notes.insert(comparison.notes.begin(), compared.notes.begin(), compared.notes.end());
   if (!compared.beyond_budget.empty()) {
     for (DecompositionStep& step : comparison.decomposition) {
-      const bool missing = step.from.empty() || step.to.empty();
-      if (missing) step.withheld += "; " + compared.beyond_budget;
+      const bool is_missing = step.estimator.empty() || step.reference.empty();
+      if (is_missing) step.withheld += "; " + compared.beyond_budget;
     }
   }
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);

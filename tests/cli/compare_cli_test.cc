@@ -67,11 +67,12 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   EXPECT_EQ(compared.code, 0) << compared.err;
   for (const char* words :
        {"added 'full_information'", "RMSD target.depth [mm]",
-        "Online: every estimate from the data up to it", "Smoothed: estimates from later data too",
-        "At the end, where all have the same data", "linearisation, ekf against full_information",
-        "smoothing, ekf against rts", "rejected measurements, batch_accepted against batch",
+        "Online: estimates that use only past data", "Smoothed: estimates that also use later data",
+        "At the end, when all have the same data",
+        "linearisation, ekf compared with full_information", "smoothing, ekf compared with rts",
+        "rejected measurements, batch_accepted compared with batch",
         "of 227 measurements were not used", "rmse target.depth [mm]", "CPU time [us/frame]",
-        "  and of the filter it starts from", "ratios are of one run and have no interval"}) {
+        "  of its initial filter", "ratios are from one run and have no confidence interval"}) {
     EXPECT_TRUE(Contains(compared.out, words)) << words << '\n' << compared.out;
   }
   const Config json = Json("out/compare.json"), run = Json("out/run.json");
@@ -258,7 +259,7 @@ TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
   const Outcome smoothed =
       Call({"compare", "config.yaml", "-o", "out", "--no-decomposition", "--set",
             window + ", output: lagged}", "--set", "estimators.rts={type: rts}"});
-  EXPECT_TRUE(Contains(smoothed.out, "later data too; ratio and difference: to rts"))
+  EXPECT_TRUE(Contains(smoothed.out, "later data; ratios and differences relative to rts"))
       << smoothed.out << smoothed.err;
   const Outcome online =
       Call({"compare", "config.yaml", "-o", "two", "--filter", "window", "--set", window + '}'});

@@ -12,21 +12,21 @@ namespace {
 static_assert(detail::RepresentationTraits<LandmarkRepresentations>::kMaxTangent <=
               internal::kMaxLandmarkTangent);
 
-/// Returns true if the landmark roles are those of the representation.
+/// Returns true if the landmark roles equal the roles of the representation.
 template <class Representation>
 bool HasRoles(const std::vector<Space>& roles) {
   constexpr int count = detail::Blocks<Representation>::kCount;
-  bool same = std::ssize(roles) == count;
+  bool is_same = std::ssize(roles) == count;
   const auto compare = [&](auto index) {
     constexpr int i = decltype(index)::value;
     using G = detail::SpaceAt<i, Representation>;
-    if (!same) return;
+    if (!is_same) return;
     const Space& role = roles[static_cast<std::size_t>(i)];
-    same = role.name == Representation::kRoles[static_cast<std::size_t>(i)].name &&
-           role.geometry == Geometry::Of<G>();
+    is_same = role.name == Representation::kRoles[static_cast<std::size_t>(i)].name &&
+              role.geometry == Geometry::Of<G>();
   };
   detail::ForEach(compare, typename detail::Blocks<Representation>::Indices{});
-  return same;
+  return is_same;
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ const char* ToString(LandmarkRepresentation representation) {
 }
 
 bool IsXyz(LandmarkRepresentation representation) {
-  return WithRepresentation(representation, [](auto chosen) { return decltype(chosen)::kIsXyz; });
+  return WithRepresentation(representation, [](auto traits) { return decltype(traits)::kIsXyz; });
 }
 
 std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>& roles) {
@@ -45,7 +45,7 @@ std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>&
   for (std::size_t i = 0; i < kLandmarkRepresentations.size(); ++i) {
     const auto representation = static_cast<LandmarkRepresentation>(i);
     const bool is_same = WithRepresentation(
-        representation, [&](auto chosen) { return HasRoles<decltype(chosen)>(landmark_roles); });
+        representation, [&](auto traits) { return HasRoles<decltype(traits)>(landmark_roles); });
     if (is_same) return representation;
   }
   return std::nullopt;
@@ -53,8 +53,8 @@ std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>&
 
 std::optional<internal::LandmarkPoint> internal::PointOf(LandmarkRepresentation representation,
                                                          const double* const* blocks) {
-  return WithRepresentation(representation, [&](auto chosen) -> std::optional<LandmarkPoint> {
-    using Representation = decltype(chosen);
+  return WithRepresentation(representation, [&](auto traits) -> std::optional<LandmarkPoint> {
+    using Representation = decltype(traits);
     constexpr int n = detail::Blocks<Representation>::kTangent;
     LandmarkPoint point;
     Eigen::Matrix<double, 3, n, Eigen::RowMajor> jacobian;
@@ -71,8 +71,8 @@ LandmarkRepresentation internal::XyzRepresentation() { return LandmarkRepresenta
 
 double internal::LinearityOf(LandmarkRepresentation representation, const double* const* blocks,
                              double sigma, const double* camera) {
-  return WithRepresentation(representation, [&](auto chosen) {
-    return LinearityIndex(RayOf<decltype(chosen)>(blocks), sigma, camera);
+  return WithRepresentation(representation, [&](auto traits) {
+    return LinearityIndex(RayOf<decltype(traits)>(blocks), sigma, camera);
   });
 }
 

@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Shared part of the two structs below: the decay a, and the square root of Q.
+/// Dynamics of the two motions below: the decay a, and the square root of Q.
 struct Dynamics {
   explicit Dynamics(const OwnedRole& owned, std::size_t n)
       : mean(owned.mean), l(owned.sqrt_density), tau_s(owned.time_constant_s) {
@@ -18,15 +18,17 @@ struct Dynamics {
     if (owned.dynamics != OwnedDynamics::kGaussMarkov) tau_s = 0.0;
   }
 
-  bool returns() const { return tau_s > 0.0; }
-  bool stationary() const {
-    return !returns() && std::ranges::all_of(l, [](double element) { return element == 0.0; });
+  bool is_gauss_markov() const { return tau_s > 0.0; }
+  bool is_stationary() const {
+    return !is_gauss_markov() &&
+           std::ranges::all_of(l, [](double element) { return element == 0.0; });
   }
-  double Decay(double dt_s) const { return returns() ? std::exp(-dt_s / tau_s) : 1.0; }
+  double Decay(double dt_s) const { return is_gauss_markov() ? std::exp(-dt_s / tau_s) : 1.0; }
   void SqrtQ(double dt_s, int n, MatrixRef q) const {
-    const double time = returns() ? -0.5 * tau_s * std::expm1(-2.0 * dt_s / tau_s) : dt_s;
+    const double effective_dt_s =
+        is_gauss_markov() ? -0.5 * tau_s * std::expm1(-2.0 * dt_s / tau_s) : dt_s;
     for (int i = 0; i < n * n; ++i) {
-      q(i / n, i % n) = std::sqrt(std::max(time, 0.0)) * l[static_cast<std::size_t>(i)];
+      q(i / n, i % n) = std::sqrt(std::max(effective_dt_s, 0.0)) * l[static_cast<std::size_t>(i)];
     }
   }
 
@@ -34,23 +36,25 @@ struct Dynamics {
   double tau_s;
 };
 
-struct OwnedVector : Motion<kDynamic, Vec<kDynamic>> {
+/// Motion of a vector of any size.
+struct OwnedVectorMotion : Motion<kDynamic, Vec<kDynamic>> {
   static constexpr std::array kBlocks{Quantity{"value"}};
 
   Dynamics dynamics;
   int size;
 
-  OwnedVector(const OwnedRole& owned, int n)
+  OwnedVectorMotion(const OwnedRole& owned, int n)
       : dynamics(owned, static_cast<std::size_t>(n)), size(n) {}
 
   int Size(int) const { return size; }
   int NoiseSize() const { return size; }
-  bool Stationary() const { return dynamics.stationary(); }
+  bool Stationary() const { return dynamics.is_stationary(); }
   template <class T>
   void Step(const T* x, const T* w, double dt_s, T* next) const {
     const double a = dynamics.Decay(dt_s);
     for (int i = 0; i < size; ++i) {
-      const double mean = dynamics.returns() ? dynamics.mean[static_cast<std::size_t>(i)] : 0.0;
+      const double mean =
+          dynamics.is_gauss_markov() ? dynamics.mean[static_cast<std::size_t>(i)] : 0.0;
       next[i] = mean + a * (x[i] - mean) + w[i];
     }
   }
@@ -63,23 +67,24 @@ struct OwnedVector : Motion<kDynamic, Vec<kDynamic>> {
   void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, size, q); }
 };
 
+/// Motion of a value of a geometry of fixed size.
 template <class G>
-struct OwnedOn : Motion<G::kTangent, G> {
+struct OwnedGeometryMotion : Motion<G::kTangent, G> {
   static constexpr std::array kBlocks{Quantity{"value"}};
 
   Dynamics dynamics;
 
-  explicit OwnedOn(const OwnedRole& owned) : dynamics(owned, G::kTangent) {}
+  explicit OwnedGeometryMotion(const OwnedRole& owned) : dynamics(owned, G::kTangent) {}
 
-  bool Stationary() const { return dynamics.stationary(); }
+  bool Stationary() const { return dynamics.is_stationary(); }
   template <class T>
   void Step(const T* x, const T* w, double dt_s, T* next) const {
-    if (!dynamics.returns()) return G::Plus(x, w, next);
-    T d[G::kTangent], moved[G::kAmbient];
+    if (!dynamics.is_gauss_markov()) return G::Plus(x, w, next);
+    T d[G::kTangent], decayed[G::kAmbient];
     G::Minus(x, dynamics.mean.data(), d);
     for (T& element : d) element *= dynamics.Decay(dt_s);
-    G::Plus(dynamics.mean.data(), d, moved);
-    G::Plus(moved, w, next);
+    G::Plus(dynamics.mean.data(), d, decayed);
+    G::Plus(decayed, w, next);
   }
   void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, G::kTangent, q); }
 };
@@ -101,10 +106,10 @@ const char* NameOf(OwnedDynamics dynamics) {
 SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
   const char* const name = NameOf(owned.dynamics);
   ALIDADE_EXPECTS(!geometry.is_product());
-  if (geometry.is_vector()) return MakeMotion(OwnedVector(owned, geometry.ambient), name);
+  if (geometry.is_vector()) return MakeMotion(OwnedVectorMotion(owned, geometry.ambient), name);
   SharedMotion motion;
   VisitGeometry(geometry.row().number,
-                [&]<class G>(G) { motion = MakeMotion(OwnedOn<G>(owned), name); });
+                [&]<class G>(G) { motion = MakeMotion(OwnedGeometryMotion<G>(owned), name); });
   return motion;
 }
 

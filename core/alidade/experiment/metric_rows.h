@@ -22,9 +22,10 @@ std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// Returns the subjects of rows in the order of the config: the blocks, their owners and the
 /// sensors of each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
-/// Returns ComparisonRows() if there are at most ten, else `diverged`, `inconsistent` and eight other
-/// rows. These rows are in the same order, and none is for a segment. Each round of the selection
-/// chooses one subject of each metric, in the order of priority. Unknown subjects come last.
+/// Returns ComparisonRows() if there are at most ten, else `diverged`, `inconsistent` and eight
+/// other rows. These rows are in the same order, and none is for a segment. Each round of the
+/// selection chooses one subject of each metric, in the order of priority. Unknown subjects come
+/// last.
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
 /// Returns the table of MainRows(), with the number of omitted rows.
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);

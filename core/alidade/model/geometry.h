@@ -8,32 +8,32 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// Geometries of state blocks, measurements and inputs: how a small vector d is added to a value,
-/// y = x (+) d, and how two values differ, d = y (-) x. For every geometry
+/// Geometries of state blocks, measurements and inputs. A geometry defines the sum of a value and a
+/// small vector, y = x (+) d, and the difference of two values, d = y (-) x. For every geometry
 ///
 ///   (1)  x (+) 0 = x
 ///   (2)  (x (+) d) (-) x = d          for small d
 ///   (3)  x (+) (y (-) x) = y
 ///
-/// Scalars are templates: double, or a dual number in x, d or both.
+/// Scalar types are template parameters: double, or a dual number for x, d or both.
 ///
 /// A geometry of fixed size is a struct with
 ///
-///   kGeometry                its number in the C table (plugin_abi.h)
+///   kGeometry                number in the C table (plugin_abi.h)
 ///   kAmbient, kTangent       sizes of a value and of d
 ///   kIdentity                the neutral element
-///   Plus, Minus              as above
-///   Normalise(x)             brings x, which left the manifold by rounding, back to it
-///   Distance(x)              optional: the distance of x from the manifold, else 0
-///   Transport(from, to, j)   optional: carries a tangent vector at `from` to the tangent space of
-///                            `to`, j kTangent x kTangent and row-major; else the identity
-///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d; else by
+///   Plus, Minus              the operations (+) and (-)
+///   Normalise(x)             moves x back to the manifold after rounding errors
+///   Distance(x)              optional: distance of x from the manifold; default 0
+///   Transport(x, y, j)       optional: j (kTangent x kTangent, row-major) transports a tangent
+///                            vector at x to the tangent space of y; default the identity
+///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d; default
 ///                            automatic differentiation of Plus and Minus
 ///
 /// and a row in alidade/state/geometry_table.h.
 namespace alidade {
 
-/// A size that is known only when the model exists.
+/// Size that is known only at run time.
 inline constexpr int kDynamic = -1;
 
 /// R^N: y = x + d.
@@ -58,13 +58,13 @@ struct Angle {
   static constexpr int kAmbient = 1, kTangent = 1;
   static constexpr std::array<double, 1> kIdentity{0.0};
 
-  /// a - 2 pi k, the one in (-pi, pi].
+  /// Returns a - 2 pi k in (-pi, pi], k an integer.
   template <class T>
   static T Wrap(const T& a) {
     constexpr double kPi = 3.14159265358979323846;
     using std::ceil;
     const T wrapped = a - 2.0 * kPi * ceil((a - kPi) / (2.0 * kPi));
-    // Rounding may have missed the interval by an ulp.
+    // The result may be outside the interval by an ulp because of rounding.
     if (wrapped > T(kPi)) return wrapped - 2.0 * kPi;
     if (wrapped <= T(-kPi)) return wrapped + 2.0 * kPi;
     return wrapped;
@@ -82,18 +82,18 @@ struct Angle {
 
 namespace detail {
 
-/// Shared part of the geometries of unit length; G is the geometry.
+/// Base of a geometry G of unit length.
 template <class G, int N>
 struct UnitLength {
-  /// x / |x|, or x itself if |x| is 1 to rounding; the neutral element for x = 0. A value that is
-  /// not finite stays.
+  /// Replaces x by x / |x|, or by the neutral element if x = 0. Does not change x if |x| is 1 to
+  /// rounding, or not finite.
   static void Normalise(double* x) {
     constexpr double kRounding = 4e-16;
     const double norm = Norm(x);
     if (!(std::abs(norm - 1.0) > kRounding)) return;
     for (int i = 0; i < N; ++i) x[i] = norm == 0.0 ? G::kIdentity[i] : x[i] * (1.0 / norm);
   }
-  /// | |x| - 1 |
+  /// Returns | |x| - 1 |.
   static double Distance(const double* x) { return std::abs(Norm(x) - 1.0); }
 
  private:
@@ -107,13 +107,14 @@ struct UnitLength {
 }  // namespace detail
 
 /// S^3, Hamilton, stored w x y z: q (+) d = q Exp(d), Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|).
-/// q and -q are one rotation: (-) takes the shorter way, |d| <= pi.  [Sola2017] ch. 4.
+/// q and -q are the same rotation: (-) returns the shorter difference, |d| <= pi.
+/// [Sola2017] ch. 4.
 struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_QUATERNION;
   static constexpr int kAmbient = 4, kTangent = 3;
   static constexpr std::array<double, 4> kIdentity{1.0, 0.0, 0.0, 0.0};
 
-  /// c = a b
+  /// Computes c = a b.
   template <class A, class B, class C>
   static void Multiply(const A* a, const B* b, C* c) {
     c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
@@ -121,7 +122,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
     c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
   }
-  /// q = Exp(d), d in rad; exact to rounding at d = 0.
+  /// Computes q = Exp(d), d in rad; accurate to rounding also near d = 0.
   template <class T>
   static void Exp(const T* d, T* q) {
     using std::cos;
@@ -139,7 +140,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     }
     for (int i = 0; i < 3; ++i) q[i + 1] = s * d[i];
   }
-  /// d = Log(q), |d| <= pi.
+  /// Computes d = Log(q), |d| <= pi.
   template <class T>
   static void Log(const T* q, T* d) {
     using std::atan2;
@@ -155,7 +156,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     }
     for (int i = 0; i < 3; ++i) d[i] = k * q[i + 1];
   }
-  /// y = R(q) x
+  /// Computes y = R(q) x.
   template <class Q, class X, class Y>
   static void Rotate(const Q* q, const X* x, Y* y) {
     // x + 2 q0 (qv x x) + 2 qv x (qv x x)
@@ -165,7 +166,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     y[1] = x[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
     y[2] = x[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
   }
-  /// y = R(q)' x
+  /// Computes y = R(q)' x.
   template <class Q, class X, class Y>
   static void RotateBack(const Q* q, const X* x, Y* y) {
     const Q conjugate[4] = {q[0], -q[1], -q[2], -q[3]};
@@ -184,7 +185,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     Multiply(conjugate, y, q);
     Log(q, d);
   }
-  /// The right Jacobian of SO(3), with t = |d| and [d]x^2 = d d' - t^2 I:
+  /// Computes the right Jacobian of SO(3), with t = |d| and [d]x^2 = d d' - t^2 I:
   ///
   ///   J = I - (1 - cos t) / t^2 [d]x + (t - sin t) / t^3 [d]x^2     [Sola2017] eq. 183
   static void PlusJacobian(const double*, const double* d, double* j) {
@@ -204,13 +205,14 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
 };
 
 /// S^2: y = cos|d| x + sin|d|/|d| B(x) d, with B(x) (3x2) an orthonormal basis of the plane normal
-/// to x. All ways to the antipode of x are equally short: (-) returns (pi, 0).  Basis: [Duff2017].
+/// to x. All geodesics to the antipode of x are equally long: (-) returns (pi, 0) there.
+/// Basis: [Duff2017].
 struct UnitVector : detail::UnitLength<UnitVector, 3> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_VECTOR;
   static constexpr int kAmbient = 3, kTangent = 2;
   static constexpr std::array<double, 3> kIdentity{0.0, 0.0, 1.0};
 
-  /// b = B(x), row-major 3x2.
+  /// Computes b = B(x), row-major 3x2.
   template <class T>
   static void Basis(const T* x, T* b) {
     const double sign = x[2] < T(0.0) ? -1.0 : 1.0;
@@ -266,36 +268,36 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
     d[0] = k * p[0];
     d[1] = k * p[1];
   }
-  /// j (2x2, row-major): parallel transport, J = B(to)' R B(from), where R turns `from` into `to`
-  /// the short way, R v = v - (from + to) (to . v) / (1 + from . to). All ways to the antipode are
-  /// equally short; this is the one along the first basis vector.
-  static void Transport(const double* from, const double* to, double* j) {
-    double b_from[6], b_to[6];
-    Basis(from, b_from);
-    Basis(to, b_to);
-    const double c = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
+  /// Computes the parallel transport j = B(y)' R B(x) (2x2, row-major). R is the smallest rotation
+  /// of x to y, R v = v - (x + y) (y . v) / (1 + x . y). All geodesics to the antipode are equally
+  /// long; there, the transport follows the first basis vector.
+  static void Transport(const double* x, const double* y, double* j) {
+    double b_x[6], b_y[6];
+    Basis(x, b_x);
+    Basis(y, b_y);
+    const double c = x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
     constexpr double kAntipode = 1e-14;
     for (int column = 0; column < 2; ++column) {
       double v[3];
-      for (int i = 0; i < 3; ++i) v[i] = b_from[2 * i + column];
+      for (int i = 0; i < 3; ++i) v[i] = b_x[2 * i + column];
       if (1.0 + c > kAntipode) {
-        const double k = (to[0] * v[0] + to[1] * v[1] + to[2] * v[2]) / (1.0 + c);
-        for (int i = 0; i < 3; ++i) v[i] -= k * (from[i] + to[i]);
+        const double k = (y[0] * v[0] + y[1] * v[1] + y[2] * v[2]) / (1.0 + c);
+        for (int i = 0; i < 3; ++i) v[i] -= k * (x[i] + y[i]);
       } else if (column == 0) {
         for (int i = 0; i < 3; ++i) v[i] = -v[i];
       }
       for (int row = 0; row < 2; ++row) {
-        j[2 * row + column] = b_to[row] * v[0] + b_to[2 + row] * v[1] + b_to[4 + row] * v[2];
+        j[2 * row + column] = b_y[row] * v[0] + b_y[2 + row] * v[1] + b_y[4 + row] * v[2];
       }
     }
   }
-  /// The derivative of the exponential map of S^2, then the parallel transport to x (+) d: lengths
-  /// along d stay, lengths across d are multiplied by sin |d| / |d|.
+  /// Computes the derivative of the exponential map of S^2, followed by the parallel transport to
+  /// x (+) d. It preserves lengths along d and multiplies lengths across d by sin |d| / |d|.
   static void PlusJacobian(const double* x, const double* d, double* j) {
     const double t2 = d[0] * d[0] + d[1] * d[1], t = std::sqrt(t2);
     constexpr double kSeries = 1e-4;
     const double s = t < kSeries ? 1.0 - t2 / 6.0 : std::sin(t) / t;
-    const double k = t < kSeries ? 1.0 / 6.0 : (1.0 - s) / t2;  // of d d'
+    const double k = t < kSeries ? 1.0 / 6.0 : (1.0 - s) / t2;  // coefficient of d d'
     double y[3], transport[4];
     Plus(x, d, y);
     Normalise(y);
@@ -309,18 +311,18 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
   }
 };
 
-/// Parts side by side, each with its own geometry: a composite measurement with correlated noise,
-/// such as a pose or a range with a bearing.
+/// Composite value whose parts each have a geometry: a measurement with correlated noise, such as a
+/// pose, or a range with a bearing.
 template <class... Parts>
 struct Product {
   static_assert(sizeof...(Parts) > 0 && ((Parts::kTangent > 0) && ... && true) &&
                     ((Parts::kGeometry != ALIDADE_PRODUCT) && ... && true),
-                "a part is of fixed size and no product");
+                "a part must have a fixed size and must not be a product");
   static constexpr std::uint32_t kGeometry = ALIDADE_PRODUCT;
   static constexpr int kAmbient = (Parts::kAmbient + ...), kTangent = (Parts::kTangent + ...);
   static constexpr std::size_t kParts = sizeof...(Parts);
 
-  /// f(Part{}, ambient offset, tangent offset) for every part.
+  /// Calls f(Part{}, ambient offset, tangent offset) for each part.
   template <class F>
   static void ForEachPart(const F& f) {
     int ambient = 0, tangent = 0;
@@ -345,7 +347,7 @@ struct HasTransport<G, std::void_t<decltype(&G::Transport)>> : std::true_type {}
 
 }  // namespace detail
 
-/// True if the tangent basis of G turns with the point, so that a covariance turns with it.
+/// True if the tangent basis of G rotates with the point, so that a covariance rotates with it.
 template <class G>
 inline constexpr bool kHasTransport = detail::HasTransport<G>::value;
 

@@ -11,25 +11,25 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/params.h"
 
-/// Representations of a landmark: the forms in which the state has a point of the world. Every
-/// representation provides the point as p = a + m / rho, which is all that the other code needs:
+/// Representations of a landmark: parametrisations of a point of the world in the state. Every
+/// representation provides the point as p = a + m / rho. All other code uses only this form:
 ///
 ///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, a point infinitely far
 ///
-/// with the camera at r, turned by q = world_from_cam. A representation has
+/// with the camera at r and its orientation q = world_from_cam. A representation has
 ///
 ///   using Spaces = std::tuple<...>;                      geometries of its blocks
-///   static constexpr std::array kRoles{Quantity{...}};   one for each, ALIDADE_ROLE_LANDMARK
-///   static constexpr const char* kName = "...";          its name in configs
+///   static constexpr std::array kRoles{Quantity{...}};   one per block, ALIDADE_ROLE_LANDMARK
+///   static constexpr const char* kName = "...";          name in configs
 ///   static constexpr bool kIsXyz = false;                true: y is the point p itself
-///   static Ray<T> ToRay(const T* y);                     y: values of the blocks side by side
-///   static bool FromRay(const Ray<T>& ray, T* y);        false: there is no such y
+///   static Ray<T> ToRay(const T* y);                     y: values of the blocks, concatenated
+///   static bool FromRay(const Ray<T>& ray, T* y);        false: the ray has no such y
 ///
-/// Unless kIsXyz, the last element of its tangent is rho. A new representation is a struct here, a
-/// value of LandmarkRepresentation, and an entry of LandmarkRepresentations.
+/// Unless kIsXyz, the last element of its tangent is rho. To add a representation, add a struct
+/// here, a value of LandmarkRepresentation, and an entry of LandmarkRepresentations.
 namespace alidade {
 
-/// p = a + m / rho.
+/// Ray to a point p = a + m / rho.
 template <class T>
 struct Ray {
   T origin[3];     ///< a, m
@@ -37,8 +37,8 @@ struct Ray {
   T rho;           ///< 1/m if m has unit length
 };
 
-/// Six numbers, the representation of MonoSLAM: the position of the camera that observed the point
-/// first, azimuth and elevation of the ray, and the inverse distance along it.
+/// Inverse-depth representation of MonoSLAM, six numbers: the position of the camera at the first
+/// observation, azimuth and elevation of the ray, and the inverse distance along the ray.
 ///
 ///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
 ///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
@@ -53,7 +53,7 @@ struct InverseDepth {
       Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
                "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
 
-  /// p = a + m / rho of y, and y of it, as above.
+  /// Convert y to its ray, and a ray to its y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     using std::cos;
@@ -77,8 +77,9 @@ struct InverseDepth {
   }
 };
 
-/// A unit vector and the inverse distance from an anchor. Landmarks that were first observed in one
-/// frame share their anchor. It has no pole, and three degrees of freedom of its own.
+/// Anchored inverse-distance representation: an anchor, a unit vector and the inverse distance from
+/// the anchor. Landmarks that were first observed in the same frame share their anchor, so each
+/// landmark adds three degrees of freedom. The representation has no pole.
 ///
 ///   y = (a, m, rho)
 ///
@@ -88,13 +89,14 @@ struct Anchored {
   static constexpr const char* kName = "anchored";
   static constexpr bool kIsXyz = false;
   static constexpr std::array kRoles{
-      Quantity{"anchor", "m", "position of the camera that observed it first", "x,y,z",
+      Quantity{"anchor", "m", "position of the camera at the first observation", "x,y,z",
                ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED},
-      Quantity{"direction", "", "from the anchor to the landmark, in the world", "x,y,z",
+      Quantity{"direction", "", "direction from the anchor to the landmark, in the world", "x,y,z",
                ALIDADE_ROLE_LANDMARK},
-      Quantity{"inverse_distance", "1/m", "from the anchor", "", ALIDADE_ROLE_LANDMARK}};
+      Quantity{"inverse_distance", "1/m", "inverse distance from the anchor", "",
+               ALIDADE_ROLE_LANDMARK}};
 
-  /// p = a + m / rho of y, and y of it, as above.
+  /// Convert y to its ray, and a ray to its y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {y[3], y[4], y[5]}, y[6]};
@@ -108,16 +110,16 @@ struct Anchored {
   }
 };
 
-/// The point itself, y = p: a ray of length zero, so that (1) is h = R_CW (p - r). FromRay is false
-/// unless rho > 0.
+/// Representation by the point itself, y = p. Its ray has m = 0 and rho = 1, so that (1) is
+/// h = R_CW (p - r). FromRay returns false unless rho > 0.
 struct Xyz {
   using Spaces = std::tuple<Vec<3>>;
   static constexpr const char* kName = "xyz";
   static constexpr bool kIsXyz = true;
-  static constexpr std::array kRoles{
-      Quantity{"landmark", "m", "the point in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
+  static constexpr std::array kRoles{Quantity{"landmark", "m", "position of the point in the world",
+                                              "x,y,z", ALIDADE_ROLE_LANDMARK}};
 
-  /// p = a + m / rho of y, and y of it, as above.
+  /// Convert y to its ray, and a ray to its y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {T(0.0), T(0.0), T(0.0)}, T(1.0)};
@@ -130,10 +132,10 @@ struct Xyz {
   }
 };
 
-/// The representations, as `landmarks.representation` selects one.
+/// Choices of `landmarks.representation`.
 enum class LandmarkRepresentation { kInverseDepth, kAnchored, kXyz };
 
-/// The structs of LandmarkRepresentation, in its order.
+/// Structs of the representations, in the order of LandmarkRepresentation.
 using LandmarkRepresentations = std::tuple<InverseDepth, Anchored, Xyz>;
 
 namespace detail {
@@ -146,7 +148,7 @@ struct RepresentationTraits<std::tuple<Representations...>> {
       Representations::kName...};
   static constexpr int kMaxTangent = std::max({Blocks<Representations>::kTangent...});
 
-  /// Calls f(Representation{}) with the representation of this index.
+  /// Calls f(Representation{}) with the representation at this index.
   template <class F>
   static auto Visit(int index, const F& f) {
     using First = std::tuple_element_t<0, std::tuple<Representations...>>;
@@ -170,25 +172,26 @@ inline LandmarkRepresentation ReadLandmarkRepresentation(Params& params) {
                     "representation of a landmark in the state", 0));
 }
 
-/// f(Representation{}) with the struct of a representation.
+/// Calls f(Representation{}) with the struct of a representation, and returns its result.
 template <class F>
 auto WithRepresentation(LandmarkRepresentation representation, const F& f) {
   return detail::RepresentationTraits<LandmarkRepresentations>::Visit(
       static_cast<int>(representation), f);
 }
 
-/// h of (1), 3 numbers.
+/// Computes h of (1), 3 numbers.
 template <class T>
 void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) {
-  T along[3];
+  T difference[3];
   for (int i = 0; i < 3; ++i) {
-    along[i] = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
+    difference[i] = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
   }
-  UnitQuaternion::RotateBack(orientation, along, h);
+  UnitQuaternion::RotateBack(orientation, difference, h);
 }
 
-/// Inverse measurement model: y of the point that a camera sees along h (in the camera, of any
-/// length) at the inverse distance rho, 1/m. Returns false if the representation has no such y.
+/// Inverse measurement model: computes y of the point that a camera observes along h at the inverse
+/// distance rho, 1/m. h is a direction in the camera frame, of any length. Returns false if the
+/// representation has no such y.
 template <class Representation, class T>
 bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;
@@ -199,7 +202,7 @@ bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T&
   return Representation::FromRay(ray, y);
 }
 
-/// The ray of a landmark whose blocks have these values.
+/// Returns the ray of a landmark whose blocks have these values.
 template <class Representation>
 Ray<double> RayOf(const double* const* blocks) {
   double y[detail::Blocks<Representation>::kAmbient];
@@ -214,8 +217,8 @@ Ray<double> RayOf(const double* const* blocks) {
   return Representation::ToRay(y);
 }
 
-/// p = a + m / rho of a landmark. Also writes the Jacobian J_p_y, 3 x tangent of its blocks, unless
-/// it is empty. kOutOfDomain unless rho > 0.
+/// Computes p = a + m / rho of a landmark, and unless J_p_y is empty also the Jacobian J_p_y
+/// (3 x tangent of its blocks). Returns kOutOfDomain unless rho > 0.
 template <class Representation>
 Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   constexpr int n = detail::Blocks<Representation>::kTangent;
@@ -229,15 +232,15 @@ Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}
   return Status::kOk;
 }
 
-/// L_d = 4 sigma_rho |cos alpha| / (rho^2 d1), d1 = |p - r|, alpha the angle between the rays to p
-/// from the anchor and from the camera at r; sigma_rho in 1/m. Small if p is almost Gaussian;
-/// infinite at rho = 0, zero for Xyz.  [Civera2008] sec. III.
+/// Returns L_d = 4 sigma_rho |cos alpha| / (rho^2 d1) with d1 = |p - r|. alpha is the angle between
+/// the rays to p from the anchor and from the camera at r; sigma_rho is in 1/m. L_d is small if p
+/// is almost Gaussian, infinite at rho = 0, and zero for Xyz.  [Civera2008] sec. III.
 inline double LinearityIndex(const Ray<double>& ray, double sigma_rho, const double* position) {
-  double dot = 0.0, length2 = 0.0;  // with rho (p - r), so that nothing is divided by rho^2
+  double dot = 0.0, length2 = 0.0;  // of rho (p - r), which avoids a division by rho^2
   for (int i = 0; i < 3; ++i) {
-    const double along = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
-    dot += along * ray.direction[i];
-    length2 += along * along;
+    const double scaled = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
+    dot += scaled * ray.direction[i];
+    length2 += scaled * scaled;
   }
   if (dot == 0.0) return 0.0;
   if (ray.rho == 0.0) return std::numeric_limits<double>::infinity();

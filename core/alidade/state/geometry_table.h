@@ -13,35 +13,35 @@
 
 namespace alidade {
 
-/// A geometry as it is used at run time: its facts, and its functions on doubles. A vector and a
-/// product have no functions here, because the model determines their sizes.
+/// Entry of the table of geometries: the properties of a geometry, and its functions on doubles. A
+/// vector and a product have no functions here, because the model determines their sizes.
 struct GeometryRow {
-  std::uint32_t number = 0;  ///< in the C table
+  std::uint32_t number = 0;  ///< number in the C table
   const char* name = "";
-  const char* elements = "";          ///< of a value, comma separated; "" for numbers
-  const char* tangent_elements = "";  ///< of a difference; "" for the same as `elements`
+  const char* elements = "";          ///< element names of a value, comma-separated; "": numbered
+  const char* tangent_elements = "";  ///< element names of a difference; "": as `elements`
   std::uint32_t angular = 0;          ///< bit i: element i of a difference is an angle in rad
-  bool double_cover = false;          ///< true if x and -x are one value
-  int ambient = 0, tangent = 0;       ///< sizes of a value and of a difference; 0: the model's
+  bool double_cover = false;          ///< true if x and -x are the same value
+  int ambient = 0, tangent = 0;       ///< sizes of a value and of a difference; 0: from the model
   const double* identity = nullptr;
   void (*plus)(const double* x, const double* d, double* y) = nullptr;
   void (*minus)(const double* y, const double* x, double* d) = nullptr;
   void (*normalise)(double* x) = nullptr;
   double (*distance)(const double* x) = nullptr;  ///< null: every x is a point of the manifold
-  void (*transport)(const double* from, const double* to, double* j) = nullptr;  ///< null: identity
+  void (*transport)(const double* x, const double* y, double* j) = nullptr;  ///< null: identity
   void (*plus_jacobian)(const double* x, const double* d, double* j) = nullptr;
 };
 
 namespace detail {
 
-/// j = d(x (+) (d + e))/de at e = 0, in the tangent space at x (+) d, by dual numbers.
+/// Computes j = d(x (+) (d + e))/de at e = 0, in the tangent space at x (+) d, by dual numbers.
 template <class G>
 void DifferentiatePlus(const double* x, const double* d, double* j) {
   using Dual = Jet<double, G::kTangent>;
-  Dual moved[G::kTangent], y[G::kAmbient], difference[G::kTangent];
+  Dual dual_d[G::kTangent], y[G::kAmbient], difference[G::kTangent];
   double base[G::kAmbient];
-  for (int i = 0; i < G::kTangent; ++i) moved[i] = Dual(d[i], i);
-  G::Plus(x, moved, y);
+  for (int i = 0; i < G::kTangent; ++i) dual_d[i] = Dual(d[i], i);
+  G::Plus(x, dual_d, y);
   for (int i = 0; i < G::kAmbient; ++i) base[i] = y[i].a;
   G::Minus(y, base, difference);
   for (int i = 0; i < G::kTangent; ++i) {
@@ -49,12 +49,12 @@ void DifferentiatePlus(const double* x, const double* d, double* j) {
   }
 }
 
-/// The row of the struct G of alidade/model/geometry.h.
+/// Entry for the struct G of alidade/model/geometry.h.
 template <class G>
 struct TypedRow : GeometryRow {
   using Type = G;
 
-  constexpr explicit TypedRow(GeometryRow facts) : GeometryRow(facts) {
+  constexpr explicit TypedRow(GeometryRow properties) : GeometryRow(properties) {
     number = G::kGeometry;
     ambient = G::kAmbient;
     tangent = G::kTangent;
@@ -77,7 +77,8 @@ struct TypedRow : GeometryRow {
   }
 };
 
-/// All geometries of fixed size. A new one is a struct in alidade/model/geometry.h and a row here.
+/// All geometries of fixed size. To add one, add a struct to alidade/model/geometry.h and an entry
+/// here.
 inline constexpr std::tuple kGeometries{
     TypedRow<Angle>({.name = "angle", .angular = 0b1}),
     TypedRow<UnitQuaternion>({.name = "unit_quaternion",
@@ -92,7 +93,7 @@ inline constexpr std::tuple kGeometries{
 inline constexpr GeometryRow kVectorRow{.number = ALIDADE_VECTOR, .name = "vector"};
 inline constexpr GeometryRow kProductRow{.number = ALIDADE_PRODUCT, .name = "product"};
 
-/// The rows of all geometries, those of the model's size too.
+/// The entries of all geometries, including those whose size the model determines.
 inline constexpr auto kGeometryRows = std::apply(
     [](const auto&... rows) {
       return std::array<const GeometryRow*, sizeof...(rows) + 2>{&kVectorRow, &rows...,
@@ -100,13 +101,13 @@ inline constexpr auto kGeometryRows = std::apply(
     },
     kGeometries);
 
-/// The largest number of tangent elements of a geometry of fixed size.
+/// Largest number of tangent elements of a geometry of fixed size.
 inline constexpr int kMaxTangent =
     std::apply([](const auto&... rows) { return std::max({rows.tangent...}); }, kGeometries);
 
 }  // namespace detail
 
-/// The row of a geometry by its number in the C table; null if there is none.
+/// Returns the entry of a geometry by its number in the C table; null if the number is unknown.
 constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   for (const GeometryRow* row : detail::kGeometryRows) {
     if (row->number == number) return row;
@@ -114,8 +115,8 @@ constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   return nullptr;
 }
 
-/// Calls f(G{}) with the struct G of the geometry of fixed size that has this number. Returns false,
-/// and calls nothing, for a vector and a product.
+/// Calls f(G{}) with the struct G of the geometry of fixed size that has this number. For a vector
+/// and a product, returns false without a call.
 template <class F>
 bool VisitGeometry(std::uint32_t number, const F& f) {
   const auto visit = [&](const auto& row) {

@@ -16,8 +16,8 @@ void SetIdentity(int size, double* j) {
   }
 }
 
-/// Fills j, of the whole geometry: the identity, with the block write(part, ambient offset, tangent
-/// offset, block) for each part that is not a vector.
+/// Sets j of a geometry to the identity, except the diagonal blocks of the parts that are not
+/// vectors. write(part, ambient offset, tangent offset, block) computes the block of a part.
 template <class Write>
 void FillByParts(const Geometry& geometry, double* j, const Write& write) {
   const int size = geometry.tangent;
@@ -41,15 +41,15 @@ Geometry::Geometry(std::uint32_t number, int size) : row_(FindGeometry(number)) 
 }
 
 Geometry Geometry::Product(std::vector<Geometry> parts) {
-  Geometry whole;
-  whole.row_ = &detail::kProductRow;
-  whole.ambient = whole.tangent = 0;
-  whole.parts = std::move(parts);
-  for (const Geometry& part : whole.parts) {
-    whole.ambient += part.ambient;
-    whole.tangent += part.tangent;
+  Geometry product;
+  product.row_ = &detail::kProductRow;
+  product.ambient = product.tangent = 0;
+  product.parts = std::move(parts);
+  for (const Geometry& part : product.parts) {
+    product.ambient += part.ambient;
+    product.tangent += part.tangent;
   }
-  return whole;
+  return product;
 }
 
 std::string ToString(const Geometry& geometry) {
@@ -70,11 +70,11 @@ bool Geometry::has_transport() const {
 }
 
 bool Geometry::IsAngular(int i) const {
-  bool angular = false;
+  bool is_angle = false;
   ForEachPart([&](const Geometry& part, int, int t) {
-    if (i >= t && i < t + part.tangent) angular = (part.row_->angular >> (i - t) & 1U) != 0;
+    if (i >= t && i < t + part.tangent) is_angle = (part.row_->angular >> (i - t) & 1U) != 0;
   });
-  return angular;
+  return is_angle;
 }
 
 bool Geometry::is_angular() const {
@@ -94,11 +94,11 @@ void Geometry::MinusCurved(const double* y, const double* x, double* d) const {
   ForEachPart([&](const Geometry& part, int a, int t) { part.Minus(y + a, x + a, d + t); });
 }
 
-void Geometry::Transport(const double* from, const double* to, double* j) const {
-  if (row_->transport != nullptr) return row_->transport(from, to, j);
+void Geometry::Transport(const double* x, const double* y, double* j) const {
+  if (row_->transport != nullptr) return row_->transport(x, y, j);
   FillByParts(*this, j, [&](const Geometry& part, int a, int, double* block) {
     if (part.row_->transport == nullptr) return SetIdentity(part.tangent, block);
-    part.row_->transport(from + a, to + a, block);
+    part.row_->transport(x + a, y + a, block);
   });
 }
 
@@ -109,13 +109,13 @@ void PlusJacobian(const Geometry& geometry, const double* x, const double* d, do
 }
 
 double DistanceFrom(const Geometry& geometry, const double* x) {
-  double worst = 0.0;
+  double largest = 0.0;
   geometry.ForEachPart([&](const Geometry& part, int a, int) {
-    const auto distance = part.row().distance;
-    const double defect = distance == nullptr ? 0.0 : distance(x + a);
-    if (!(defect <= worst)) worst = defect;
+    const auto function = part.row().distance;
+    const double distance = function == nullptr ? 0.0 : function(x + a);
+    if (!(distance <= largest)) largest = distance;
   });
-  return worst;
+  return largest;
 }
 
 void Geometry::Normalise(double* x) const {

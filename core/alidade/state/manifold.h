@@ -10,22 +10,24 @@
 
 namespace alidade {
 
-/// The largest accepted difference from 1 of the length of a unit vector or quaternion that the
-/// library did not compute itself.
+/// Largest accepted deviation from 1 of the length of a unit vector or quaternion that comes from
+/// outside the library.
 inline constexpr double kUnitTolerance = 1e-3;
 
-/// A geometry of alidade/model/geometry.h that is chosen at run time, with its size.
+/// Geometry of alidade/model/geometry.h, selected at run time, with its size.
 class Geometry {
  public:
   int ambient = 1;
   int tangent = 1;
-  std::vector<Geometry> parts = {};  ///< of a product
+  std::vector<Geometry> parts = {};  ///< parts of a product
 
-  /// R^1
+  /// Constructs R^1.
   Geometry() : Geometry(ALIDADE_VECTOR) {}
-  /// The geometry with this number in the C table, which is not a product; `size`: of a vector.
+  /// Constructs the geometry with this number in the C table; not a product. Only a vector uses
+  /// `size`.
   explicit Geometry(std::uint32_t number, int size = 1);
-  /// The geometry of a struct of geometry.h; `size`: of a vector whose size is kDynamic.
+  /// Returns the geometry of a struct of geometry.h. `size` is the size of a vector with the size
+  /// kDynamic.
   template <class G>
   static Geometry Of(int size = G::kAmbient) {
     return Geometry(G::kGeometry, size);
@@ -36,22 +38,22 @@ class Geometry {
   static Geometry Angle() { return Of<alidade::Angle>(); }
   static Geometry Product(std::vector<Geometry> parts);
 
-  /// The entry of the table of geometries.
+  /// Returns the entry in the table of geometries.
   const GeometryRow& row() const { return *row_; }
   const char* name() const { return row_->name; }
   bool is_vector() const { return row_->number == ALIDADE_VECTOR; }
   bool is_product() const { return row_->number == ALIDADE_PRODUCT; }
   bool is_angle() const { return row_->number == ALIDADE_ANGLE; }
-  /// True if the tangent basis turns with the point, so that a covariance turns with it; of a
-  /// product: that of a part.
+  /// Returns true if the tangent basis rotates with the point, so that a covariance rotates with
+  /// it. For a product, returns true if that holds for a part.
   bool has_transport() const;
-  /// True if element `i` of a difference is an angle in rad.
+  /// Returns true if element `i` of a difference is an angle in rad.
   bool IsAngular(int i) const;
-  /// True if all elements of a difference are.
+  /// Returns true if all elements of a difference are angles.
   bool is_angular() const;
 
-  /// Calls f(part, ambient offset, tangent offset) for each part of a product; for any other
-  /// geometry once, for itself.
+  /// Calls f(part, ambient offset, tangent offset) for each part of a product. For any other
+  /// geometry, calls f once with the geometry itself.
   template <class F>
   void ForEachPart(const F& f) const {
     if (!is_product()) return f(*this, 0, 0);
@@ -63,19 +65,20 @@ class Geometry {
     }
   }
 
-  /// y = x (+) d; x and y may be the same. The result lies on the manifold to rounding.
+  /// Computes y = x (+) d; x and y may be the same array. The result lies on the manifold to
+  /// rounding.
   void Plus(const double* x, const double* d, double* y) const;
-  /// d = y (-) x
+  /// Computes d = y (-) x.
   void Minus(const double* y, const double* x, double* d) const {
     if (!is_vector()) return MinusCurved(y, x, d);
     for (int i = 0; i < ambient; ++i) d[i] = y[i] - x[i];
   }
-  /// Carries a tangent vector at `from` to the tangent space of `to` along the geodesic: writes j
-  /// (tangent x tangent, row-major). It is the identity unless has_transport().
-  void Transport(const double* from, const double* to, double* j) const;
+  /// Computes the matrix j (tangent x tangent, row-major) that transports a tangent vector at x
+  /// along the geodesic to the tangent space of y. It is the identity unless has_transport().
+  void Transport(const double* x, const double* y, double* j) const;
   /// Moves x to the nearest point of the manifold; wraps an angle.
   void Normalise(double* x) const;
-  /// The neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
+  /// Returns the neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
   std::vector<double> Identity() const;
 
   friend bool operator==(const Geometry& a, const Geometry& b) {
@@ -85,27 +88,28 @@ class Geometry {
  private:
   void MinusCurved(const double* y, const double* x, double* d) const;
 
-  const GeometryRow* row_;  ///< in the table of the library, which outlives every plugin
+  const GeometryRow* row_;  ///< entry in the table of the library, which outlives every plugin
 };
 
-/// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
+/// Computes j = d(x (+) d)/dd (tangent x tangent, row-major), in the tangent space at x (+) d: the
 /// identity for vectors, for angles, and at d = 0.
 void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
-/// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
-/// that of the farthest part for products.
+/// Returns the distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and
+/// quaternions, the largest distance of a part for products.
 double DistanceFrom(const Geometry& geometry, const double* x);
 /// Wraps each part of x that is an angle.
 void WrapAngles(const Geometry& geometry, double* x);
 
-/// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`, `product(vector(3), unit_quaternion)`.
+/// Returns the name of a geometry: `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`,
+/// `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);
 
-/// A named quantity with its geometry: a role, a measurement, a control input, a state block.
+/// A named quantity with its geometry: a role, a measurement, a control input or a state block.
 struct Space {
   std::string name;
   std::string unit;
   std::string doc;
-  std::vector<std::string> elements;  ///< names of the ambient elements; {""} for a single one
+  std::vector<std::string> elements;  ///< names of the ambient elements; {""} for one element
   Geometry geometry;
   unsigned flags = 0;                   ///< ALIDADE_ROLE_*
   std::vector<std::string> parts = {};  ///< names of the parts of a product
@@ -115,7 +119,7 @@ struct Space {
   bool shared() const { return (flags & ALIDADE_ROLE_SHARED) != 0; }
 };
 
-/// `name` or `name.element` for each ambient element: the columns of a value.
+/// Returns `name` or `name.element` for each ambient element: the columns of a value.
 std::vector<std::string> ColumnNames(const std::string& name, const Space& space);
 
 }  // namespace alidade

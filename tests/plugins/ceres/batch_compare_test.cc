@@ -313,7 +313,7 @@ Comparison CompareScene(const std::string& more) {
 TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   const DecompositionStep step = CompareScene("").decomposition[0];
   EXPECT_TRUE(step.at_end);
-  EXPECT_EQ(step.from + ' ' + step.to, "ekf batch_accepted");
+  EXPECT_EQ(step.estimator + ' ' + step.reference, "ekf batch_accepted");
   const Comparison with =
       CompareScene("{type: ceres_batch, mode: filtering, use: {accepted_by: ekf}}");
   EXPECT_FALSE(with.decomposition[0].at_end);
@@ -360,7 +360,7 @@ TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
             "no reference: estimator 'ekf' failed, the comparison with it is withheld (1 of 2 "
             "runs)");
   const std::string text = CompareReport(both, TableStyle::kText);
-  EXPECT_NE(text.find("ratio and difference: to ekf"), text.npos) << text;
+  EXPECT_NE(text.find("ratios and differences relative to ekf"), text.npos) << text;
   EXPECT_NE(text.find("runs with a reference"), text.npos) << text;
 }
 

@@ -74,7 +74,8 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' has no reference: no batch "
                                                         "uses its sensors"}));
   const std::string text = CompareReport(comparison, TableStyle::kText);
-  EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
+  EXPECT_NE(text.find("ratios and differences relative to the reference of each column"), text.npos)
+      << text;
 }
 
 // A batch with other overrides, such as a robust loss, is a reference only if no batch of the same
@@ -101,7 +102,7 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
     const Comparison comparison = CompareRuns({RunOf(entries)}, {});
     EXPECT_EQ(comparison.withheld, "");
     EXPECT_EQ(Find(comparison, "ekf").final_reference, "batch");
-    EXPECT_EQ(comparison.decomposition[0].to, "batch");
+    EXPECT_EQ(comparison.decomposition[0].reference, "batch");
   }
   const Comparison alone = CompareRuns({RunOf({failed, ekf})}, {});
   EXPECT_EQ(alone.withheld,
@@ -186,7 +187,7 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   const DecompositionStep& step = comparison.decomposition[0];
   EXPECT_TRUE(step.at_end);
   EXPECT_EQ(step.withheld, "");
-  EXPECT_EQ(step.to, "batch");
+  EXPECT_EQ(step.reference, "batch");
   const auto value = [&](const char* key) { return step.values.at(key).mean; };
   EXPECT_EQ(value("rmsd:p.x"), 1.5);
   EXPECT_EQ(value("rmsd.sigmas:p"), 3.0);
@@ -195,7 +196,8 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   EXPECT_EQ(value("rmsd:map"), 0.375);
   EXPECT_LT(value("rmsd:map.sim3"), 1e-12);
   const std::string text = CompareReport(comparison, TableStyle::kText);
-  EXPECT_NE(text.find("linearisation, ekf against batch, at the last frame\n"), text.npos) << text;
+  EXPECT_NE(text.find("linearisation, ekf compared with batch, at the last frame\n"), text.npos)
+      << text;
   EXPECT_NE(text.find("\nmap [m]"), text.npos) << text;
   EXPECT_NE(CompareJson(comparison).find("\"at_end\": true"), std::string::npos);
 }
@@ -206,11 +208,12 @@ TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   accepted.result.accepted_by = "ekf";
   const Candidate ekf = Entry("ekf", "ekf", false, 2.0);
   const Candidate batch = Entry("batch", "ceres_batch", true, 0.5);
-  EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).decomposition[0].to, "accepted");
+  EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).decomposition[0].reference,
+            "accepted");
   Candidate full_information = Entry("full_information", "ceres_batch", false, 1.5);
   const DecompositionStep step =
       CompareRuns({RunOf({ekf, batch, accepted, full_information})}, {}).decomposition[0];
-  EXPECT_EQ(step.to, "full_information");
+  EXPECT_EQ(step.reference, "full_information");
   EXPECT_FALSE(step.at_end);
 }
 

@@ -62,7 +62,7 @@ TEST(CompareReport, IntervalsOfFewRunsAreSaidToBeSo) {
     const std::string text = CompareReport(comparison, TableStyle::kText);
     EXPECT_TRUE(Contains(text, "2.0000 [1.9000, 2.1000]")) << text;
     EXPECT_EQ(Contains(text, "2.1000] too few runs"), runs < 10) << text;
-    EXPECT_EQ(Contains(text, "too few runs: of fewer than 10"), runs < 10) << text;
+    EXPECT_EQ(Contains(text, "too few runs: with fewer than 10"), runs < 10) << text;
   }
 }
 

@@ -25,8 +25,8 @@ Comparison OneRun(double error, bool filter_diverged = false) {
   one.estimators[1].name = "batch";
   DecompositionStep& step = one.decomposition.emplace_back();
   step.kind = DecompositionKind::kRejected;
-  step.from = "accepted";
-  step.to = "batch";
+  step.estimator = "accepted";
+  step.reference = "batch";
   step.values["rejected"] = {error, error, error, error};
   return one;
 }
@@ -66,7 +66,7 @@ TEST(Summarise, SaysInHowManyRunsANoteHolds) {
 
 TEST(Summarise, TakesAStepBetweenTheSameTwoAlone) {
   Comparison other = OneRun(7.0);
-  other.decomposition[0].to = "another";
+  other.decomposition[0].reference = "another";
   EXPECT_EQ(Summarise({OneRun(1.0), other}).decomposition[0].values.at("rejected").mean, 1.0);
 }
 

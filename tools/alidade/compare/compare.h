@@ -17,6 +17,7 @@
 /// uses all data: the reference of each estimator is a batch of the same data.
 namespace alidade {
 
+/// Options of a comparison.
 struct CompareOptions {
   /// Reference of the errors: `truth`, or the name of an estimator. "": truth if it is known, else
   /// the batch.
@@ -42,14 +43,14 @@ struct CompareOptions {
 ///   trajectory.sim3.rmsd           RMSD of the trajectory after alignment by a similarity, m
 ///   map.rmsd                       RMSD of the landmark positions at the end, m
 ///   map.sim3.rmsd                  the same after alignment of the map by a similarity, m
-///   time_us                        wall clock for each measurement
+///   time_us                        wall-clock time for each measurement
 ///   cpu_us                         CPU time for each frame; for a batch, without cpu_us.start
 ///   cpu_us.start                   CPU time of the filter from which a batch starts
 struct ComparedEstimator {
   std::string name, type;
-  bool smoothed = false;        ///< its estimates also use later data
-  std::string reference;        ///< of its estimates along the run; "": no reference
-  std::string final_reference;  ///< of the last estimate and the map
+  bool smoothed = false;        ///< true if its estimates also use later data
+  std::string reference;        ///< reference of its estimates over the run; "": no reference
+  std::string final_reference;  ///< reference of the last estimate and of the map
   /// Number of used runs in which the reference exists.
   std::int64_t reference_runs = 0, final_reference_runs = 0;
   std::map<std::string, Spread> values;
@@ -59,8 +60,8 @@ struct ComparedEstimator {
   std::map<std::string, std::string> units;  ///< of blocks
   std::int64_t used = 0;                     ///< number of runs that the values use
   std::int64_t diverged = 0;                 ///< number of runs in which it diverged
-  ErrorSeries series;                        ///< of one run of several seeds
-  OverTime over_time;                        ///< over several runs
+  ErrorSeries series;                        ///< errors of one run of several seeds
+  OverTime over_time;                        ///< averages over several runs
   /// Interval that contains the mean error over several runs with probability 0.95, by KEY.
   std::map<std::string, Interval> mean_intervals = {};
 };
@@ -75,18 +76,19 @@ enum class DecompositionKind {
 const char* ToString(DecompositionKind kind);
 
 /// One step from the filter to the batch. Values: `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the
-/// two estimators; `rmse.from:BLOCK` and `rmse.to:BLOCK`, their RMSE relative to truth;
-/// `measurements` and `rejected`, of kRejected only. With `at_end` the values are those of the last
-/// frame, and BLOCK may also be `map` or `map.sim3`.
+/// two estimators; `rmse.from:BLOCK` and `rmse.to:BLOCK`, the RMSE of `estimator` and `reference`
+/// relative to truth; `measurements` and `rejected`, only for kRejected. If `at_end` is true, the
+/// values are those of the last frame, and BLOCK may also be `map` or `map.sim3`.
 struct DecompositionStep {
   DecompositionKind kind = DecompositionKind::kLinearisation;
-  std::string from, to;  ///< names of the two estimators
-  bool at_end = false;   ///< at the last frame, because there is no full-information filter
+  std::string estimator, reference;  ///< names of the two estimators
+  bool at_end = false;  ///< at the last frame, because there is no full-information filter
   std::map<std::string, Spread> values;
-  std::map<std::string, Ratio> ratios;  ///< by `rmse:BLOCK`, of `from` relative to `to`
+  std::map<std::string, Ratio> ratios;  ///< by `rmse:BLOCK`, of `estimator` relative to `reference`
   std::string withheld;                 ///< why there are no values, or ""
 };
 
+/// Comparison of estimators over one run or several runs.
 struct Comparison {
   std::int64_t runs = 1;  ///< number of seeds, over which the values are spread
   std::int64_t frames = 0;
@@ -104,7 +106,7 @@ struct Comparison {
 struct ComparedExperiment {
   Config config;  ///< including the added estimators
   Experiment experiment;
-  std::string filter;              ///< whose error is decomposed; "": there is no filter
+  std::string filter;              ///< filter whose error is decomposed; "": no filter
   std::vector<std::string> added;  ///< names of the added estimators
   std::vector<std::string> notes;  ///< added estimators, and missing ones with the reason
   /// Note for steps that lack an estimator because of the budget; "": the budget excludes none.

@@ -74,8 +74,8 @@ DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, co
   DecompositionStep step;
   step.kind = kind;
   step.at_end = at_end;
-  if (start != nullptr) step.from = start->name;
-  if (end != nullptr) step.to = end->name;
+  if (start != nullptr) step.estimator = start->name;
+  if (end != nullptr) step.reference = end->name;
   if (start == nullptr || end == nullptr) {
     step.withheld = missing_reason;
     return step;

@@ -24,13 +24,13 @@ using internal::TableRow;
 
 namespace {
 
-/// The rows of one metric, or of its ratios to the reference.
+/// Selection of the rows of one metric, or of its ratios to the reference.
 struct RowKind {
   std::string metric, label;
   bool is_ratio = false;
 };
 
-/// A column of a table, in the form that rows are made of.
+/// Column of a table: the values of one estimator.
 struct Column {
   std::string name;
   std::map<std::string, Spread> values;
@@ -38,19 +38,19 @@ struct Column {
   std::map<std::string, Ratio> ratios = {};
 };
 
-/// A number as the other rows have it.
+/// Returns a number in the format of the other rows.
 std::string CellOf(double value) {
-  RunResult one;
-  one.estimators.resize(1);
-  one.estimators[0].metrics["value"] = value;
-  return RowsOf(one, "value", "")[0].cells[0];
+  RunResult result;
+  result.estimators.resize(1);
+  result.estimators[0].metrics["value"] = value;
+  return RowsOf(result, "value", "")[0].cells[0];
 }
 
-/// Of fewer runs an interval is not what it says: that of three, as of a t distribution, would have
-/// to be 2.7 times as wide for its 95 %, that of ten 1.2 times.
+/// With fewer runs, an interval contains the ratio with less than its nominal probability. By the t
+/// distribution, the 95 % interval of three runs would be 2.7 times as wide, and of ten 1.2 times.
 constexpr std::int64_t kFewRuns = 10;
 
-/// `1.0110 [0.9930, 1.0302] undecided`
+/// Returns a ratio with its interval: `1.0110 [0.9930, 1.0302] undecided`.
 std::string RatioText(const Ratio& ratio) {
   const auto text = [](double value) { return internal::FixedText(value, value < 10.0 ? 4 : 1); };
   if (!ratio.interval || ratio.error == ratio.reference_error) return CellOf(ratio.value());
@@ -61,7 +61,7 @@ std::string RatioText(const Ratio& ratio) {
                                 : "");
 }
 
-/// The ratios of a metric.
+/// Returns the rows with the ratios of a metric.
 std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
   std::map<std::string, TableRow> rows;  // by key
   for (const Column& column : columns) {
@@ -71,27 +71,27 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
       rows[key].label = kind.label + (parsed.subject.empty() ? "" : ' ' + parsed.subject);
     }
   }
-  std::vector<TableRow> all;
+  std::vector<TableRow> sorted_rows;
   for (auto& [key, row] : rows) {
     for (const Column& column : columns) {
       const auto found = column.ratios.find(key);
       row.cells.push_back(found == column.ratios.end() ? "-" : RatioText(found->second));
     }
-    all.push_back(std::move(row));
+    sorted_rows.push_back(std::move(row));
   }
-  return all;
+  return sorted_rows;
 }
 
-/// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
-/// numbers share their unit and decimals with all others of the row.
+/// Returns rows with the mean, and over several runs [p05, p95]. Formats these as three columns of
+/// one table, so that all numbers of a row have the same unit.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
-  RunResult all;
+  RunResult result;
   for (const Column& column : columns) {
     for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p95}) {
-      EstimatorResult& one = all.estimators.emplace_back();
-      one.units = column.units;
-      for (const auto& [key, spread] : column.values) one.metrics[key] = spread.*member;
+      EstimatorResult& estimator = result.estimators.emplace_back();
+      estimator.units = column.units;
+      for (const auto& [key, spread] : column.values) estimator.metrics[key] = spread.*member;
     }
   }
   std::vector<TableRow> rows;
@@ -101,12 +101,12 @@ std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool severa
       rows.insert(rows.end(), ratios.begin(), ratios.end());
       continue;
     }
-    for (TableRow& row : RowsOf(all, kind.metric, kind.label)) {
+    for (TableRow& row : RowsOf(result, kind.metric, kind.label)) {
       std::vector<std::string> cells;
       for (std::size_t i = 0; i < row.cells.size(); i += 3) {
         const std::string* const c = &row.cells[i];
-        const bool spread = several && c[0] != "-";
-        cells.push_back(spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
+        const bool has_spread = several && c[0] != "-";
+        cells.push_back(has_spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
       }
       rows.push_back({row.label, std::move(cells)});
     }
@@ -120,23 +120,24 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// What the columns of a table are compared with: in its title, or where they differ in a row.
-void TellReferences(const std::vector<std::string>& references, Section& section) {
+/// Adds the references of the columns to a table: to its title if they are equal, else as a row.
+void AppendReferences(const std::vector<std::string>& references, Section& section) {
   std::set<std::string> distinct(references.begin(), references.end());
   distinct.erase("");
   if (distinct.size() == 1) {
-    section.title += "; ratio and difference: to " + *distinct.begin();
+    section.title += "; ratios and differences relative to " + *distinct.begin();
   } else if (distinct.size() > 1) {
-    section.title += "; ratio and difference: to the reference of each";
+    section.title += "; ratios and differences relative to the reference of each column";
     TableRow row{"reference", {}};
-    for (const std::string& one : references) row.cells.push_back(one.empty() ? "-" : one);
+    for (const std::string& name : references) row.cells.push_back(name.empty() ? "-" : name);
     section.rows.push_back(row);
   }
 }
 
-/// A table of `of`, with what they are compared with, and over several runs in how many of them.
-Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const std::string& title,
-                std::string ComparedEstimator::*reference,
+/// Returns the table of estimators, with their references. If some runs lack the reference, it also
+/// has a row with the number of runs with a reference.
+Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
+                const std::string& title, std::string ComparedEstimator::*reference,
                 std::int64_t ComparedEstimator::*reference_runs,
                 const std::vector<RowKind>& kinds) {
   Section section;
@@ -144,23 +145,24 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
   std::vector<Column> columns;
   std::vector<std::string> references;
   TableRow with_reference{"runs with a reference", {}};
-  bool fewer = false;
-  for (const ComparedEstimator& one : of) {
-    columns.push_back({one.name, one.values, one.units, one.ratios});
-    references.push_back(one.*reference);
-    with_reference.cells.push_back(std::to_string(one.*reference_runs));
-    fewer = fewer || (one.*reference_runs > 0 && one.*reference_runs < one.used);
+  bool any_missing = false;
+  for (const ComparedEstimator& estimator : estimators) {
+    columns.push_back({estimator.name, estimator.values, estimator.units, estimator.ratios});
+    references.push_back(estimator.*reference);
+    with_reference.cells.push_back(std::to_string(estimator.*reference_runs));
+    any_missing = any_missing ||
+                  (estimator.*reference_runs > 0 && estimator.*reference_runs < estimator.used);
   }
   section.columns = Names(columns);
   const std::vector<TableRow> rows = SpreadRows(columns, several, kinds);
   if (rows.empty()) return section;
-  TellReferences(references, section);
+  AppendReferences(references, section);
   section.rows.insert(section.rows.end(), rows.begin(), rows.end());
-  if (fewer) section.rows.push_back(with_reference);
+  if (any_missing) section.rows.push_back(with_reference);
   return section;
 }
 
-/// The rows of a section. The short form has errors if truth is known, else differences.
+/// Returns the rows of a section. The short form has errors if truth is known, else differences.
 std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section, ReportRows rows) {
   const bool has_cpu_time = std::ranges::any_of(
       comparison.estimators,
@@ -178,50 +180,51 @@ std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section
     }
     kinds.push_back({metric.name, metric.label});
     if (!metric.has_ratio) continue;
-    const bool is_of_blocks = metric.subject == MetricSubject::kBlock;
+    const bool has_blocks = metric.subject == MetricSubject::kBlock;
     kinds.push_back(
-        {metric.name, is_of_blocks ? "  ratio" : std::string("  ratio, ") + metric.label, true});
+        {metric.name, has_blocks ? "  ratio" : std::string("  ratio, ") + metric.label, true});
   }
   return kinds;
 }
 
-/// The share of timestamps at which the average NEES over the runs is within its bounds.
-std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& of) {
+/// Returns rows with the share of timestamps at which the average NEES over the runs is within its
+/// bounds.
+std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& estimators) {
   std::set<std::string> owners;
-  for (const ComparedEstimator& one : of) {
-    for (const auto& [owner, nees] : one.over_time.nees) owners.insert(owner);
+  for (const ComparedEstimator& estimator : estimators) {
+    for (const auto& [owner, nees] : estimator.over_time.nees) owners.insert(owner);
   }
   std::vector<TableRow> rows;
   for (const std::string& owner : owners) {
     TableRow& row = rows.emplace_back(TableRow{"ANEES in its bounds " + owner + " [%]", {}});
-    for (const ComparedEstimator& one : of) {
-      const auto found = one.over_time.nees.find(owner);
-      const bool known = found != one.over_time.nees.end();
-      row.cells.push_back(known ? internal::RoundedText(100.0 * found->second.inside, 3) : "-");
+    for (const ComparedEstimator& estimator : estimators) {
+      const auto found = estimator.over_time.nees.find(owner);
+      const bool is_known = found != estimator.over_time.nees.end();
+      row.cells.push_back(is_known ? internal::RoundedText(100.0 * found->second.inside, 3) : "-");
     }
   }
   return rows;
 }
 
-/// The estimators along the run, of one kind: filters, or those that know later data.
+/// Returns the section with the values over the run, of the online or of the smoothed estimators.
 Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows rows) {
-  std::vector<ComparedEstimator> of;
+  std::vector<ComparedEstimator> estimators;
   TableRow diverged{"diverged", {}}, used{"runs used", {}};
   bool any_diverged = false;
-  for (const ComparedEstimator& one : comparison.estimators) {
-    if (one.smoothed != smoothed) continue;
-    of.push_back(one);
-    diverged.cells.push_back(std::to_string(one.diverged));
-    used.cells.push_back(std::to_string(one.used));
-    any_diverged = any_diverged || one.diverged > 0;
+  for (const ComparedEstimator& estimator : comparison.estimators) {
+    if (estimator.smoothed != smoothed) continue;
+    estimators.push_back(estimator);
+    diverged.cells.push_back(std::to_string(estimator.diverged));
+    used.cells.push_back(std::to_string(estimator.used));
+    any_diverged = any_diverged || estimator.diverged > 0;
   }
-  if (of.empty()) return {};
-  Section section = TableOf(of, comparison.runs > 1,
-                            smoothed ? "Smoothed: estimates from later data too"
-                                     : "Online: every estimate from the data up to it",
+  if (estimators.empty()) return {};
+  Section section = TableOf(estimators, comparison.runs > 1,
+                            smoothed ? "Smoothed: estimates that also use later data"
+                                     : "Online: estimates that use only past data",
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
                             KindsOf(comparison, MetricSection::kAlong, rows));
-  const std::vector<TableRow> average_nees = AverageNeesRows(of);
+  const std::vector<TableRow> average_nees = AverageNeesRows(estimators);
   section.rows.insert(section.rows.end(), average_nees.begin(), average_nees.end());
   if (any_diverged) section.rows.push_back(diverged);
   if (comparison.runs > 1) section.rows.push_back(used);
@@ -230,22 +233,22 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
 
 Section FinalSection(const Comparison& comparison, ReportRows rows) {
   return TableOf(comparison.estimators, comparison.runs > 1,
-                 "At the end, where all have the same data", &ComparedEstimator::final_reference,
+                 "At the end, when all have the same data", &ComparedEstimator::final_reference,
                  &ComparedEstimator::final_reference_runs,
                  KindsOf(comparison, MetricSection::kFinal, rows));
 }
 
-/// The values of one kind by their subject, under another kind.
-std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
-                                    const std::string& kind, const std::string& as) {
+/// Returns the values whose keys start with `kind`, with `new_kind` instead.
+std::map<std::string, Spread> WithKind(const std::map<std::string, Spread>& values,
+                                       const std::string& kind, const std::string& new_kind) {
   std::map<std::string, Spread> found;
   for (const auto& [key, value] : values) {
-    if (key.starts_with(kind)) found[as + key.substr(kind.size())] = value;
+    if (key.starts_with(kind)) found[new_kind + key.substr(kind.size())] = value;
   }
   return found;
 }
 
-/// `0.06 (target)`, the largest first; the largest itself goes to `largest`.
+/// Returns the distances in sigmas in descending order: `0.06 (target)`. Sets `largest`.
 std::string DistancesText(const DecompositionStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
   const std::string kind = "rmsd.sigmas:";
@@ -261,51 +264,56 @@ std::string DistancesText(const DecompositionStep& step, double& largest) {
   return internal::Join(parts);
 }
 
-/// What a step of the decomposition means, in words.
-std::string WordsOf(DecompositionKind kind) {
+/// Returns the meaning of a step of the decomposition.
+std::string MeaningOf(DecompositionKind kind) {
   switch (kind) {
     case DecompositionKind::kLinearisation:
-      return "what it costs that each measurement is linearised once, where the filter then was";
+      return "cost of linearising each measurement only once, at the filter's estimate of that "
+             "time";
     case DecompositionKind::kSmoothing:
-      return "what later data add to each estimate: a smoother can use it, a filter cannot";
+      return "gain from later data, which a smoother can use but a filter cannot";
     case DecompositionKind::kRejected:
       break;
   }
-  return "what the filter would have gained from what its gate and its other checks kept out";
+  return "gain from the measurements that the gate and other checks of the filter rejected";
 }
 
-std::string LinesOf(const DecompositionStep& step) {
+/// Returns the distance between the estimators of a step, or "" if it is unknown.
+std::string DistanceLine(const DecompositionStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
   if (distances.empty()) return "";
-  std::string line =
-      (step.at_end ? "difference " : "RMSD ") + distances + " in sigmas of " + step.to;
+  const std::string line = std::string(step.at_end ? "difference" : "RMSD") + " of " +
+                           step.estimator + " and " + step.reference + ", in sigmas of " +
+                           step.reference + ": " + distances;
   if (step.kind == DecompositionKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
-  return line + (largest < kNegligible ? ": negligible compared with what neither of them knows"
-                 : largest < kSmall    ? ": small compared with what neither of them knows"
-                 : largest < kLarge    ? ": not small compared with what neither of them knows"
-                                    : ": more than the uncertainty that is left: here it matters");
+  return line + (largest < kNegligible ? "; negligible: far below the remaining uncertainty"
+                 : largest < kSmall    ? "; small: below half of the remaining uncertainty"
+                 : largest < kLarge    ? "; not small: comparable with the remaining uncertainty"
+                                       : "; large: above the remaining uncertainty");
 }
 
-/// `3 of 226 measurements were not used`
+/// Returns `3 of 226 measurements were not used by the filter`, or "" if the counts are unknown.
 std::string RejectedText(const DecompositionStep& step) {
-  const auto rejected = step.values.find("rejected"), all = step.values.find("measurements");
-  if (rejected == step.values.end() || all == step.values.end()) return "";
+  const auto rejected = step.values.find("rejected"), total = step.values.find("measurements");
+  if (rejected == step.values.end() || total == step.values.end()) return "";
   return internal::RoundedText(rejected->second.mean, 6) + " of " +
-         internal::RoundedText(all->second.mean, 6) + " measurements were not used by the filter";
+         internal::RoundedText(total->second.mean, 6) + " measurements were not used by the filter";
 }
 
 Section DecompositionSection(const Comparison& comparison, const DecompositionStep& step) {
   Section section;
-  const std::string pair =
-      step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
+  const std::string pair = step.estimator.empty() || step.reference.empty()
+                               ? ""
+                               : ", " + step.estimator + " compared with " + step.reference;
   section.title = ToString(step.kind);
   std::ranges::replace(section.title, '_', ' ');
   section.title += pair + (step.at_end ? ", at the last frame" : "");
-  section.lines.push_back(WordsOf(step.kind));
+  section.lines.push_back(MeaningOf(step.kind));
   if (step.at_end) {
-    section.lines.emplace_back("there the batch of all data is the full-information filter");
+    section.lines.emplace_back(
+        "at the last frame, the batch of all data equals the full-information filter");
   }
   if (step.kind == DecompositionKind::kRejected) {
     section.lines.push_back(RejectedText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
@@ -313,20 +321,20 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
   const auto rejected = step.values.find("rejected");
   if (rejected != step.values.end() && rejected->second.mean == 0.0) return section;
   if (!step.withheld.empty()) {
-    section.lines.push_back("not known: " + step.withheld);
+    section.lines.push_back("not available: " + step.withheld);
     return section;
   }
   std::map<std::string, std::string> units;
-  for (const ComparedEstimator& one : comparison.estimators) {
-    units.insert(one.units.begin(), one.units.end());
+  for (const ComparedEstimator& estimator : comparison.estimators) {
+    units.insert(estimator.units.begin(), estimator.units.end());
   }
   if (step.at_end) units["map"] = units["map.sim3"] = "m";
   const bool several = comparison.runs > 1;
   std::vector<Column> columns = {
-      {step.from, Under(step.values, "rmse.from:", "rmse:"), units},
-      {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
+      {step.estimator, WithKind(step.values, "rmse.from:", "rmse:"), units},
+      {step.reference, WithKind(step.values, "rmse.to:", "rmse:"), units},
       {"ratio", {}, {}},
-      {step.at_end ? "difference" : "RMSD", Under(step.values, "rmsd:", "rmse:"), units}};
+      {step.at_end ? "difference" : "RMSD", WithKind(step.values, "rmsd:", "rmse:"), units}};
   if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
   section.columns = Names(columns);
   section.rows = SpreadRows(columns, several, {{"rmse", ""}});
@@ -337,47 +345,50 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
     const auto ratio = step.ratios.find("rmse:" + block);
     if (ratio != step.ratios.end()) row.cells[2] = RatioText(ratio->second);
   }
-  if (const std::string line = LinesOf(step); !line.empty()) section.lines.push_back(line);
+  if (const std::string line = DistanceLine(step); !line.empty()) section.lines.push_back(line);
   return section;
 }
 
-/// All that estimators are compared with at the end.
+/// Returns the names of all references of the last estimates.
 std::string ReferencesText(const Comparison& comparison) {
   std::vector<std::string> names;
-  for (const ComparedEstimator& one : comparison.estimators) {
-    const std::string& name = one.final_reference;
+  for (const ComparedEstimator& estimator : comparison.estimators) {
+    const std::string& name = estimator.final_reference;
     if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
   }
   return names.empty() ? comparison.reference : internal::Join(names);
 }
 
-constexpr const char* kByBound = "mse_by_bound";
+constexpr const char* kBoundRatio = "mse_by_bound";
 
-/// What ratios are, and their intervals, a line each.
+/// Returns lines that define the ratios and their intervals.
 std::vector<std::string> RatioLines(const Comparison& comparison) {
-  bool to_reference = false, by_bound = false;
-  for (const ComparedEstimator& one : comparison.estimators) {
-    for (const auto& [key, ratio] : one.ratios) {
-      const bool is_by_bound = key.starts_with(kByBound);
-      by_bound = by_bound || is_by_bound;
-      to_reference = to_reference || (!is_by_bound && ratio.error != ratio.reference_error);
+  bool has_reference_ratio = false, has_bound_ratio = false;
+  for (const ComparedEstimator& estimator : comparison.estimators) {
+    for (const auto& [key, ratio] : estimator.ratios) {
+      const bool is_bound_ratio = key.starts_with(kBoundRatio);
+      has_bound_ratio = has_bound_ratio || is_bound_ratio;
+      has_reference_ratio =
+          has_reference_ratio || (!is_bound_ratio && ratio.error != ratio.reference_error);
     }
   }
   std::vector<std::string> lines;
-  if (to_reference && comparison.runs == 1) {
-    lines.emplace_back("ratios are of one run and have no interval: --runs N gives one");
-  } else if (to_reference) {
-    lines.push_back(
-        "ratio: mean error over the runs by that of the reference [95 % interval, paired "
-        "bootstrap over the runs]; undecided: the interval includes 1" +
-        (comparison.runs < kFewRuns ? "; too few runs: of fewer than " + std::to_string(kFewRuns) +
-                                          " it is too narrow, and decides nothing"
-                                    : std::string()));
-  }
-  if (by_bound) {
+  if (has_reference_ratio && comparison.runs == 1) {
     lines.emplace_back(
-        "MSE / Cramer-Rao bound: mean square error by the least that an unbiased filter can have "
-        "[95 % interval], mean over the run and the runs");
+        "ratios are from one run and have no confidence interval; --runs N computes one");
+  } else if (has_reference_ratio) {
+    lines.push_back(
+        "ratio: mean error over the runs / mean error of the reference [95 % interval, paired "
+        "bootstrap over the runs]; undecided: the interval includes 1" +
+        (comparison.runs < kFewRuns
+             ? "; too few runs: with fewer than " + std::to_string(kFewRuns) +
+                   " runs the interval is too narrow to decide"
+             : std::string()));
+  }
+  if (has_bound_ratio) {
+    lines.emplace_back(
+        "MSE / Cramer-Rao bound: mean square error / smallest mean square error of an unbiased "
+        "filter [95 % interval], mean over the timestamps and the runs");
   }
   return lines;
 }
@@ -389,7 +400,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
                                    : std::to_string(comparison.frames) + " frames";
   head.title += comparison.reference.empty() ? ""
                 : comparison.reference == "truth"
-                    ? ", errors against truth"
+                    ? ", errors relative to truth"
                     : ", differences from " + ReferencesText(comparison);
   head.lines = RatioLines(comparison);
   if (!comparison.measurements_sha256.empty()) {
@@ -410,7 +421,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   return sections;
 }
 
-/// Values, and ratios as `ratio.KEY`.
+/// Returns the values, and the ratios with the keys `ratio.KEY`.
 internal::Json JsonOf(const std::map<std::string, Spread>& values,
                       const std::map<std::string, Ratio>& ratios, bool several) {
   internal::Json json = internal::Json::object();
@@ -434,7 +445,7 @@ internal::Json JsonOf(const std::map<std::string, Spread>& values,
   return json;
 }
 
-/// Numbers, null where there is none.
+/// Returns the numbers; null for a number that is not finite.
 internal::Json JsonOf(const std::vector<double>& values) {
   internal::Json json = internal::Json::array();
   for (const double value : values) {
@@ -443,7 +454,7 @@ internal::Json JsonOf(const std::vector<double>& values) {
   return json;
 }
 
-/// The average NEES by owner, timestamp by timestamp.
+/// Returns the average NEES of each owner by timestamp.
 internal::Json JsonOf(const OverTime& over_time) {
   std::vector<double> t_s;
   for (const Timestamp timestamp : over_time.timestamps) t_s.push_back(Seconds(timestamp));
@@ -456,25 +467,26 @@ internal::Json JsonOf(const OverTime& over_time) {
   return json;
 }
 
-internal::Json JsonOf(const ComparedEstimator& one, bool several) {
-  internal::Json json = {{"type", one.type},
-                         {"smoothed", one.smoothed},
-                         {"reference", one.reference},
-                         {"final_reference", one.final_reference},
-                         {"diverged", one.diverged},
-                         {"used", one.used},
-                         {"reference_runs", one.reference_runs},
-                         {"final_reference_runs", one.final_reference_runs},
-                         {"values", JsonOf(one.values, one.ratios, several)},
-                         {"units", one.units}};
-  if (several) json["anees"] = JsonOf(one.over_time);
+internal::Json JsonOf(const ComparedEstimator& estimator, bool several) {
+  internal::Json json = {{"type", estimator.type},
+                         {"smoothed", estimator.smoothed},
+                         {"reference", estimator.reference},
+                         {"final_reference", estimator.final_reference},
+                         {"diverged", estimator.diverged},
+                         {"used", estimator.used},
+                         {"reference_runs", estimator.reference_runs},
+                         {"final_reference_runs", estimator.final_reference_runs},
+                         {"values", JsonOf(estimator.values, estimator.ratios, several)},
+                         {"units", estimator.units}};
+  if (several) json["anees"] = JsonOf(estimator.over_time);
   return json;
 }
 
 internal::Json JsonOfDecomposition(const Comparison& comparison) {
   internal::Json steps = internal::Json::array();
   for (const DecompositionStep& step : comparison.decomposition) {
-    internal::Json json = {{"kind", ToString(step.kind)}, {"from", step.from}, {"to", step.to}};
+    internal::Json json = {
+        {"kind", ToString(step.kind)}, {"from", step.estimator}, {"to", step.reference}};
     if (step.at_end) json["at_end"] = true;
     if (!step.withheld.empty()) json["withheld"] = step.withheld;
     json["values"] = JsonOf(step.values, step.ratios, comparison.runs > 1);
@@ -487,14 +499,14 @@ internal::Json JsonOfDecomposition(const Comparison& comparison) {
 
 std::string CompareReport(const Comparison& comparison, TableStyle style, ReportRows rows) {
   std::vector<Section> sections = SectionsOf(comparison, rows);
-  const auto count = [](const std::vector<Section>& all) {
+  const auto count = [](const std::vector<Section>& counted) {
     std::size_t sum = 0;
-    for (const Section& one : all) sum += one.rows.size();
+    for (const Section& section : counted) sum += section.rows.size();
     return sum;
   };
-  const std::size_t left_out = count(SectionsOf(comparison, ReportRows::kAll)) - count(sections);
-  if (left_out > 0) {
-    sections.push_back({std::to_string(left_out) + " more rows: --all", {}, {}, {}});
+  const std::size_t omitted = count(SectionsOf(comparison, ReportRows::kAll)) - count(sections);
+  if (omitted > 0) {
+    sections.push_back({std::to_string(omitted) + " more rows: --all", {}, {}, {}});
   }
   return internal::SectionsText(sections, style);
 }
@@ -509,8 +521,8 @@ std::string CompareJson(const Comparison& comparison) {
     json["measurements_sha256"] = comparison.measurements_sha256;
   }
   internal::Json& estimators = json["estimators"] = internal::Json::object();
-  for (const ComparedEstimator& one : comparison.estimators) {
-    estimators[one.name] = JsonOf(one, comparison.runs > 1);
+  for (const ComparedEstimator& estimator : comparison.estimators) {
+    estimators[estimator.name] = JsonOf(estimator, comparison.runs > 1);
   }
   if (!comparison.decomposition.empty()) json["decomposition"] = JsonOfDecomposition(comparison);
   json["notes"] = comparison.notes;

@@ -36,7 +36,7 @@ std::string Html(const Section& section) {
     text += "<p class=\"soft\">" + HtmlEscaped(line) + "</p>\n";
   }
   if (section.rows.empty()) return text;
-  const auto row = [](const char* tag, const std::vector<std::string>& cells) {
+  const auto table_row = [](const char* tag, const std::vector<std::string>& cells) {
     std::string line = "<tr>";
     for (const std::string& cell : cells) {
       line.append("<").append(tag).append(">") += HtmlEscaped(cell);
@@ -45,8 +45,8 @@ std::string Html(const Section& section) {
     return line + "</tr>\n";
   };
   const Table table = MakeTable(section.columns, section.rows);
-  text += "<div class=\"scroll\"><table>\n" + row("th", table.header);
-  for (const TextRow& cells : table.rows) text += row("td", cells);
+  text += "<div class=\"scroll\"><table>\n" + table_row("th", table.header);
+  for (const TextRow& cells : table.rows) text += table_row("td", cells);
   return text + "</table></div>\n";
 }
 

@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// A table below its title, and lines of text; each part may be missing.
+/// Section of a report: a title, lines of text and a table. Each part may be empty.
 struct Section {
   std::string title;
   std::vector<std::string> columns;
@@ -17,7 +17,7 @@ struct Section {
   std::vector<std::string> lines;
 };
 
-/// All sections, as lines for a terminal, as Markdown, as LaTeX without any package, or as HTML.
+/// Formats sections as lines for a terminal, as Markdown, as LaTeX without packages, or as HTML.
 std::string SectionsText(const std::vector<Section>& sections, TableStyle style);
 
 }  // namespace alidade::internal

@@ -112,7 +112,7 @@ DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std:
   RatioCollector ratios;
   for (const Comparison& comparison : comparisons) {
     const DecompositionStep& step = comparison.decomposition.at(s);
-    const bool is_same = step.from == summary.from && step.to == summary.to;
+    const bool is_same = step.estimator == summary.estimator && step.reference == summary.reference;
     if (!is_same || Diverged(comparison, comparison.decomposed)) continue;
     values.Add(step.values);
     ratios.Add(step.ratios);

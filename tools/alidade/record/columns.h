@@ -62,8 +62,8 @@ using RunColumns = std::map<std::string, std::vector<Column>>;
 CsvFile CreateCsv(const OutputFolder& folder, const std::string& name, std::vector<Column> columns,
                   RunColumns& run_columns);
 
-/// Returns the text of `columns.json`: FILE: [{name, unit, quantity, subject}, ...]. The keys `unit`
-/// and `subject` are omitted if they are "".
+/// Returns the text of `columns.json`: FILE: [{name, unit, quantity, subject}, ...]. The keys
+/// `unit` and `subject` are omitted if they are "".
 std::string ColumnsJson(const RunColumns& run_columns);
 
 }  // namespace alidade::internal

@@ -22,7 +22,7 @@
 
 namespace alidade {
 
-using internal::CountWhole;
+using internal::CountFinished;
 using internal::CountWithheld;
 using internal::CsvFile;
 using internal::Json;
@@ -72,7 +72,7 @@ const char* StatusOf(bool stopped) {
 std::string SweepJson(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
   return internal::JsonText({{"status", StatusOf(result.stopped)},
                              {"runs", result.runs},
-                             {"runs_used", CountWhole(result)},
+                             {"runs_used", CountFinished(result)},
                              {"first_seed", result.first_seed},
                              {"reference", result.reference},
                              {"withheld", CountWithheld(result)},
@@ -83,7 +83,7 @@ std::string SweepJson(const VariedSweep& sweep) {
   Json values = Json::array();
   for (const Part& part : PartsOf(sweep)) {
     values.push_back({{"value", part.value},
-                      {"runs_used", CountWhole(*part.result)},
+                      {"runs_used", CountFinished(*part.result)},
                       {"reference", part.result->reference},
                       {"withheld", CountWithheld(*part.result)},
                       {"estimators", EstimatorsOf(Summarise(*part.result))}});

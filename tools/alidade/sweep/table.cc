@@ -12,20 +12,20 @@
 namespace alidade::internal {
 namespace {
 
-/// "" where metrics compare with truth.
+/// Returns a sentence about the reference of the errors; "" if it is truth.
 std::string ReferenceText(const SweepResult& result) {
-  RunResult of_runs;
-  of_runs.reference = result.reference;
-  const std::string text = internal::ReferenceText(of_runs);
+  RunResult run;
+  run.reference = result.reference;
+  const std::string text = internal::ReferenceText(run);
   const std::int64_t withheld = CountWithheld(result);
   if (withheld == 0) return text;
   return text + "; withheld in " + std::to_string(withheld) + " of " +
-         std::to_string(CountWhole(result)) +
+         std::to_string(CountFinished(result)) +
          " runs, in which it failed, diverged or had no estimates";
 }
 
-/// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
-/// their unit and decimals with all others of the row.
+/// Returns rows with a cell for each estimator. Formats mean and quantiles as four columns of one
+/// table, so that all numbers of a row have the same unit.
 std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
@@ -36,10 +36,10 @@ std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
     }
   }
   std::vector<TableRow> rows;
-  for (const TableRow& from : MetricRows(columns)) {
-    TableRow& row = rows.emplace_back(TableRow{from.label, {}});
-    for (std::size_t i = 0; i < from.cells.size(); i += 4) {
-      const std::string* const c = &from.cells[i];
+  for (const TableRow& source : MetricRows(columns)) {
+    TableRow& row = rows.emplace_back(TableRow{source.label, {}});
+    for (std::size_t i = 0; i < source.cells.size(); i += 4) {
+      const std::string* const c = &source.cells[i];
       row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
     }
   }
@@ -57,7 +57,7 @@ std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
 
 }  // namespace
 
-std::int64_t CountWhole(const SweepResult& result) {
+std::int64_t CountFinished(const SweepResult& result) {
   return std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
 }
 
@@ -114,10 +114,10 @@ std::string ReferenceLines(const VariedSweep& sweep) {
 }
 
 std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
-  std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
+  std::string text = std::to_string(CountFinished(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
-                     "inconsistent ones among them.\n\n";
+                     "including inconsistent ones.\n\n";
   text += FormatTable(MakeTable(NamesOf(summaries), TableRows(summaries)), TableFormat::kMarkdown);
   return text + NeesLines(summaries) + ReferenceLines(result);
 }

@@ -8,28 +8,29 @@
 #include "alidade/base/statistics.h"
 #include "alidade/sweep/sweep.h"
 
-/// What every table and file of a sweep tells alike.
+/// Texts and statistics that all tables and files of a sweep share.
 namespace alidade::internal {
 
-/// Runs that came to their end.
-std::int64_t CountWhole(const SweepResult& result);
+/// Returns the number of runs that finished.
+std::int64_t CountFinished(const SweepResult& result);
 
-/// Those of them in which there was no reference to compare with.
+/// Returns the number of finished runs without a reference for the errors.
 std::int64_t CountWithheld(const SweepResult& result);
 
-/// For each owner the 95 % bounds of its mean NEES over all runs, by key of the metric. Each run
-/// counts as one sample, which holds however the errors of a run are correlated over time.
+/// Returns the 95 % bounds of the mean NEES over all runs for each owner, by the key of the metric.
+/// Each run counts as one sample, so the bounds hold for any correlation of the errors over time.
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary);
 
-/// A line for each mean NEES outside its bounds, behind an empty one; "" where there is none.
+/// Returns an empty line and a line for each mean NEES outside its bounds; "" if all are inside.
 std::string NeesLines(const std::vector<SweepSummary>& summaries);
 
-/// What the errors of a sweep are differences from, and how often that was withheld, as lines
-/// behind an empty one; "" where that is truth. Of a varied sweep: by value, where they differ.
+/// Returns an empty line and the reference of the errors, with the number of runs in which it was
+/// withheld; "" if the reference is truth. For a varied sweep, returns such lines for each value if
+/// they differ.
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 
-/// The text of `table.md`: a column for each estimator, of which `summaries` are.
+/// Returns the text of `table.md`, with a column for each estimator of `summaries`.
 std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries);
 
 }  // namespace alidade::internal

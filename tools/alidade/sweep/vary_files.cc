@@ -60,7 +60,7 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
   for (const SweepResult& result : sweep.results) {
     const std::size_t v = table.rows.size();
     table.rows.push_back({sweep.variation.values[v], {}});
-    const std::string of_all = " of " + std::to_string(CountWhole(result));
+    const std::string of_all = " of " + std::to_string(CountFinished(result));
     table.rows[v].cells = {std::to_string(column[v].diverged) + of_all,
                            std::to_string(column[v].inconsistent) + of_all};
   }
@@ -217,8 +217,8 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
   std::string text =
       "Seeds " + std::to_string(first.first_seed) + " to " +
       std::to_string(first.first_seed + static_cast<std::uint64_t>(first.runs) - 1) +
-      " for each value. Means over the runs that did not diverge, inconsistent ones among "
-      "them.\n";
+      " for each value. Means over the runs that did not diverge, including inconsistent "
+      "ones.\n";
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
     const std::string corner = '`' + column.front().name + "`: " + sweep.variation.key;

@@ -2,10 +2,10 @@
 
 # alidade_unity(TARGET COUNT SANITIZED)
 #
-# With ALIDADE_UNITY, compiles up to COUNT sources of a folder as one: headers are read once, and
-# what several sources instantiate is compiled once, which saves a quarter to a third of the CPU
-# time. With sanitizers up to SANITIZED, for a source then takes twice the memory; without them GCC
-# may use 1 GiB before it collects garbage, which saves a tenth.
+# If ALIDADE_UNITY is set, compiles up to COUNT sources of a folder as one translation unit. Headers
+# are then read once and templates instantiated once, which saves a quarter to a third of the CPU
+# time. With sanitizers, the limit is SANITIZED, because a source then needs twice the memory.
+# Without them, GCC may use 1 GiB before it collects garbage, which saves a tenth of the time.
 function(alidade_unity target count sanitized)
   if(NOT ALIDADE_UNITY)
     return()
@@ -34,8 +34,8 @@ endfunction()
 
 # alidade_add_library(NAME SOURCES file... HEADERS file...)
 #
-# The shared library alidade::NAME of this folder, libalidade-NAME, which exports the names that
-# exports.map lists. HEADERS are those that are installed, relative to the folder.
+# Adds the shared library alidade::NAME of this folder, libalidade-NAME, which exports the names in
+# exports.map. HEADERS are the installed headers, relative to the folder.
 function(alidade_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
   set(target alidade_${name})

@@ -2,13 +2,13 @@
 
 # alidade_add_plugin(NAME SOURCES file... [CPP] [FOLDER folder] [LIBRARIES target...])
 #
-# Builds a plugin that alidade loads at run time: hidden visibility, no instruction-set flags. A
-# C-ABI plugin (models) needs the headers alone; CPP (sources, estimators) links alidade::core and
-# loads only into an alidade of the same ABI number. A plugin in another FOLDER than `plugins` is
-# not searched, but loaded when it is needed.
+# Builds a plugin that alidade loads at run time, with hidden visibility and without instruction-set
+# flags. A C-ABI plugin (models) needs only the headers. A C++ plugin (CPP; sources, estimators)
+# links alidade::core and loads only into an alidade with the same ABI number. alidade searches only
+# the FOLDER `plugins`; it loads a plugin in another folder on demand.
 #
-# Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor CMAKE_CXX_FLAGS
-# chooses a level, the plugin is compiled with -O2.
+# Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor
+# CMAKE_CXX_FLAGS sets an optimisation level, the plugin is compiled with -O2.
 function(alidade_add_plugin name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "CPP" "FOLDER" "SOURCES;LIBRARIES")
   if(NOT arg_FOLDER)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# The target `docs`: HTML in docs/ of the build folder; see scripts/check-docs for what it refuses.
+# Target `docs`: writes HTML to docs/ in the build folder. scripts/check-docs lists its checks.
 add_custom_target(docs COMMAND ${PROJECT_SOURCE_DIR}/scripts/check-docs ${PROJECT_BINARY_DIR}/docs
                   USES_TERMINAL VERBATIM)

@@ -2,8 +2,8 @@
 
 # alidade_embed(TARGET NAME FILE HEADER)
 #
-# Adds to TARGET the text of FILE, without its first line's words (the licence), as
-# alidade::internal::NAME, which HEADER declares. A change of FILE configures again.
+# Adds the text of FILE to TARGET as alidade::internal::NAME, which HEADER declares. The text of the
+# first line, the licence, is removed. A change of FILE triggers a new configuration.
 function(alidade_embed target name file header)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
   file(READ ${file} text)

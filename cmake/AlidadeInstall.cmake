@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# Installs what is around AlidadeInstallEstimation: the program, core and tools, the plugins.
-# Its variables package_folder and plugin_folder are used here too.
+# Installs everything that AlidadeInstallEstimation does not: the program, the libraries core and
+# tools, and the plugins. Uses its variables package_folder and plugin_folder.
 
-# The plugins that `folder` and the folders below it define.
+# Sets `result` to the plugins that `folder` and its subfolders define.
 function(alidade_plugins_of folder result)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   set(plugins)
@@ -15,8 +15,8 @@ function(alidade_plugins_of folder result)
   endforeach()
   get_property(subfolders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
   foreach(subfolder IN LISTS subfolders)
-    alidade_plugins_of(${subfolder} below)
-    list(APPEND plugins ${below})
+    alidade_plugins_of(${subfolder} subfolder_plugins)
+    list(APPEND plugins ${subfolder_plugins})
   endforeach()
   set(${result} ${plugins} PARENT_SCOPE)
 endfunction()
@@ -28,11 +28,11 @@ install(TARGETS alidade_core alidade_tools EXPORT alidadeTargets FILE_SET HEADER
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
-  # C++ plugins link the library; both may move together.
+  # C++ plugins link the library. The relative path allows moving both together.
   set_target_properties(${plugins} PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
   foreach(plugin IN LISTS plugins)
-    get_target_property(beside ${plugin} ALIDADE_FOLDER)
-    install(TARGETS ${plugin} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/alidade/${beside})
+    get_target_property(subfolder ${plugin} ALIDADE_FOLDER)
+    install(TARGETS ${plugin} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/alidade/${subfolder})
   endforeach()
 endforeach()
 

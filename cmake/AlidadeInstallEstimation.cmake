@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# Installs what a program needs that has its filter in code, the components `estimation` and
-# `testing`: the library, the headers of the shipped models and the package that
-# find_package(alidade) reads.
+# Installs the components `estimation` and `testing`, for programs that define their filter in C++:
+# the library, the headers of the shipped models, and the package that find_package(alidade) reads.
 include(CMakePackageConfigHelpers)
 
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/alidade)

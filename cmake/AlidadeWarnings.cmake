@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# alidade_warnings(TARGET): the warnings every target of this project is built with. GCC 12 finds
-# overlaps in `"text" + std::string` that are not there (-Wrestrict, GCC bug 105651), and under the
-# sanitizers uninitialised members of std::regex (-Wmaybe-uninitialized; -fsanitize in its manual).
+# alidade_warnings(TARGET)
+#
+# Sets the warning options of all targets of this project. GCC 12 has two false warnings: overlaps
+# in `"text" + std::string` (-Wrestrict, GCC bug 105651), and with sanitizers uninitialised members
+# of std::regex (-Wmaybe-uninitialized; see -fsanitize in its manual).
 function(alidade_warnings target)
   set(old_gcc $<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>)
   target_compile_options(${target} PRIVATE

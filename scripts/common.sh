@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
 #
-# What the scripts share; they source it from the top of the tree, under `set -o pipefail`.
+# Functions and settings of all scripts, which source this file in the root folder of the repository
+# under `set -o pipefail`.
 
-# Compilers at once: one for each processor, and one for each 2 GiB of memory.
+# Number of parallel compilers: at most one per processor and one per 2 GiB of memory.
 jobs=$(nproc)
 memory_jobs=$(awk '/^MemAvailable:/ { print int($2 / 2097152) }' /proc/meminfo)
 ((memory_jobs < jobs)) && jobs=$((memory_jobs > 1 ? memory_jobs : 1))
@@ -14,7 +15,7 @@ if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
 
-# Shows the last `[done/all]` of its input: in place on a terminal, else a line for each tenth.
+# Shows the last `[done/all]` of its input: on a terminal in one place, else one line per tenth.
 progress() {
   local line tenth=0
   while IFS= read -r line; do
@@ -29,7 +30,7 @@ progress() {
   [[ ! -t 2 ]] || printf '\r%12s\r' '' >&2
 }
 
-# Runs a command and shows what it printed only when it fails.
+# Runs a command, and shows its output only if it fails.
 quietly() {
   local log
   log=$(mktemp)

@@ -14,9 +14,9 @@ namespace alidade {
 /// number equals that of the library. Increase it with each change of the layout or meaning of an
 /// installed class or function. The classes of a debug standard library have another layout.
 #if defined(_GLIBCXX_DEBUG)
-#define ALIDADE_CPP_ABI "3 with _GLIBCXX_DEBUG"
+#define ALIDADE_CPP_ABI "4 with _GLIBCXX_DEBUG"
 #else
-#define ALIDADE_CPP_ABI "3"
+#define ALIDADE_CPP_ABI "4"
 #endif
 
 /// Implementation of an interface by a plugin. The loader does not know the type of the factory;

@@ -62,12 +62,12 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   const bool has_known = model.known_slot >= 0;
   Function predict{"Predict", with_known(FirstSlots(count)), {z}, {}, count, false, {}};
   for (const Space& role : roles) predict.matrices.push_back({m, role.geometry.tangent});
-  predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
+  predict.call = [=](const double* const* inputs, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
     const bool requested = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
     const AlidadeObservation observation =
-        MakeObservation(nullptr, has_known ? in[count] : nullptr);
-    return sensor.eval(self, &observation, in, out[0], requested ? jacobians : nullptr,
+        MakeObservation(nullptr, has_known ? inputs[count] : nullptr);
+    return sensor.eval(self, &observation, inputs, out[0], requested ? jacobians : nullptr,
                        requested ? strides : nullptr);
   };
   model.functions.push_back(std::move(predict));
@@ -78,12 +78,12 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
        {{m, m}},
        0,
        true,
-       [=, &given = model.instance->noise_root()](const double* const* in, double* const*,
+       [=, &given = model.instance->noise_root()](const double* const* inputs, double* const*,
                                                   double* const* l, const std::int32_t* strides) {
          if (CopyConfigNoise(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          const AlidadeObservation observation =
-             MakeObservation(in[count], has_known ? in[count + 1] : nullptr);
-         return sensor.sqrt_noise(self, &observation, in, l[0], strides[0]);
+             MakeObservation(inputs[count], has_known ? inputs[count + 1] : nullptr);
+         return sensor.sqrt_noise(self, &observation, inputs, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
     model.functions.push_back(
@@ -93,9 +93,9 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
          {},
          0,
          false,
-         [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
+         [=](const double* const* inputs, double* const*, double* const*, const std::int32_t*) {
            const AlidadeObservation observation =
-               MakeObservation(in[0], has_known ? in[1] : nullptr);
+               MakeObservation(inputs[0], has_known ? inputs[1] : nullptr);
            return sensor.valid(self, &observation);
          }});
   }
@@ -152,24 +152,24 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
   f.differentiated = static_cast<int>(f.slots.size());
   const bool has_known = model.known_slot >= 0;
   if (has_known) f.slots.push_back(model.known_slot);
-  f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
-                                    const std::int32_t* strides) {
+  f.call = [=, outputs = f.outputs](const double* const* inputs, double* const* out,
+                                    double* const* j, const std::int32_t* strides) {
     std::vector<const double*> role_values(count, nullptr);
     std::vector<double*> jx(count, nullptr);
     std::vector<std::int32_t> jx_strides(count, 0);
     std::size_t k = 0;
     for (std::size_t i = 0; i < count; ++i) {
       if (is_y(i)) continue;
-      role_values[i] = in[k];
+      role_values[i] = inputs[k];
       jx[i] = j[k];
       jx_strides[i] = strides[k++];
     }
     const bool has_prior = prior > 0, has_several = outputs.size() > 1;
     std::vector<double> row = has_several ? Gather(outputs, out) : std::vector<double>();
     const AlidadeObservation observation =
-        MakeObservation(in[k], has_known ? in[k + (has_prior ? 2 : 1)] : nullptr);
+        MakeObservation(inputs[k], has_known ? inputs[k + (has_prior ? 2 : 1)] : nullptr);
     const std::int32_t code = sensor.initialise(
-        self, &observation, role_values.data(), has_prior ? in[k + 1] : nullptr,
+        self, &observation, role_values.data(), has_prior ? inputs[k + 1] : nullptr,
         has_several ? row.data() : out[0], jx.data(), jx_strides.data(), j[k], strides[k],
         has_prior ? j[k + 1] : nullptr, has_prior ? strides[k + 1] : 0);
     if (has_several) Scatter(row, outputs, out);
@@ -186,18 +186,18 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
   const int dt = static_cast<int>(model.slots.size()) - 1;
   int n = 0;
   for (const Space& block : blocks) n += block.geometry.tangent;
-  model.functions.push_back({"Step",
-                             FirstSlots(dt + 1),
-                             blocks,
-                             {{n, n}, {n, n_w}},
-                             count + 1,
-                             false,
-                             [=](const double* const* in, double* const* out, double* const* j,
-                                 const std::int32_t* strides) {
-                               return motion.step(self, in, has_input ? in + count + 1 : nullptr,
-                                                  in[count], in[dt][0], out, j[0], strides[0], j[1],
-                                                  strides[1], nullptr, 0);
-                             }});
+  model.functions.push_back(
+      {"Step",
+       FirstSlots(dt + 1),
+       blocks,
+       {{n, n}, {n, n_w}},
+       count + 1,
+       false,
+       [=](const double* const* inputs, double* const* out, double* const* j,
+           const std::int32_t* strides) {
+         return motion.step(self, inputs, has_input ? inputs + count + 1 : nullptr, inputs[count],
+                            inputs[dt][0], out, j[0], strides[0], j[1], strides[1], nullptr, 0);
+       }});
   if (n_w == 0) return;
   std::vector<int> slots = FirstSlots(count);
   slots.push_back(dt);
@@ -209,11 +209,11 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
        {{n_w, n_w}},
        0,
        true,
-       [=, &given = model.instance->noise_root()](const double* const* in, double* const*,
+       [=, &given = model.instance->noise_root()](const double* const* inputs, double* const*,
                                                   double* const* l, const std::int32_t* strides) {
          if (CopyConfigNoise(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
-         return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
-                              strides[0]);
+         return motion.sqrt_q(self, inputs, has_input ? inputs + count + 1 : nullptr,
+                              inputs[count][0], l[0], strides[0]);
        }});
 }
 
@@ -297,11 +297,11 @@ const Function* ModelUnderTest::Find(const std::string& name) const {
 
 Answer CallFunction(const Function& function, const Values& inputs, int matrices) {
   Answer answer;
-  std::vector<const double*> in;
+  std::vector<const double*> inputs;
   std::vector<double*> out, requested;
   std::vector<std::int32_t> strides;
   const Values passed(inputs.begin(), inputs.end());  // a copy that the model may write to
-  for (const auto& input : passed) in.push_back(input.empty() ? nullptr : input.data());
+  for (const auto& input : passed) inputs.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);
   for (const Shape& shape : function.matrices) {
@@ -312,13 +312,13 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
     Buffer& buffer = answer.matrices[i];
     // The Jacobian by an unbound role does not exist.
     const bool exists =
-        buffer.columns() > 0 && (!function.jacobian_per_input() || in[i] != nullptr);
+        buffer.columns() > 0 && (!function.jacobian_per_input() || inputs[i] != nullptr);
     const bool selected = matrices == kAllMatrices || matrices == static_cast<int>(i);
     requested.push_back(exists && (selected || function.is_noise) ? buffer.data() : nullptr);
     strides.push_back(buffer.stride());
   }
   PoisonStack();
-  answer.code = function.call(in.data(), out.data(), requested.data(), strides.data());
+  answer.code = function.call(inputs.data(), out.data(), requested.data(), strides.data());
   for (std::size_t i = 0; i < passed.size() && answer.written_input < 0; ++i) {
     if (!std::ranges::equal(passed[i], inputs[i], SameBits))
       answer.written_input = static_cast<int>(i);

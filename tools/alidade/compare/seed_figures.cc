@@ -219,14 +219,14 @@ bool IsOnFront(const ComparedEstimator& one, const Estimators& among, const std:
 /// A figure of cost against accuracy.
 struct CostFigure {
   std::string name, title, prefix;  ///< the prefix is that of its columns
-  Estimators of;
+  Estimators estimators;
   std::vector<std::string> kinds;  ///< of errors
 };
 
 /// Errors that at least two of its estimators have, of known cost.
 std::vector<std::string> KeysOf(const CostFigure& figure) {
   std::map<std::string, int> counts;
-  for (const ComparedEstimator& one : figure.of) {
+  for (const ComparedEstimator& one : figure.estimators) {
     for (const auto& [key, value] : one.values) {
       const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
       const bool whole = key.find('@') == key.npos && std::ranges::any_of(figure.kinds, begins);
@@ -251,7 +251,7 @@ std::vector<CostFigure> CostFiguresOf(const Estimators& estimators) {
   CostFigure smoothed{
       "cost.smoothed", "cost against the error, smoothed", "smoothed.", {}, {"rmse:"}};
   for (const ComparedEstimator& one : estimators) {
-    (one.smoothed ? smoothed : online).of.push_back(one);
+    (one.smoothed ? smoothed : online).estimators.push_back(one);
   }
   std::vector<CostFigure> figures = {end, online, smoothed};
   std::erase_if(figures, [](const CostFigure& figure) { return KeysOf(figure).empty(); });
@@ -281,15 +281,16 @@ void WriteCost(const OutputFolder& folder, const Estimators& estimators,
     number(value("cpu_us.start"));
     number(CostOf(one));
     for (const CostFigure& figure : figures) {
-      const bool in = std::ranges::count(figure.of, one.name, &ComparedEstimator::name) > 0;
+      const bool is_shown =
+          std::ranges::count(figure.estimators, one.name, &ComparedEstimator::name) > 0;
       for (const std::string& key : KeysOf(figure)) {
-        const auto error = in ? ErrorOf(one, key) : std::nullopt;
+        const auto error = is_shown ? ErrorOf(one, key) : std::nullopt;
         const auto interval = one.mean_intervals.find(key);
         const bool known = error && interval != one.mean_intervals.end();
         number(error);
         number(known ? std::optional(interval->second.low) : error);
         number(known ? std::optional(interval->second.high) : error);
-        csv.Integer(in && IsOnFront(one, figure.of, key) ? 1 : 0);
+        csv.Integer(is_shown && IsOnFront(one, figure.estimators, key) ? 1 : 0);
       }
     }
     csv.EndRow();
@@ -320,8 +321,9 @@ FigureScript ScriptOf(const CostFigure& figure, const Estimators& estimators) {
     script.Set("set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05");
     for (std::size_t e = 0; e < estimators.size(); ++e) {
       const ComparedEstimator& one = estimators[e];
-      const bool in = std::ranges::count(figure.of, one.name, &ComparedEstimator::name) > 0;
-      if (!in || !ErrorOf(one, key)) continue;
+      const bool is_shown =
+          std::ranges::count(figure.estimators, one.name, &ComparedEstimator::name) > 0;
+      if (!is_shown || !ErrorOf(one, key)) continue;
       const auto of_row = [&](const std::string& column) {
         return "($0 == " + std::to_string(e) + " ? " + GnuplotColumn(column) + " : NaN)";
       };

@@ -297,11 +297,11 @@ const Function* ModelUnderTest::Find(const std::string& name) const {
 
 Answer CallFunction(const Function& function, const Values& inputs, int matrices) {
   Answer answer;
-  std::vector<const double*> inputs;
+  std::vector<const double*> arguments;
   std::vector<double*> out, requested;
   std::vector<std::int32_t> strides;
   const Values passed(inputs.begin(), inputs.end());  // a copy that the model may write to
-  for (const auto& input : passed) inputs.push_back(input.empty() ? nullptr : input.data());
+  for (const auto& input : passed) arguments.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);
   for (const Shape& shape : function.matrices) {
@@ -312,13 +312,13 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
     Buffer& buffer = answer.matrices[i];
     // The Jacobian by an unbound role does not exist.
     const bool exists =
-        buffer.columns() > 0 && (!function.jacobian_per_input() || inputs[i] != nullptr);
+        buffer.columns() > 0 && (!function.jacobian_per_input() || arguments[i] != nullptr);
     const bool selected = matrices == kAllMatrices || matrices == static_cast<int>(i);
     requested.push_back(exists && (selected || function.is_noise) ? buffer.data() : nullptr);
     strides.push_back(buffer.stride());
   }
   PoisonStack();
-  answer.code = function.call(inputs.data(), out.data(), requested.data(), strides.data());
+  answer.code = function.call(arguments.data(), out.data(), requested.data(), strides.data());
   for (std::size_t i = 0; i < passed.size() && answer.written_input < 0; ++i) {
     if (!std::ranges::equal(passed[i], inputs[i], SameBits))
       answer.written_input = static_cast<int>(i);

@@ -7,8 +7,8 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace alidade::fuzz;
   static const Folder folder;
-  constexpr const char* kFiles[] = {"run.json", "timing.json", "ekf/estimates.csv",
-                                    "ekf/landmarks.csv", "ekf/covariance.bin"};
+  constexpr const char* kFiles[] = {"run.json",          "timing.json",       "columns.json",
+                                    "ekf/estimates.csv", "ekf/landmarks.csv", "ekf/covariance.bin"};
   const auto parts = Parts(TextOf(data, size), std::size(kFiles));
   for (std::size_t i = 0; i < std::size(kFiles); ++i) folder.Put(kFiles[i], parts[i]);
   static_cast<void>(Accepts([&] {

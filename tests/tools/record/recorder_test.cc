@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "alidade/base/number_text.h"
 #include "alidade/io/sha256.h"
@@ -26,6 +27,7 @@ TEST(Recorder, WritesEveryFile) {
                                                                          "alone/events.csv",
                                                                          "alone/gains.csv",
                                                                          "alone/innovations.csv",
+                                                                         "columns.json",
                                                                          "comparison.csv",
                                                                          "config.resolved.yaml",
                                                                          "ekf/errors.csv",
@@ -43,7 +45,27 @@ TEST(Recorder, WritesEveryFile) {
                                                                          "timing.csv",
                                                                          "timing.json",
                                                                          "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 22u);  // no files outside the run's folder
+  EXPECT_EQ(FilesIn(folder.path()).size(), 23u);  // no files outside the run's folder
+}
+
+TEST(Recorder, ColumnsJsonHasTheHeaderOfEveryCsvFile) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"));
+  const auto columns = nlohmann::json::parse(Read(folder / "out/columns.json"));
+  int files = 0;
+  for (const std::string& file : FilesIn(folder / "out")) {
+    if (!file.ends_with(".csv") || file == "comparison.csv") continue;
+    ++files;
+    std::vector<std::string> names;
+    for (const auto& column : columns.at(file)) names.push_back(column.at("name"));
+    EXPECT_EQ(names, Cells(Lines(folder / "out" / file).at(0))) << file;
+  }
+  EXPECT_EQ(files, static_cast<int>(columns.size()));
+  const auto& sigma = columns.at("ekf/estimates.csv").at(2);
+  EXPECT_EQ(sigma.at("name"), "sigma:target.depth");
+  EXPECT_EQ(sigma.at("unit"), "m");
+  EXPECT_EQ(sigma.at("quantity"), "sigma");
+  EXPECT_EQ(sigma.at("subject"), "target.depth");
 }
 
 TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {

@@ -297,7 +297,7 @@ inline constexpr std::array kInnovationColumns = std::to_array<
      [](const auto&, const InnovationRow& row, CsvFile& file) {
        file.Landmark(row.report.landmark);
      }},
-    {"outcome", "", "outcome of the measurement, see [Outcomes](#outcomes)",
+    {"outcome", "", "outcome of the measurement, see [Outcomes](run_folder.md#outcomes)",
      [](const auto&, const InnovationRow& row, CsvFile& file) {
        file.Text(ToString(row.report.outcome));
      }},
@@ -393,7 +393,7 @@ inline constexpr std::array kReprojectionColumns =
 inline constexpr std::array kEventColumns = std::to_array<ColumnInfo<NoLayout, Event>>({
     {"t_s", "s", "timestamp of the frame; empty for the whole run",
      [](const auto&, const Event& event, CsvFile& file) { file.Time(event.timestamp); }},
-    {"kind", "", "kind of the event, see [Events](#events)",
+    {"kind", "", "kind of the event, see [Events](run_folder.md#events)",
      [](const auto&, const Event& event, CsvFile& file) { file.Text(ToString(event.kind)); }},
     {"text", "", "description of the event",
      [](const auto&, const Event& event, CsvFile& file) { file.Text(event.text); }},

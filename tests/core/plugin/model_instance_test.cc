@@ -281,7 +281,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved0 = 1; }},
       {"role 'x' is the value at an earlier timestamp, which this version",
        [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_CLONE; }},
-      {"role 'x' has a prior and dynamics, but is no state",
+      {"role 'x' has a prior and dynamics, but is not a state",
        [](HandWritten& h) {
          h.Own();
          h.role.flags = 0;

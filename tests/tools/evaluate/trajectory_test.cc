@@ -219,14 +219,14 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
                    '\n');
   };
   const std::string none = " is not positive semi-definite: its smallest eigenvalue is -";
-  EXPECT_EQ(refusal(good, "1 0 0 1 0 -1"),
-            "poses.txt:2: the covariance of the position" + none + "1; expected a covariance");
-  EXPECT_EQ(
-      refusal("0.01 0.03 0 0.01 0 1", good),
-      "poses.txt:2: the covariance of the orientation" + none + "0.02; expected a covariance");
-  EXPECT_EQ(
-      refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
-      "poses.txt:2: the covariance of the orientation" + none + "1e-09; expected a covariance");
+  EXPECT_EQ(refusal(good, "1 0 0 1 0 -1"), "poses.txt:2: the covariance of the position" + none +
+                                               "1; expected a positive semi-definite matrix");
+  EXPECT_EQ(refusal("0.01 0.03 0 0.01 0 1", good),
+            "poses.txt:2: the covariance of the orientation" + none +
+                "0.02; expected a positive semi-definite matrix");
+  EXPECT_EQ(refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
+            "poses.txt:2: the covariance of the orientation" + none +
+                "1e-09; expected a positive semi-definite matrix");
   // A singular covariance is valid, and so is one rounded to six digits.
   EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");

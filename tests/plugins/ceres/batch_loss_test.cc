@@ -148,7 +148,8 @@ TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
     const auto note = [&](const State& state, const UpdateReport& report) {
       x = testing::ValueOf(state, "p.x");
       said.clear();
-      for (const Event& event : report.events) said.push_back(event.kind + ": " + event.text);
+      for (const Event& event : report.events)
+        said.push_back(std::string(ToString(event.kind)) + ": " + event.text);
     };
     for (const Frame& frame : frames) note(batch->state(), batch->Process(frame));
     if (batch->offline()) {

@@ -106,12 +106,12 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
       EXPECT_EQ(one.counts.at("accepted:gps"), 7) << one.name;
       EXPECT_EQ(one.counts.at("input_stale"), 2) << one.name;
       EXPECT_EQ(one.counts.size(), 3u) << one.name;
-      const auto count = [&](const char* kind) {
+      const auto count = [&](EventKind kind) {
         return std::ranges::count(one.events, kind, &Event::kind);
       };
-      EXPECT_EQ(count("input_stale"), 2) << one.name;
-      EXPECT_EQ(count("unused"), 0) << one.name;
-      EXPECT_EQ(count("substeps"), std::string(max_dt_s) == "0.1" ? 3 : 0) << one.name;
+      EXPECT_EQ(count(EventKind::kInputStale), 2) << one.name;
+      EXPECT_EQ(count(EventKind::kUnused), 0) << one.name;
+      EXPECT_EQ(count(EventKind::kSubsteps), std::string(max_dt_s) == "0.1" ? 3 : 0) << one.name;
     }
     const std::string json = testing::Read(folder / "run.json");
     EXPECT_NE(json.find("\"inputs:car\": 6"), std::string::npos) << json;

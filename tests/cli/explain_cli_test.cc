@@ -67,8 +67,8 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
       Call({"explain", "config.yaml", "--set", "estimators.ekf.jacobian=first_estimate", "--set",
             "sensors.stereo.loss={huber: 1.345}"});
   for (const char* part :
-       {"jacobian            first_estimate: H where", "loss                stereo: huber 1.345",
-        "consider (Schmidt)", "robust losses"}) {
+       {"jacobian            first_estimate: H at the first",
+        "loss                stereo: huber 1.345", "consider (Schmidt)", "robust losses"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
   const Outcome iekf = Call({"explain", "config.yaml", "--set", "estimators.ekf.type=iekf"});

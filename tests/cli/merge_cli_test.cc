@@ -133,7 +133,7 @@ TEST_F(MergeCli, RefusesShardsOfOtherKernels) {
   before_ = "export ALIDADE_KERNELS=none";
   const Outcome none = Sweep("s3", "2/2");
   EXPECT_EQ(none.code, 2);
-  EXPECT_TRUE(Contains(none.err, "environment variable ALIDADE_KERNELS: 'none' is none of"))
+  EXPECT_TRUE(Contains(none.err, "environment variable ALIDADE_KERNELS: 'none' is not available"))
       << none.err;
   EXPECT_FALSE(Exists("s3"));
 }

@@ -350,7 +350,7 @@ const Fault kLandmarkFaults[] = {
                {"inverse_distance: 0.5", "inverse_distance: 0"}},
               14,
               "landmarks.prior.inverse_distance: a landmark at infinity cannot be xyz; expected "
-              "above 0, 1/m"),
+              "a value above 0, 1/m"),
     MakeFault(
         "landmarks_xyz_to_xyz", "landmarks",
         {After(kPrior, "  representation: xyz\n  convert_to_xyz: {max_linearity_index: 0.1}")}, 12,

@@ -66,7 +66,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   }
   EXPECT_GT(refused, 5);
   EXPECT_GT(kept, 5);
-  before_ = "ulimit -f 4";
+  before_ = "ulimit -f 12";
   const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"});
   EXPECT_TRUE(run.err.starts_with("error: out.partial/")) << run.err;
   EXPECT_TRUE(Contains(run.err, ": cannot write: File too large\n")) << run.err;

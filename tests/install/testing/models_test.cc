@@ -47,7 +47,8 @@ TEST(DepthFilter, FollowsTheDisparityAndReportsAStaleFrame) {
   alidade::Ekf filter(problem);
   for (int k = 0; k < 10; ++k) filter.Process(FrameAt(0.1 * k, {{stereo.stream, 65.0}}));
   EXPECT_NEAR(ValueOf(filter.state(), "target.position"), 0.4, 0.005);  // 26 px m / 65 px
-  EXPECT_TRUE(HasEvent(filter.Process(FrameAt(0.5, {{stereo.stream, 65.0}})), EventKind::kStale));
+  EXPECT_TRUE(
+      HasEvent(filter.Process(FrameAt(0.5, {{stereo.stream, 65.0}})), alidade::EventKind::kStale));
 }
 
 TEST(UnitQuaternion, IsAManifold) {

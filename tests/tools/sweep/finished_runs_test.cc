@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/run_record.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::internal {

@@ -12,7 +12,7 @@
 #include "alidade/experiment/frame_innovation.h"
 #include "alidade/experiment/source.h"
 #include "alidade/record/columns.h"
-#include "alidade/record/contents.h"
+#include "alidade/record/recorded_run.h"
 #include "alidade/state/element_names.h"
 
 /// Columns of the csv files of a run folder, one table for each file. To add a column, add an entry

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

@@ -7,9 +7,9 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/csv_file.h"
 #include "alidade/record/column_tables.h"
-#include "alidade/record/contents.h"
 #include "alidade/record/errors_file.h"
 #include "alidade/record/pose_file.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "alidade/io/output_folder.h"
-#include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

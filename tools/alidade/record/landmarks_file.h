@@ -7,7 +7,7 @@
 #include "alidade/experiment/run.h"
 #include "alidade/io/output_folder.h"
 #include "alidade/record/columns.h"
-#include "alidade/record/contents.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

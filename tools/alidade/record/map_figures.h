@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/record/contents.h"
 #include "alidade/record/figure_script.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

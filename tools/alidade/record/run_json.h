@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "alidade/experiment/run.h"
-#include "alidade/record/contents.h"
+#include "alidade/record/recorded_run.h"
 
 namespace alidade::internal {
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/run_record.h"
 
 namespace alidade::internal {
 

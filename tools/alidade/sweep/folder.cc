@@ -15,7 +15,7 @@
 #include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/reprojection.h"
-#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/run_record.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/table.h"
 #include "alidade/sweep/vary_files.h"

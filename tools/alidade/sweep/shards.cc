@@ -14,7 +14,7 @@
 #include "alidade/replay/replay.h"
 #include "alidade/replay/run_inputs.h"
 #include "alidade/sweep/finished_runs.h"
-#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/run_record.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade::internal {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/run_record.h"
 
 #include <cmath>
 #include <limits>

@@ -171,7 +171,9 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD in sigmas",
                .is_main = true},
     MetricInfo{.name = "lag_ms",
-               .meaning = "delay after truth, see [Lag](metrics.md#lag); > 0 is late; scalar blocks only",
+               .meaning =
+                   "delay after truth, see [Lag](metrics.md#lag); > 0 is late; scalar blocks "
+                   "only",
                .subject = MetricSubject::kBlock,
                .unit = MetricUnit::kMillisecond,
                .goal = MetricGoal::kZero,
@@ -204,7 +206,8 @@ inline constexpr std::array kMetrics = {
         .label = "NEES",
         .is_main = true},
     MetricInfo{.name = "nees.low",
-               .meaning = "lower 95 % bound of `nees.mean`, see [Bounds](metrics.md#bounds-of-nees-and-nis)",
+               .meaning = "lower 95 % bound of `nees.mean`, see "
+                          "[Bounds](metrics.md#bounds-of-nees-and-nis)",
                .subject = MetricSubject::kOwner},
     MetricInfo{.name = "nees.high",
                .meaning = "upper 95 % bound of `nees.mean`",
@@ -239,7 +242,8 @@ inline constexpr std::array kMetrics = {
         .section = MetricSection::kAlong,
         .label = "NIS"},
     MetricInfo{.name = "nis.low",
-               .meaning = "lower 95 % bound of `nis.mean`, see [Bounds](metrics.md#bounds-of-nees-and-nis)",
+               .meaning = "lower 95 % bound of `nis.mean`, see "
+                          "[Bounds](metrics.md#bounds-of-nees-and-nis)",
                .subject = MetricSubject::kSensor,
                .needs_truth = false},
     MetricInfo{.name = "nis.high",

@@ -27,10 +27,12 @@ std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random&
   return x;
 }
 
-/// Special points. Of a vector: all elements 0, 1e-6 and 1e6, of either sign. Of a product: the
-/// special points of one part, the other parts at the neutral element. Else the neutral element, and
-/// the points at pi, just short of -pi, and pi / 2 from it along each tangent direction; of a double
-/// cover also the negative of the neutral element.
+/// Returns the special points of a geometry:
+///
+///   vector   all elements 0, 1e-6 or 1e6, with either sign
+///   product  the special points of one part, with the other parts at the neutral element
+///   others   the neutral element; the points at pi, just short of -pi and pi / 2 from it along each
+///            tangent direction; of a double cover also the negative of the neutral element
 std::vector<std::vector<double>> Edges(const Geometry& geometry) {
   std::vector<std::vector<double>> edges;
   if (geometry.is_vector()) {

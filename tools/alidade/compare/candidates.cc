@@ -294,8 +294,7 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
     const Candidate& final = *references.final;
     compared.final_reference = final.name;
     compared.final_reference_runs = 1;
-    if (truth)
-      AddRatios(estimator, final, MetricSection::kFinal, compared.ratios);
+    if (truth) AddRatios(estimator, final, MetricSection::kFinal, compared.ratios);
     if (&final != &estimator) AddFinal(estimator, final, compared);
   }
   return compared;

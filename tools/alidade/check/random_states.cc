@@ -31,7 +31,7 @@ std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random&
 ///
 ///   vector   all elements 0, 1e-6 or 1e6, with either sign
 ///   product  the special points of one part, with the other parts at the neutral element
-///   others   the neutral element; the points at pi, just short of -pi and pi / 2 from it along each
+///   others   the neutral element; the points at pi, just short of -pi and pi / 2 along each
 ///            tangent direction; of a double cover also the negative of the neutral element
 std::vector<std::vector<double>> Edges(const Geometry& geometry) {
   std::vector<std::vector<double>> edges;

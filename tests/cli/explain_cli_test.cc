@@ -11,20 +11,20 @@ using ExplainCli = testing::ProgramTest;
 TEST_F(ExplainCli, TellsWhatCannotBeObserved) {
   const Outcome both = Call({"explain", "config.yaml"});
   EXPECT_EQ(both.code, 0) << both.err;
-  EXPECT_FALSE(Contains(both.out, "cannot be observed")) << both.out;
+  EXPECT_FALSE(Contains(both.out, "unobservable")) << both.out;
   for (const char* part : {"target.depth ", "0.3 +- 0.1", "constant_velocity", "scale_2d",
                            "jacobian_at", "corrects", "gate ", "joint"}) {
     EXPECT_TRUE(Contains(both.out, part)) << part << '\n' << both.out;
   }
   const Outcome scale = Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[scale]"});
   EXPECT_TRUE(Contains(scale.out,
-                       "cannot be observed: target.depth together with target.depth_rate, "
+                       "unobservable: target.depth together with target.depth_rate, "
                        "template.inverse_distance (1 direction)"))
       << scale.out;
   const Outcome known = Call({"explain", "config.yaml", "--set",
                               "sensors.scale.roles.inverse_distance={block: "
                               "template.inverse_distance, mode: known}"});
-  EXPECT_TRUE(Contains(known.out, "cannot be observed: template.inverse_distance (1 direction)"))
+  EXPECT_TRUE(Contains(known.out, "unobservable: template.inverse_distance (1 direction)"))
       << known.out;
   EXPECT_TRUE(Contains(known.out, "knows")) << known.out;
 }

@@ -356,19 +356,19 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
 TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
   const Outcome alone = Call({"explain", "map.yaml"});
-  EXPECT_TRUE(Contains(
-      alone.out, "  cannot be observed: scale (1 direction)\n    scale, of trajectory and map"))
+  EXPECT_TRUE(
+      Contains(alone.out, "  unobservable: scale (1 direction)\n    scale, of trajectory and map"))
       << alone.out;
   const Outcome at_infinity =
       Call({"explain", "map.yaml", "--set", "landmarks.prior.inverse_distance=0"});
-  EXPECT_TRUE(Contains(at_infinity.out, "  cannot be observed: scale (1 direction)\n"))
+  EXPECT_TRUE(Contains(at_infinity.out, "  unobservable: scale (1 direction)\n"))
       << at_infinity.out;
   const Outcome run = Run("map.yaml");
   EXPECT_TRUE(
       Contains(run.out, "ekf: unobservable\n  no sensor of this estimator determines scale\n"))
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
-  const char* const observed = "every direction of the state can be observed";
+  const char* const observed = "the state is fully observable";
   // Measured depths make the scale observable, and so do known landmarks.
   const Outcome depth =
       Call({"explain", "map.yaml", "--set", "sensors.pixels.model=depth_feature", "--set",

@@ -244,9 +244,9 @@ std::string Unobservable(const Problem& problem) {
   std::map<std::vector<std::string>, int> directions;
   for (const auto& names : unobservable) ++directions[names];
   std::string text;
-  if (directions.empty()) text = "  every direction of the state can be observed\n";
+  if (directions.empty()) text = "  the state is fully observable\n";
   for (const auto& [names, count] : directions) {
-    text += "  cannot be observed: " + DirectionText(names);
+    text += "  unobservable: " + DirectionText(names);
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=

@@ -17,8 +17,8 @@ SharedSensor InverseDepthSensor(const Camera& camera) {
   return MakeSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
 }
 
-/// Returns the landmark that the camera at kPose sees at `pixel` from 4 m away; its anchor is
-/// kAnchor.
+/// Returns a landmark 4 m away from the camera at kPose, which sees the landmark at `pixel`. The
+/// anchor is kAnchor.
 template <class Representation>
 Blocks SeenAt(const Camera& camera, const std::vector<double>& pixel) {
   Vec3 h;
@@ -75,7 +75,7 @@ TEST(InverseDepthFeature, SeesAtInfinityAndBeyond) {
 }
 
 TEST(InverseDepthFeature, SeesNearThePoles) {
-  // phi = 90 deg - 1e-6 rad: the ray is almost along -y, the direction in which the camera looks.
+  // phi = 90 deg - 1e-6 rad: the ray is almost parallel to -y. The camera looks along -y.
   const double half = std::sqrt(0.5);
   const Blocks pose{{0, 0, 0}, {half, half, 0, 0}};
   const double phi = 1.5707963267948966 - 1e-6;

@@ -14,8 +14,8 @@ using testing::Blocks;
 using testing::kPoison;
 using testing::Pointers;
 
-// A receiver at (1, 2, 3) m with a clock bias of 7 m, and a transmitter 3 m north of it and 4 m
-// above it.
+// The receiver is at (1, 2, 3) m and has a clock bias of 7 m. The transmitter is 3 m north of the
+// receiver and 4 m above it.
 const Blocks kPseudorangeRoles{{1, 2, 3}, {7}};
 const double kTransmitter[3] = {1, 5, 7};
 

@@ -23,14 +23,14 @@ SharedSensor MakeRangeBearing() {
   return MakeSensor(RangeBearing<Xyz>(0.1, 0.02, 10.0), "range_bearing");
 }
 
-// A sensor at (1, 0, 0) m, rotated by 90 deg about z, and a point at (1, 3, 4) m.
+// The sensor is at (1, 0, 0) m, rotated by 90 deg about z. The point is at (1, 3, 4) m.
 const Blocks kRangeBearingRoles{{1, 0, 0}, {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 3, 4}};
 
 TEST(RangeBearing, PredictsWorkedNumbers) {
   const SharedSensor sensor = MakeRangeBearing();
   std::vector<double> z(4, kPoison);
   ASSERT_EQ(sensor->Predict(Pointers(kRangeBearingRoles).data(), z.data()), Status::kOk);
-  ExpectSame(z, {5.0, 0.6, 0.0, 0.8}, 1e-15);  // the world's y is the sensor's x
+  ExpectSame(z, {5.0, 0.6, 0.0, 0.8}, 1e-15);  // the sensor's x axis points along the world's y
   EXPECT_EQ(sensor->measurement().elements,
             (std::vector<std::string>{"range", "bearing.x", "bearing.y", "bearing.z"}));
   ExpectSame(SensorJacobian(sensor, kRangeBearingRoles),
@@ -56,8 +56,8 @@ TEST(RangeBearing, SeesNothingWhereItStandsNorFurtherThanItsRange) {
   }
 }
 
-// Predict returns the measurement from which Initialise computed the point; their Jacobians are
-// inverses.
+// Initialise computes the point from a measurement, and Predict returns the same measurement. The
+// Jacobians of both functions are inverses of each other.
 TEST(RangeBearing, TellsThePoint) {
   const SharedSensor sensor = MakeRangeBearing();
   const std::vector<double> z{5.0, 0.6, 0.0, 0.8};
@@ -68,7 +68,7 @@ TEST(RangeBearing, TellsThePoint) {
             Status::kOk);
   ExpectSame(y, kRangeBearingRoles[2], 1e-15);
   const std::vector<double> j =
-      SensorJacobian(sensor, kRangeBearingRoles);  // 3 x 9, the point's columns last
+      SensorJacobian(sensor, kRangeBearingRoles);  // 3 x 9; the last columns are those of the point
   for (std::size_t r = 0; r < 3; ++r) {
     for (std::size_t c = 0; c < 3; ++c) {
       double product = 0.0;

@@ -17,7 +17,8 @@ using testing::NumericSensorJacobian;
 using testing::Pointers;
 using testing::SensorJacobian;
 
-// The body is at (1, 2, 3), rotated by 90 degrees about z: its x axis is the world's y axis.
+// The body is at (1, 2, 3) m, rotated by 90 degrees about z, so its x axis points along the y axis
+// of the world.
 const double kHalf = std::sqrt(0.5);
 const Blocks kRoles{{1, 2, 3}, {kHalf, 0, 0, kHalf}, {1, 6, 3.5}, {kHalf, kHalf, 0, 0}};
 
@@ -29,7 +30,8 @@ TEST(RelativePose, IsThatOfTheLandmarkInTheBody) {
   const SharedSensor sensor = MakeRelativePose();
   std::vector<double> z(7, kPoison);
   ASSERT_EQ(sensor->Predict(Pointers(kRoles).data(), z.data()), Status::kOk);
-  // 4 m ahead and 0.5 m above; rotated back by 90 degrees about z, then by 90 degrees about x.
+  // The landmark is 4 m ahead of the body and 0.5 m above it. The relative rotation is -90 degrees
+  // about z, then 90 degrees about x.
   ExpectSame(z, {4, 0, 0.5, 0.5, 0.5, -0.5, -0.5}, 1e-15);
   ExpectSame(SensorJacobian(sensor, kRoles), NumericSensorJacobian(sensor, kRoles), kNumeric);
 }
@@ -46,7 +48,7 @@ TEST(RelativePose, PlacesTheLandmarkWhereItWasMeasured) {
   ExpectSame(y, {1, 6, 3.5, kHalf, kHalf, 0, 0}, 1e-15);
 }
 
-// A landmark at the neutral relative pose equals the body's pose: dy = (dr, dq).
+// If the relative pose is neutral, the landmark has the pose of the body: dy = (dr, dq).
 TEST(RelativePose, AKeyframeIsACloneOfTheBody) {
   const SharedSensor sensor = MakeRelativePose();
   const std::vector<double> neutral{0, 0, 0, 1, 0, 0, 0};

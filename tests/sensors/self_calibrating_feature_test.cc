@@ -18,7 +18,7 @@ SharedSensor Made() {
   return MakeSensor(SelfCalibratingFeature<Lens>(0.5), "self_calibrating_feature");
 }
 
-/// A camera with a general pose, and a point 5 m in front of it.
+/// The camera has a general pose, and the point is 5 m in front of it.
 const Blocks kRadial{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {500, -0.3, 0.2}, {-2.6, 1.1, 3.5}};
 const std::vector<double> kRadtan{500, 320, 240, -0.3, 0.2, 0.05, 0.01, -0.02};
 
@@ -41,7 +41,8 @@ TEST(SelfCalibratingFeature, MayHaveAnotherNoiseInUThanInV) {
   EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 2.0}));
 }
 
-/// The equation of BAL, whose camera looks along -z and has y up: P = R X + t, p = -P / P.z.
+/// Compares the model with the equation of BAL: P = R X + t, p = -P / P.z. The camera of BAL looks
+/// along -z, and its y axis points up.
 TEST(SelfCalibratingFeature, IsTheCameraOfBalTurnedAboutItsXAxis) {
   const double turn[4] = {0, 1, 0, 0};
   double q[4], back[4], along[3], p[3];
@@ -89,12 +90,13 @@ TEST(SelfCalibratingFeature, SeesNothingBehindIt) {
   }
 }
 
-/// The equation of BAL for points behind the camera, P_z > 0: the image is that of the mirrored
-/// point.
+/// The equation of BAL also holds for points behind the camera (P.z > 0). The image of such a point
+/// is the image of the mirrored point.
 TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
   const SharedSensor sensor =
       MakeSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
-  // h = (-0.3, 0.4, -1) m is the opposite of h in PredictsWorkedNumbers: the same line, x = h / hz.
+  // h = (-0.3, 0.4, -1) m is the opposite of h in PredictsWorkedNumbers. Both points lie on one
+  // line through the camera, so x = h / hz is the same.
   Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {0.7, 0.4, -1}};
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 140.625, 1e-12);

@@ -17,7 +17,7 @@ SharedSensor MadeStereo() {
 }
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
-  // The left camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m. The left pixel is
+  // The left camera at (1, 0, 0) m looks along z. The point is at (0, 0.4, 2) m. The left pixel is
   // that of a single camera.
   // d = 525 0.1 / 2 = 26.25 px: u_right = 57.5 - 26.25
   ForEachRepresentation([](auto representation) {
@@ -47,13 +47,13 @@ TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
   });
 }
 
-/// The right pixel equals that of a single camera at the position of the right camera.
+/// The right pixel equals the pixel of a single camera at the position of the right camera.
 TEST(StereoFeature, TheRightCameraIsBesideTheLeftOne) {
   const Blocks pose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
   const Vec3 right{0.1, 0, 0};
   Vec3 at;
   UnitQuaternion::Rotate(pose[1].data(), right.data(), at.data());
-  Vec3 ahead{0.2, -0.3, 5.0}, point;  // in the left camera
+  Vec3 ahead{0.2, -0.3, 5.0}, point;  // coordinates in the left camera
   UnitQuaternion::Rotate(pose[1].data(), ahead.data(), point.data());
   for (std::size_t i = 0; i < 3; ++i) at[i] += pose[0][i], point[i] += pose[0][i];
   double h[3], pixel[2];
@@ -82,7 +82,7 @@ TEST(StereoFeature, InitialisesWithoutAPrior) {
     EXPECT_EQ(sensor->inverse().prior_size, 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
-    // d = 0 px
+    // a disparity of 0 px
     const std::vector<double> far{411, 87.5, 411, 87.5};
     const std::vector<double> position{0, 0, 0}, orientation{1, 0, 0, 0};
     std::vector<const double*> roles(sensor->roles().size());

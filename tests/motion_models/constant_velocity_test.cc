@@ -34,7 +34,7 @@ void CheckConstantVelocity() {
   }
   ExpectTrueJacobians(motion, x, nullptr, w, dt_s);
   EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.03, 0.17), 1e-15);
-  // G Qw G' per axis:
+  // G Qw G' of each axis:
   // discrete    sigma^2 [dt^4/4 dt^3/2; . dt^2]
   // continuous  sigma^2 [dt^3/3 dt^2/2; . dt]
   const double s2 = sigma * sigma, t = dt_s;

@@ -16,8 +16,9 @@ using testing::StepResult;
 
 const double kPi = 3.14159265358979323846;
 
-// The camera looks forward from a vehicle whose x is forward and z up: x_cam = -y, y_cam = -z,
-// z_cam = x. It is 1 m in front of the vehicle's origin and 1.5 m above it.
+// The x axis of the vehicle points forward and its z axis points up. The camera looks forward:
+// x_cam = -y, y_cam = -z, z_cam = x. The camera is 1 m in front of the vehicle's origin and 1.5 m
+// above it.
 const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
                                {"noise.linear_velocity", {0.03, 0.3, 0.3}},
                                {"noise.angular_velocity", {0.002}},
@@ -27,10 +28,10 @@ const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
                                {"vehicle_from_cam.orientation.y", {0.5}},
                                {"vehicle_from_cam.orientation.z", {-0.5}}};
 
-/// Model parameter states that change neither the extrinsics nor the speed of the input.
+/// Model parameter states that leave the extrinsics and the speed of the input unchanged.
 const Blocks kAsGiven{{0, 0, 0}, {1, 0, 0, 0}, {0}};
 
-/// Returns the camera pose of a vehicle at (x, y) with heading `yaw`.
+/// Returns the camera pose of a vehicle at (x, y) with the heading `yaw`.
 Blocks Camera(double x, double y, double yaw) {
   const double mount[3] = {1, 0, 1.5}, camera[4] = {0.5, -0.5, 0.5, -0.5};
   const double turn[4] = {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)};
@@ -53,27 +54,28 @@ void ExpectPose(const Blocks& a, const Blocks& b) {
 TEST(OdometryPose, FollowsTheVehicle) {
   const auto motion = AbiMotion<OdometryPose>(kMounted);
   ASSERT_TRUE(motion->has_input());
-  // 2 m/s forward for 3 s
+  // The vehicle moves forward at 2 m/s for 3 s.
   const double straight[6] = {2, 0, 0, 0, 0, 0};
   ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, 0), straight, nullptr, 3.0).next,
              Camera(11, 6, 0));
-  // A quarter circle of radius 4 m to the left, in 1 s
+  // The vehicle turns left on a quarter circle of radius 4 m in 1 s.
   const double bend[6] = {2 * kPi, 0, 0, 0, 0, kPi / 2};
   ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, 0), bend, nullptr, 1.0).next,
              Camera(9, 10, kPi / 2));
-  // 0.005 rad of a circle of radius 400 m, for which the model uses series
+  // The vehicle moves 0.005 rad along a circle of radius 400 m. For such a small angle the model
+  // uses series.
   const double all_but_straight[6] = {2, 0, 0, 0, 0, 0.005};
   const double half = std::sin(0.0025);
   ExpectPose(
       testing::StepWithJacobians(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
       Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
-  // From another heading, by noise only
+  // The vehicle starts at another heading. The noise alone moves it, without a control input.
   const double none[6] = {};
   ExpectPose(testing::StepWithJacobians(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,
              Camera(1, 10, kPi));
 }
 
-// Model parameter states have the same effect as the parameters and the input.
+// Model parameter states have the same effect as the same values in the config and in the input.
 TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
   const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};
@@ -81,7 +83,7 @@ TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
                                                   Camera(5, 6, 1), input, nullptr, 0.7)
                            .next;
 
-  MapHost::Values not_mounted = kMounted;  // 0.5 m lower; rotated by 0.1 rad about y
+  MapHost::Values not_mounted = kMounted;  // 0.5 m lower and rotated by 0.1 rad about y
   not_mounted["vehicle_from_cam.position"] = {1, 0, 1};
   const double tilt[4] = {std::cos(0.05), 0, std::sin(0.05), 0},
                back[4] = {tilt[0], 0, -tilt[2], 0};
@@ -119,8 +121,8 @@ TEST(OdometryPose, NoiseIsPerAxis) {
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(q[7 * i], sigma[i] * sigma[i], 1e-17);
 }
 
-// The velocity error is either constant over the gap or white. On a straight path, splitting the
-// gap changes nothing except for the lateral effect of rotation.
+// The velocity error is constant over the gap, or it is white noise. On a straight path, processing
+// the gap in two parts changes only the lateral effect of rotation.
 TEST(OdometryPose, NoiseOfEitherKindIsThatOfTheWholeGap) {
   MapHost::Values values = kMounted;
   values["noise.kind"] = {0};

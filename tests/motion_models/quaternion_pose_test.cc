@@ -24,7 +24,8 @@ const MapHost::Values kNoise{{"noise.linear_acceleration", {0.6}},
                              {"noise.angular_acceleration", {0.1, 0.2, 0.3}}};
 
 TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // Half a turn per second about z for 1 s; a = (0, 2, 0) m/s^2: v' = (1, 2, 0), r' = (1, 2, 3)
+  // The body turns by half a turn about z in 1 s.
+  // a = (0, 2, 0) m/s^2: v' = (1, 2, 0), r' = (1, 2, 3)
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[6] = {0, 2, 0, 0, 0, pi / 2};
@@ -45,7 +46,7 @@ TEST(QuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   still[3] = {0, 0, 0};
   testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
   testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
-  // d rotation / d omega = dt at omega = 0, exactly
+  // At omega = 0, the derivative of the rotation with respect to omega is exactly dt.
   const StepResult out = testing::StepWithJacobians(motion, still, nullptr, none.data(), 0.2);
   for (int i = 0; i < 3; ++i) EXPECT_DOUBLE_EQ(out.f[(3 + i) * 12 + 9 + i], 0.2);
 }
@@ -68,7 +69,7 @@ TEST(QuaternionPose, NoiseIsOneNumberOrOneForEachAxis) {
   }
 }
 
-/// z = x (+) n, n ~ N(0, 0.02^2 I)
+/// The sensor measures the block itself: z = x (+) n, n ~ N(0, 0.02^2 I).
 template <class G>
 struct Itself : Sensor<G, G> {
   static constexpr std::array kRoles{Quantity{"x"}};
@@ -84,8 +85,8 @@ struct Itself : Sensor<G, G> {
   }
 };
 
-/// Returns a problem of a body that is at rest at first and whose position and orientation are
-/// measured.
+/// Returns a problem with one body, which starts at rest. Sensors measure its position and its
+/// orientation.
 Problem MeasuredPose(const SharedMotion& model) {
   Problem problem;
   MotionBinding binding{"body", model, {}};
@@ -107,8 +108,8 @@ Problem MeasuredPose(const SharedMotion& model) {
   return problem;
 }
 
-// Velocities are about 0.3 m/s and rad/s: the filters differ by the nonlinearity of a rotation by
-// 0.03 rad.
+// Velocities are about 0.3 m/s and 0.3 rad/s. The filters differ only by the nonlinearity of a
+// rotation by 0.03 rad.
 TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
   const auto motion = AbiMotion<QuaternionPose>(kNoise);
   const Problem problem = MeasuredPose(motion);
@@ -157,8 +158,8 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
   }
 }
 
-// One w is constant over the interval. Because r' uses v', splitting the interval changes r by half
-// of sigma_a dt^2, but nothing else.
+// One w is constant over the interval. r' is computed from v', so two half intervals change r by
+// half of sigma_a dt^2 and change nothing else.
 TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
   const auto motion = AbiMotion<QuaternionPose>(kNoise);
   EXPECT_TRUE(motion->discrete_noise());
@@ -168,7 +169,8 @@ TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
 }
 
 TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
-  // A quarter turn per second about z for 1 s, and a quarter turn of w: a half turn.
+  // The angular velocity and w each rotate the body by a quarter turn about z in 1 s; together this
+  // is half a turn.
   const double pi = 3.14159265358979323846;
   const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
   const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
@@ -188,7 +190,7 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   const Blocks moving{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
   Blocks still = moving, slow = moving;
   still[3] = {0, 0, 0};
-  slow[3] = {0.02, -0.03, 0.025};  // at the limit of the Jacobian's series
+  slow[3] = {0.02, -0.03, 0.025};  // at the limit below which the Jacobian uses series
   const std::vector<double> none(12);
   testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
   testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
@@ -196,8 +198,8 @@ TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
   testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.3);
 }
 
-// Per axis, the noise of (r, v) and, without rotation, of (q, omega) is
-// sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt].
+// Each axis of (r, v) has noise of covariance sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. Without rotation
+// (q, omega) has the same.
 TEST(ContinuousQuaternionPose, NoiseAddsUp) {
   const auto motion = AbiMotion<ContinuousQuaternionPose>(kNoise);
   EXPECT_FALSE(motion->discrete_noise());

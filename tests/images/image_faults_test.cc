@@ -20,13 +20,13 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-/// A camera with faults, which looks at a wall, and features tracked in its images. Image k shows
-/// the wall from (u, v) = shown_[k] on: a point at p in image j is at p + shown_[j] - shown_[k] in
-/// image k. So the truth of each measurement is known.
+/// A camera with faults looks at a wall, and features are tracked in its images. Image k shows the
+/// wall from (u, v) = shown_[k] on. A point at p in image j is at p + shown_[j] - shown_[k] in
+/// image k, so the true position of each feature is known.
 class ImageFaults : public testing::ProgramTest {
  protected:
   static constexpr int kImages = 20, kFeatures = 40;
-  static constexpr double kFalse = 0.5;  ///< px; a correct track is off by less than half of this
+  static constexpr double kFalse = 0.5;  ///< px; a correct track has less than half of this error
 
   struct Seen {
     int feature;
@@ -36,7 +36,7 @@ class ImageFaults : public testing::ProgramTest {
 
   void SetUp() override {
     ProgramTest::SetUp();
-    before_ = "ulimit -t 60";  // s of CPU time; a run takes 1 s, and an endless one is killed
+    before_ = "ulimit -t 60";  // s of CPU time; a run takes 1 s, and an endless run is killed
     Write("config.yaml", R"(alidade: 1
 source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
 )");
@@ -71,7 +71,7 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
     more.insert(more.begin(), {"simulate", "config.yaml", "-o", "found", "--force"});
     return Call(more);
   }
-  /// Returns the tracks of the images.
+  /// Returns the tracks that the program found in the images.
   ByImage Track(const testing::Arguments& more = {}) const {
     const Outcome outcome = Simulate(more);
     EXPECT_EQ(outcome.signal, 0);
@@ -104,8 +104,8 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
         std::ranges::count_if(after, [&](int id) { return before.contains(id); }));
   }
 
-  /// Expects that every feature stays at its point of the wall, has at most one measurement in an
-  /// image, and does not return after it has ended.
+  /// Expects three properties of each feature: it stays at its point of the wall, it has at most
+  /// one measurement in an image, and it does not return after it has ended.
   void ExpectTrue(const ByImage& found) const {
     struct Life {
       cv::Point2d on_wall;
@@ -127,7 +127,7 @@ source: {type: image_tracks, path: images, rate_hz: 20, features: 40}
   }
 
   cv::Mat wall_;
-  std::vector<cv::Point2d> shown_;  ///< px of the wall, by image
+  std::vector<cv::Point2d> shown_;  ///< px of the wall, one entry for each image
 };
 
 TEST_F(ImageFaults, WithoutAnyFeaturesLive) {
@@ -135,7 +135,7 @@ TEST_F(ImageFaults, WithoutAnyFeaturesLive) {
   const ByImage found = Track();
   ASSERT_EQ(found.size(), 20u);
   ExpectTrue(found);
-  // At 2.6 px an image some features leave the image.
+  // The wall moves by 2.6 px from image to image, so some features leave the image.
   EXPECT_GT(Shared(found, 0, 10), 20u);
   for (const auto& [image, features] : found) EXPECT_GT(features.size(), 35u) << image;
 }
@@ -147,7 +147,8 @@ TEST_F(ImageFaults, BlackImagesEndAllFeatures) {
   ExpectTrue(found);
   for (const int k : {0, 8, 9, 10}) EXPECT_FALSE(found.contains(k)) << k;
   EXPECT_EQ(Shared(found, 7, 11), 0u);
-  // New features are found at once in the whole image and are then tracked.
+  // In the first image after the cut, new features are found in the whole image. They are then
+  // tracked.
   for (const int k : {1, 11}) EXPECT_GT(IdsOf(found, k).size(), 35u) << k;
   EXPECT_GT(Shared(found, 11, 12), 35u);
 }
@@ -166,14 +167,14 @@ TEST_F(ImageFaults, AFrozenImageMovesNothing) {
       }
     }
   }
-  // The tracks bridge the motion of 10 px in the missed images.
+  // The wall moves by 10 px during the frozen images. The tracks continue across this motion.
   EXPECT_GT(Shared(found, 11, 12), 30u);
 }
 
 TEST_F(ImageFaults, DuplicatedImagesAreFollowedBackAndForth) {
   shown_[6] = shown_[5];  // each of two images is sent twice
   shown_[8] = shown_[7];
-  shown_[11] = shown_[9];  // two images, then the same two again
+  shown_[11] = shown_[9];  // two images, then the same two images again
   shown_[12] = shown_[10];
   WriteImages();
   const ByImage found = Track();
@@ -182,7 +183,7 @@ TEST_F(ImageFaults, DuplicatedImagesAreFollowedBackAndForth) {
   for (int k = 5; k < 13; ++k) EXPECT_GT(Shared(found, k, k + 1), 30u) << k;
 }
 
-// An image file is missing. The timestamps of the remaining images show the gap.
+// One image file is missing. The timestamps of the remaining images show the gap.
 TEST_F(ImageFaults, ADroppedImageIsAGapInTime) {
   WriteImages();
   for (const int k : {9, 14, 15}) {
@@ -208,7 +209,7 @@ TEST_F(ImageFaults, ADroppedImageIsAGapInTime) {
   EXPECT_GT(Shared(found, 12, 13), 30u);
 }
 
-// Rows numbered with the missing image do not determine the images' timestamps.
+// The row numbers count the missing image, so they do not determine the timestamps of the images.
 TEST_F(ImageFaults, AnImageWithoutATimeEndsTheRun) {
   WriteImages();
   std::filesystem::remove(ImageFile(9));
@@ -222,7 +223,8 @@ TEST_F(ImageFaults, AnImageWithoutATimeEndsTheRun) {
   EXPECT_TRUE(Contains(outcome.err, "has no time for image 9")) << outcome.err;
 }
 
-// A jump by half of the image and back: no feature is tracked across it, and none is confused.
+// The image jumps by half its size and back. No feature is tracked across the jump, and no two
+// features are confused.
 TEST_F(ImageFaults, AJumpEndsFeaturesThatItTakesTooFar) {
   for (int k = 8; k < 14; ++k) shown_[static_cast<std::size_t>(k)] += cv::Point2d(170.0, 130.0);
   WriteImages();

@@ -90,7 +90,7 @@ class ImageTracks : public testing::ProgramTest {
     const Outcome made = Call(more);
     ASSERT_EQ(made.code, 0) << made.err;
   }
-  /// Extracts the tracks of the images with `alidade simulate`.
+  /// Extracts the tracks from the images with `alidade simulate`.
   Outcome Track(testing::Arguments more = {}) {
     more.insert(more.begin(), {"simulate", "config.yaml", "-o", "found", "--force"});
     return Call(more);
@@ -118,7 +118,7 @@ class ImageTracks : public testing::ProgramTest {
   }
 };
 
-/// Returns the true feature nearest to a found one, and the distance.
+/// Returns the true feature that is nearest to `found`, and the distance between them.
 std::pair<int, double> Nearest(const std::vector<Seen>& truth, const Seen& found) {
   std::pair<int, double> nearest{-1, 1e9};
   for (const Seen& t : truth) {
@@ -134,8 +134,8 @@ TEST_F(ImageTracks, FollowOneThingAsLongAsTheyLive) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const ByFrame truth = Rows("scene/tracks.csv"), found = Rows("found/tracks.csv");
   ASSERT_EQ(found.size(), 20u);
-  // Corners lie on the rims of discs of radius 4 px. The offset of a track from its disc must be
-  // constant.
+  // Corners lie on the rims of discs of radius 4 px. The offset of a track from the centre of its
+  // disc must be constant.
   struct Life {
     int of = -1;
     double du = 0.0, dv = 0.0;
@@ -156,7 +156,7 @@ TEST_F(ImageTracks, FollowOneThingAsLongAsTheyLive) {
       }
       if (life.frames++ == 0) {
         const auto [of, off] = Nearest(truth.at(frame), one);
-        if (off > 6.0) continue;  // the image number, and touching discs
+        if (off > 6.0) continue;  // excludes corners of the image number and of discs that touch
         life.of = of;
         for (const Seen& t : truth.at(frame)) {
           if (t.feature == of) life.du = one.u - t.u, life.dv = one.v - t.v;
@@ -166,7 +166,7 @@ TEST_F(ImageTracks, FollowOneThingAsLongAsTheyLive) {
     }
   }
   EXPECT_GT(long_ones, 12);
-  // Some of the 25 discs touch. A corner at the crossing of two rims belongs to neither disc.
+  // Some of the 25 discs touch. A corner at which two rims cross belongs to neither disc.
   ASSERT_GT(off_px.size(), 300u);
   std::ranges::sort(off_px);
   EXPECT_LT(off_px[off_px.size() / 2], 0.1);
@@ -181,13 +181,15 @@ TEST_F(ImageTracks, AreSpreadAndApart) {
   for (const Seen& a : first) {
     for (const Seen& b : first) {
       if (a.feature == b.feature) continue;
-      // Sub-pixel refinement may bring features up to 5 px closer than the selected corners.
+      // Sub-pixel refinement may move features up to 5 px closer to each other than the selected
+      // corners.
       EXPECT_GT(std::hypot(a.u - b.u, a.v - b.v), 14.0);
     }
   }
 }
 
-// The four corners of a small square have one stable point, its centre.
+// A small square has four corners, but refinement moves all of them to one stable point, its
+// centre.
 TEST_F(ImageTracks, DoNotShareAPoint) {
   Write("config.yaml", R"(alidade: 1
 source:
@@ -262,7 +264,7 @@ TEST_F(ImageTracks, RefuseWhatIsNoImage) {
       << small.err;
 }
 
-// Pixels of images with another size would belong to another camera.
+// Images of another size belong to another camera, so their pixels must not be used.
 TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
   MakeImages();
   Write("config.yaml",
@@ -275,7 +277,8 @@ TEST_F(ImageTracks, AreOfImagesAsLargeAsTheCamera) {
       << other.err;
   EXPECT_EQ(Track({"--set", "camera.width=320", "--set", "camera.height=240"}).code, 0);
 
-  // The same for the camera of a sensor entry and for the one stored with the images.
+  // The same check applies to the camera of a sensor entry and to the camera stored with the
+  // images.
   Write("config.yaml", kGuided);
   EXPECT_EQ(Call({"run", "config.yaml", "-o", "run"}).code, 0);
   const std::string guided = kGuided;
@@ -324,7 +327,7 @@ TEST_F(ImageTracks, AreNotOfImagesSmallerThanTheirPatch) {
   EXPECT_TRUE(Contains(refused.err, "103 px or more")) << refused.err;
 }
 
-// The decoder returns a whole image: the rest is grey.
+// The decoder returns an image of full size, in which the missing part is grey.
 TEST_F(ImageTracks, RefuseAJpegThatIsCutShort) {
   MakeImages();
   const std::string jpeg = (folder_ / "scene/images/000003.jpg").string();
@@ -350,7 +353,7 @@ TEST_F(ImageTracks, EndInABlackImageAndBeginAnewAfterIt) {
   for (const Seen& one : found.at(10)) EXPECT_FALSE(before.contains(one.feature));
 }
 
-// A frozen camera: a repeated image has the same features.
+// The camera is frozen. A repeated image has the same features as the image before.
 TEST_F(ImageTracks, StandStillInAFrozenImage) {
   MakeImages();
   std::filesystem::copy_file(ImageFile(8), ImageFile(9),
@@ -410,12 +413,12 @@ TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
   ASSERT_EQ(track("tum/rgb/").code, 0);
   EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n1,1305031453.250000000\n"));
   EXPECT_TRUE(Contains(Read("found/truth.tum"), "1305031453.250000000 1 2 3"))
-      << Read("found/truth.tum");  // off by 4.9 ms
+      << Read("found/truth.tum");  // the timestamp is off by 4.9 ms
   ASSERT_EQ(track("kitti/image_0").code, 0);
   EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n19,1.950000000\n"))
       << Read("found/timestamps.csv");
 
-  // If file names are timestamps, a missing image does no harm; a missing timestamp is an error.
+  // If file names are timestamps, a missing image is harmless. A missing timestamp is an error.
   std::filesystem::remove(folder_ / "tum/rgb/000019.png");
   EXPECT_EQ(track("tum/rgb").code, 0);
   std::string back = tum;
@@ -472,7 +475,7 @@ TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {
       << gone.err;
 }
 
-// Missing images late in the sequence are reported at once, too.
+// Missing images late in the sequence are also reported before the first image is processed.
 TEST_F(ImageTracks, AllTimesAreCheckedBeforeTheFirstImage) {
   MakeImages();
   Write("config.yaml", kGuided);
@@ -491,8 +494,8 @@ TEST_F(ImageTracks, AllTimesAreCheckedBeforeTheFirstImage) {
   EXPECT_EQ(run({"--set", "source.max_frames=15"}).code, 0);
 }
 
-/// Computes the error-free measurements of the features that a run tracked through a room. The
-/// point of a feature is the point of the walls at its first observation.
+/// Computes the exact measurements of the features that a run tracked in a room. Each feature is
+/// the point of the walls that its first observation shows.
 class ExactTracks {
  public:
   ExactTracks(Eigen::Vector3d least, Eigen::Vector3d most, std::istream&& truth)
@@ -504,12 +507,12 @@ class ExactTracks {
       Eigen::Quaterniond& q = pose.q;
       if (std::sscanf(row.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &t, &r[0], &r[1], &r[2],
                       &q.x(), &q.y(), &q.z(), &q.w()) != 8) {
-        poses_.pop_back();  // the file's header
+        poses_.pop_back();  // removes the header line of the file
       }
     }
   }
 
-  /// Returns rows frame,feature,dim,value from a run's measurements.csv.
+  /// Returns the rows `frame,feature,dim,value` for the features in a run's measurements.csv.
   std::string Rows(std::istream&& measurements, double rate_hz) const {
     std::ostringstream rows("frame,feature,dim,value\n", std::ios::ate);
     rows.precision(17);
@@ -553,8 +556,8 @@ class ExactTracks {
   std::vector<Pose> poses_;
 };
 
-// Example 25, from images to the camera's trajectory: the errors are at most 1.5 times those with
-// exact measurements of the tracked features.
+// Runs example 25 from images to the trajectory of the camera. The errors are at most 1.5 times
+// those of a run with exact measurements of the same features.
 TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
   const std::string example = std::string(ALIDADE_SOURCE_DIR) + "/examples/25_slam_images/";
   const Outcome drawn =
@@ -595,8 +598,8 @@ source:
                          {position: [0.2, 0.1, 0], target: [2.5, 0, 3]}]}
 )";
 
-// The rotation of the camera accelerates. Without a pyramid, optical flow covers only a few pixels,
-// but the filter predicts the rotation.
+// The rotation of the camera accelerates. Without a pyramid, optical flow finds motions of only a
+// few pixels, but the filter predicts the rotation.
 TEST_F(ImageTracks, AreFoundWhereTheFilterExpectsThem) {
   Write("scene.yaml", kTurning);
   Write("config.yaml", kGuided);
@@ -620,8 +623,8 @@ TEST_F(ImageTracks, AreFoundWhereTheFilterExpectsThem) {
   EXPECT_GT(guided, 2.0 * alone) << "images a feature is in: " << guided << " and " << alone;
 }
 
-/// Predicts every feature at its previous position, with small covariances, but some of them
-/// shifted.
+/// Predicts each feature at its previous position, with a small covariance. The predictions of the
+/// first `count` features are shifted by `by_px`.
 class Aside : public Guide {
  public:
   Aside(int count, double by_px) : count_(count), by_px_(by_px) {}
@@ -657,8 +660,8 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
   Config config = Config::FromFile((folder_ / "config.yaml").string());
   config.Set("source.path", (folder_ / "scene/images").string(), "test");
   const PluginHost host;
-  // If 5 features are outside their regions, these are lost; if more than half are, the filter is
-  // considered wrong.
+  // If 5 features are outside their predicted regions, these features are lost. If more than half
+  // of the features are outside, the prediction is considered wrong and no feature is lost.
   for (const int aside : {0, 5, 1000}) {
     const auto source = CreateSource(host, config, 1);
     Aside guide(aside, 3.0);
@@ -677,7 +680,8 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
   }
 }
 
-/// Returns a sum of waves of 6 to 30 px, shifted by `shift` px; grey values, not rounded.
+/// Returns an image that is a sum of waves of 6 to 30 px, shifted by `shift` px. Grey values are
+/// not rounded.
 cv::Mat Waves(cv::Point2f shift) {
   cv::Mat grey(160, 240, CV_32F, cv::Scalar(128.0));
   cv::RNG random(11);
@@ -709,7 +713,8 @@ class EstimatedNoise : public ImageTracks {
     grey.convertTo(image, CV_8U);
     ASSERT_TRUE(cv::imwrite(ImageFile(k), image));
   }
-  /// Calls take(first, now) for each feature of the first image that a later image contains.
+  /// Calls take(first, now) for each feature of the first image in each later image that has the
+  /// feature.
   template <class Take>
   void Follow(const Take& take) const {
     Config config = Config::FromFile((folder_ / "config.yaml").string());
@@ -748,13 +753,13 @@ TEST_F(EstimatedNoise, IsThatOfThePlacesThatAreFound) {
     ++count;
   });
   ASSERT_GT(count, 20 * kImages);
-  // The variance of 600 positions is accurate to 6 %. The estimate from 25 cells with six fitted
-  // parameters is a fifth too small.
+  // The variance from 600 positions is accurate to 6 %. The variance estimated from 25 cells with
+  // six fitted parameters is a fifth too small.
   EXPECT_GT(of_places / count, 1e-4);
   EXPECT_NEAR(told / of_places, 0.85, 0.25) << told << " of " << of_places;
 }
 
-// A depth discontinuity: the right half of the image moves differently.
+// The scene has a depth discontinuity: the right half of the image moves by another distance.
 TEST_F(EstimatedNoise, IsLargeOfPatchesThatMoveInParts) {
   Draw(0, Waves({}));
   cv::Mat parted = Waves({0.5F, 0.0F});
@@ -779,7 +784,8 @@ TEST_F(EstimatedNoise, IsLargeOfPatchesThatMoveInParts) {
   EXPECT_GT(across / is_across, 4.0 * beside / is_beside);
 }
 
-// A filter with a large error is worse than no filter.
+// The predictions have a large error, so they are ignored: all features are found, as without a
+// filter.
 TEST_F(ImageTracks, AreFoundWithoutAGuideThatIsFarOff) {
   Write("config.yaml", kGuided);
   MakeImages();
@@ -895,7 +901,7 @@ TEST_F(ImageTracks, PointsOfKnownDepthGiveTheMapItsScale) {
                          {position: [0.5, 0.1, 0.2], target: [0, 0, 3]}]}
 )");
   MakeImages();
-  // The camera starts at the origin, so the depth of a point is its z.
+  // The camera starts at the origin and looks along z, so the depth of a point is its z.
   std::map<int, double> depth_m;
   std::istringstream map(Read("scene/map.csv"));
   std::string row;
@@ -946,7 +952,7 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
     return at == std::string::npos ? NAN : std::stod(eval.out.substr(at + 8));
   };
   EXPECT_NEAR(scale({}), 1.0, 0.03);
-  // Halving the depths halves the map.
+  // If all known depths are halved, the map is half as large.
   std::ostringstream half;
   for (std::istringstream rows(known.str()); std::getline(rows, row);) {
     double u = 0.0, v = 0.0, depth = 0.0;

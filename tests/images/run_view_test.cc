@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade run --save-video`: the contents of the video, and the refused cases.
+// `alidade run --save-video`: the contents of the video, and the cases in which the program refuses
+// to write it.
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -19,8 +20,8 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-// Four points on a textured plate 4 m ahead. A camera that moves sideways, x = 0 to 0.3 m, sees
-// them at u = 159.5 + 250 (X - x) / 4, v = 119.5 + 250 Y / 4.
+// The scene has four points on a textured plate 4 m ahead. The camera moves sideways from x = 0 to
+// 0.3 m. It sees a point at u = 159.5 + 250 (X - x) / 4, v = 119.5 + 250 Y / 4.
 const std::string kPlate = R"(alidade: 1
 title: A plate
 camera: {model: pinhole, width: 320, height: 240, fx: 250, fy: 250, cx: 159.5, cy: 119.5}
@@ -48,7 +49,7 @@ source:
                          {position: [0.3, 0, 0], target: [0.3, 0, 4]}]}
 estimators: {ekf: {type: ekf}}
 )";
-// 320 x 240 px, enlarged three times, and the panel.
+// The video shows the image of 320 x 240 px, enlarged three times, next to the panel.
 constexpr int kTimes = 3, kWidth = 320 * kTimes + 400, kHeight = 240 * kTimes;
 
 class RunView : public testing::ProgramTest {
@@ -64,13 +65,14 @@ class RunView : public testing::ProgramTest {
     for (cv::Mat frame; video.read(frame);) frames.push_back(frame.clone());
     return frames;
   }
-  /// Returns the mean blue, green and red of 3 x 3 pixels around pixel (u, v) of the source's
+  /// Returns the mean blue, green and red of the 3 x 3 pixels around pixel (u, v) of the source's
   /// image.
   static cv::Scalar ColourAt(const cv::Mat& frame, double u, double v) {
     const int x = cvRound(kTimes * (u + 0.5) - 0.5), y = cvRound(kTimes * (v + 0.5) - 0.5);
     return cv::mean(frame(cv::Rect(x - 1, y - 1, 3, 3)));
   }
-  /// Returns whether channel 0, 1 or 2 (blue, green, red) is clearly brighter than the others.
+  /// Returns true if the channel 0, 1 or 2 (blue, green, red) is clearly brighter than the other
+  /// two.
   static bool Is(const cv::Scalar& colour, int channel) {
     for (int other = 0; other < 3; ++other) {
       if (other != channel && colour[channel] < colour[other] + 50.0) return false;
@@ -79,7 +81,7 @@ class RunView : public testing::ProgramTest {
   }
 };
 
-// u = 159.5 + 250 X / 4, v = 119.5 + 250 Y / 4 in the first frame.
+// Pixels in the first frame: u = 159.5 + 250 X / 4, v = 119.5 + 250 Y / 4.
 constexpr std::array<double, 2> kFirst[] = {{97, 82}, {222, 82}, {97, 157}, {222, 157}};
 
 TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
@@ -91,7 +93,8 @@ TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   for (const cv::Mat& frame : frames) EXPECT_EQ(frame.size(), cv::Size(kWidth, kHeight));
   const cv::VideoCapture video((folder_ / "plate.avi").string(), cv::CAP_OPENCV_MJPEG);
   EXPECT_EQ(video.get(cv::CAP_PROP_FPS), 10.0);
-  // Frames are complete up to the last block of the panel, and another reader finds all of them.
+  // Each frame is complete: even the last block of the panel has the panel's grey. Another
+  // reader finds all frames.
   for (const cv::Mat& frame : frames) {
     const cv::Scalar last = cv::mean(frame(cv::Rect(kWidth - 8, kHeight - 8, 8, 8)));
     for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(last[channel], 27.0, 6.0);
@@ -101,12 +104,12 @@ TEST_F(RunView, TheVideoHasEachFrameAndItsFeaturesInTheirColours) {
   for (cv::Mat frame; other.read(frame);) ++count;
   EXPECT_EQ(count, 8) << other.getBackendName();
   for (const auto& [u, v] : kFirst) {
-    // new features are blue
+    // New features are blue.
     EXPECT_TRUE(Is(ColourAt(frames[0], u, v), 0)) << ColourAt(frames[0], u, v);
     EXPECT_FALSE(Is(ColourAt(frames[0], u + 20.0, v), 0));
   }
-  // The camera moves 0.3 m in the 7 intervals, at 250 / 4 px a metre. Features accepted from the
-  // second frame on are green.
+  // The camera moves 0.3 m in 7 intervals, and 1 m moves a point by 250 / 4 px. Features accepted
+  // from the second frame on are green.
   for (std::size_t k = 1; k < frames.size(); ++k) {
     const double moved = 0.3 / 7.0 * static_cast<double>(k) * 250.0 / 4.0;
     for (const auto& [u, v] : kFirst) {
@@ -127,7 +130,8 @@ TEST_F(RunView, RejectedFeaturesAreRed) {
   }
 }
 
-// The ellipse of 3 sigma of the innovation: at least 6 px for R alone, and S makes it larger.
+// The video shows the 3-sigma ellipse of the innovation. R alone makes it at least 6 px large, and
+// S makes it larger.
 TEST_F(RunView, TheInnovationHasItsEllipse) {
   ASSERT_EQ(Run(kPlate, {"--save-video", "p.avi"}).code, 0);
   const cv::Mat frame = Frames("p.avi").at(4);
@@ -138,10 +142,10 @@ TEST_F(RunView, TheInnovationHasItsEllipse) {
     for (int x = -60; x <= 60; ++x) {
       const cv::Scalar colour =
           frame.at<cv::Vec3b>(cvRound(kTimes * (v + 0.5)) + y, cvRound(kTimes * (u + 0.5)) + x);
-      const double away = std::hypot(x, y) / kTimes;  // px of the source's image
+      const double away = std::hypot(x, y) / kTimes;  // distance in px of the source's image
       if (!Is(colour, 1)) continue;
       if (away > 5.5 && away < 12.0) ++ring;
-      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // except for the tail
+      if (away > 2.5 && away < 5.0 && std::abs(y) > 4) ++inside;  // y: excludes the tail
     }
   }
   EXPECT_GT(ring, 60);
@@ -169,14 +173,15 @@ TEST_F(RunView, ShowsTheImagesThatFeaturesWereFoundIn) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::vector<cv::Mat> frames = Frames("found.avi");
   ASSERT_EQ(frames.size(), 8u);
-  // The green dots have three times as many pixels as rings without a feature could have.
+  // The bound is three times the number of green pixels of rings without a feature.
   cv::Mat channels[3];
   cv::split(frames[5](cv::Rect(0, 0, 320 * kTimes, kHeight)), channels);
   const cv::Mat green = channels[1] > channels[0] + 60;
   EXPECT_GT(cv::countNonZero(green), 1000);
 }
 
-// In the first image the target is 90 px wide, from (75, 45) on. Its outline excludes 4 % of it.
+// In the first image the target is 90 px wide and starts at (75, 45). The outline is drawn 3.5 px
+// inside its edges.
 TEST_F(RunView, ShowsTheOutlineOfATarget) {
   Write("scene.yaml", R"(alidade: 1
 source:
@@ -200,7 +205,7 @@ source:
   const std::vector<cv::Mat> frames = Frames("target.avi");
   ASSERT_EQ(frames.size(), 7u);
   ASSERT_EQ(frames[0].size(), cv::Size(4 * 240 + 400, 720));
-  const auto green_columns = [&](int from, int to) {  // in the row through the middle
+  const auto green_columns = [&](int from, int to) {  // in the row through the target's middle
     int count = 0;
     for (int x = from; x < to; ++x) {
       const cv::Vec3b at = frames[0].at<cv::Vec3b>(360, x);

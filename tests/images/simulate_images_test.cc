@@ -16,7 +16,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-// A lens that moves the corners inwards by about 40 px.
+// The lens distortion moves the corners of the image inwards by about 40 px.
 const std::string kScene = R"(alidade: 1
 camera: {model: radtan, width: 320, height: 240, fx: 260, fy: 265, cx: 160.5, cy: 119,
          k1: -0.25, k2: 0.05, p1: 0.001, p2: -0.002}
@@ -33,7 +33,7 @@ source:
 )";
 
 using Pixel = std::array<double, 2>;
-using Pixels = std::map<int, std::map<int, Pixel>>;  ///< by frame and feature
+using Pixels = std::map<int, std::map<int, Pixel>>;  ///< pixel of each feature in each frame
 
 class SimulateImages : public testing::ProgramTest {
  protected:
@@ -43,7 +43,7 @@ class SimulateImages : public testing::ProgramTest {
     return Call(more);
   }
 
-  /// Reads the pixels of a file with rows frame,feature,dim,value into `pixels`.
+  /// Reads the pixels from a file with rows `frame,feature,dim,value` into `pixels`.
   void Read(const std::string& name, Pixels& pixels) const {
     std::istringstream rows(ProgramTest::Read(name));
     std::string row;
@@ -76,11 +76,11 @@ class SimulateImages : public testing::ProgramTest {
   }
 };
 
-// kRadius in px. The grey value of the frame number is below kDark.
+// kRadius is in px. The grey value of the drawn frame number is below kDark.
 constexpr double kRadius = 4.0, kDark = 60.0;
 
-/// Returns the largest distance of a disc's centroid from its point, px. Skips discs that touch
-/// another disc or the border, and counts the others.
+/// Returns the largest distance between the centroid of a disc and its point, px. Discs that touch
+/// another disc or the border are skipped; `count` counts the others.
 double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, int& count) {
   double largest = 0.0;
   for (const auto& [feature, p] : points) {
@@ -121,8 +121,8 @@ TEST_F(SimulateImages, DiscsLieWhereTheTracksSay) {
     const cv::Mat image = Image("data/images/00000" + std::to_string(k) + ".png");
     ASSERT_EQ(image.size(), cv::Size(320, 240));
     ASSERT_EQ(frames[static_cast<std::size_t>(k)].size(), cv::Size(320, 240));
-    // The smoothed discs of OpenCV lie within 0.06 px of their centres for any of 16 x 16 sub-pixel
-    // positions. JPEG adds its losses.
+    // OpenCV draws smoothed discs. For each of 16 x 16 sub-pixel positions the centroid is within
+    // 0.06 px of the centre. JPEG adds its losses.
     EXPECT_LT(LargestError(image, pixels.at(k), seen), 0.1) << "frame " << k;
     const cv::Mat& frame = frames[static_cast<std::size_t>(k)];
     EXPECT_LT(LargestError(frame, pixels.at(k), seen_again), 0.5) << "frame " << k;
@@ -135,13 +135,14 @@ TEST_F(SimulateImages, AreAllAlikeAndOfNothingElse) {
   ASSERT_EQ(Simulate(kScene, {"--images", "images"}).code, 0);
   const Pixels pixels = AllPixels();
   const cv::Mat image = Image("data/images/000000.png");
-  // The sum over all discs is between zero and that of separate discs: an area of pi r^2 with a
-  // value of 255 each.
+  // The sum of the grey values of all discs lies between zero and the sum for separate discs. A
+  // separate disc has an area of pi r^2 with the value 255.
   const double total = cv::sum(cv::max(image, static_cast<int>(kDark)) - kDark)[0];
   const double one = M_PI * (kRadius + 0.5) * (kRadius + 0.5) * (255.0 - kDark);
   const auto count = static_cast<double>(pixels.at(0).size());
   EXPECT_LT(total, 1.1 * count * one);
-  EXPECT_GT(total, 0.7 * count * one);  // some discs touch, or the border cuts them
+  // Some discs touch, or the border cuts them.
+  EXPECT_GT(total, 0.7 * count * one);
 }
 
 TEST_F(SimulateImages, TheVideoHasTheRateOfTheSource) {
@@ -177,7 +178,8 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
 }
 
 TEST_F(SimulateImages, SurfacesAreSeenWhereTheyAre) {
-  // A plate 1 m wide and 0.5 m high, 2 m ahead; a pinhole camera sees its edges at known pixels.
+  // The plate is 1 m wide and 0.5 m high and is 2 m ahead. A pinhole camera sees its edges at known
+  // pixels.
   const Outcome outcome = Simulate(R"(alidade: 1
 camera: {model: pinhole, width: 160, height: 120, fx: 100, fy: 100, cx: 80, cy: 60,
          baseline_m: 0.4}
@@ -218,7 +220,8 @@ source:
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return cv::imread((folder_ / folder / "images/000000.png").string(), cv::IMREAD_GRAYSCALE);
   };
-  // The textures follow the order of the list: a rectangle out of view replaces the wall.
+  // Textures are assigned in the order of the list. A rectangle that is out of view takes the place
+  // of the wall, so the textures of the other surfaces do not change.
   const char* const kAway = "{rectangle: {corner: [0, 0, -5], right: [1, 0, 0], down: [0, 1, 0]}}";
   const std::string wall =
       "{rectangle: {corner: [-5, -5, 4], right: [10, 0, 0], down: [0, 10, 0]}}";
@@ -233,7 +236,7 @@ source:
   EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
 }
 
-// Blocks have 512 bytes: each other file fits into 16 blocks, and an image needs more than 2.
+// Blocks have 512 bytes. Each file except the video fits into 16 blocks. An image needs more than 2.
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});

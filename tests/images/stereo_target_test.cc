@@ -39,7 +39,7 @@ source:
   target: [75, 45, 90, 90]
 )";
 
-/// Values of a stream without landmarks by frame.
+/// Values of a stream without landmarks, keyed by frame.
 using Values = std::map<int, double>;
 
 class StereoTarget : public testing::ProgramTest {
@@ -136,7 +136,8 @@ sensors:
            focal_px: 120, baseline_m: 0.065, sigma_px: 50}
 estimators: {ekf: {type: ekf}}
 )");
-  // The sensor's sigma is 50 px: without the measurements' variances the depth hardly changes.
+  // The sensor entry has a sigma of 50 px. Unless the variances of the measurements are used,
+  // disparity hardly changes the depth.
   const auto rmse_mm = [&](const char* estimate) {
     const Outcome outcome =
         Call({"run", "run.yaml", "-o", "run", "--force", "--set",
@@ -154,7 +155,7 @@ estimators: {ekf: {type: ekf}}
 
 TEST_F(StereoTarget, HiddenBlackAndFrozenImagesGiveNothingFalse) {
   MakePair();
-  // Black images; a dimmer image, which has no effect; and a repeated image.
+  // Three images are black. One image is dimmer, which has no effect. One image is a repetition.
   for (const int k : {5, 6, 7}) Change(k, [](cv::Mat& image) { image.setTo(0); });
   Change(12, [](cv::Mat& image) { image = 0.5 * image + 20; });
   for (const char* side : {"left", "right"}) {
@@ -192,8 +193,8 @@ TEST_F(StereoTarget, WithoutTextureThereIsNoDisparity) {
 
 TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   MakePair();
-  // Vertical stripes with a period of 12 px look the same at each twelfth disparity; their rows
-  // differ.
+  // Vertical stripes with a period of 12 px match at every multiple of 12 px of disparity. Their
+  // rows differ.
   for (int k = 0; k < 21; ++k) {
     Change(k, [&](cv::Mat& image) {
       for (int y = 0; y < image.rows; ++y) {
@@ -208,7 +209,7 @@ TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(Found("disparity").empty());
   EXPECT_EQ(Found("inverse_scale").size(), 21u);
-  // The repetition is the only cause.
+  // The repeated match is the only reason: without the check there are disparities.
   ASSERT_EQ(Measure({"--set", "source.disparity.min_distinct=0"}).code, 0);
   EXPECT_FALSE(Found("disparity").empty());
 }
@@ -226,7 +227,8 @@ source: {type: stereo_target, left: 'pair/images/left/*.png', rate_hz: 20, boxes
 }
 
 TEST_F(StereoTarget, APlaneThatTiltsKeepsItsDepth) {
-  // A textured plate 2 m ahead, tilted and moved back step by step, drawn by its homography.
+  // Draws a textured plate 2 m ahead with its homography. The plate is tilted and moved back step
+  // by step.
   const cv::Matx33d k(200, 0, 160, 0, 200, 120, 0, 0, 1);
   cv::Mat texture(240, 320, CV_8U);
   cv::RNG random(3);
@@ -240,7 +242,8 @@ TEST_F(StereoTarget, APlaneThatTiltsKeepsItsDepth) {
     cv::Matx33d turn;
     cv::Rodrigues(axis, turn);
     const double z0 = 2.0, z = z0 * (1.0 + 0.02 * i);
-    // X' = R (X - c) + (0, 0, z) for the plate's points X = (x, y, z0), c = (0, 0, z0) its middle.
+    // A point X = (x, y, z0) of the plate moves to X' = R (X - c) + (0, 0, z). The middle of the
+    // plate is c = (0, 0, z0).
     const cv::Vec3d t = cv::Vec3d(0, 0, z) - turn * cv::Vec3d(0, 0, z0);
     const cv::Matx33d h = k * (turn + cv::Matx31d(t) * cv::Matx13d(0, 0, 1.0 / z0)) * k.inv();
     cv::Mat image;
@@ -266,7 +269,7 @@ source: {type: stereo_target, left: plate, rate_hz: 20, target: [110, 70, 101, 1
 
 TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   MakePair();
-  // A plate slides over the target from the left and stays until image 12. Later images are
+  // A plate slides over the target from the left and stays over it until image 12. Later images are
   // unchanged.
   cv::Mat plate(180, 240, CV_8U);
   cv::RNG random(5);
@@ -288,9 +291,9 @@ TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   }
 }
 
-/// Draws a textured square in front of a textured wall. The square grows, and from image 1 on it
-/// moves up and down by 16 px between images. Each image is the mean over its exposure, four fifths
-/// of that time. Returns the size of the square relative to image 0.
+/// Draws a textured square in front of a textured wall. The square grows. From image 1 on it also
+/// moves up or down by 16 px between images. Each image is the mean over its exposure, which lasts
+/// four fifths of the interval between images. Returns the size of the square relative to image 0.
 std::vector<double> DrawSwing(const std::filesystem::path& folder, int count) {
   std::filesystem::create_directories(folder);
   cv::RNG random(11);
@@ -304,7 +307,7 @@ std::vector<double> DrawSwing(const std::filesystem::path& folder, int count) {
   std::vector<double> sizes;
   for (int i = 0; i < count; ++i) {
     constexpr int kParts = 24;
-    constexpr double kReach = 32.0, kSpeed = 16.0;  // px, px an image
+    constexpr double kReach = 32.0, kSpeed = 16.0;  // in px, and in px per image
     cv::Mat mean(wall.size(), CV_32F, cv::Scalar(0.0));
     for (int part = 0; part < kParts; ++part) {
       const double t = i + 0.8 * ((part + 0.5) / kParts - 0.5);
@@ -333,18 +336,18 @@ source: {type: stereo_target, left: swing, rate_hz: 20, target: [101, 71, 38, 38
   const Outcome outcome = Measure();
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Values scale = Found("inverse_scale");
-  EXPECT_GE(scale.size(), 38u);  // without a blurred template 10
+  EXPECT_GE(scale.size(), 38u);  // 10 without a blurred template
   for (const auto& [frame, value] : scale) {
     EXPECT_NEAR(value * sizes[static_cast<std::size_t>(frame)], 1.0, 0.02) << frame;
   }
-  // Measurements with a large uncertainty from the blur can be omitted.
+  // Measurements to which blur gives a large uncertainty can be omitted.
   ASSERT_EQ(Measure({"--set", "source.max_relative_sigma=0.01"}).code, 0);
   EXPECT_LT(Found("inverse_scale").size(), scale.size());
 }
 
 TEST_F(StereoTarget, ATargetThatIsGoneIsNotFoundElsewhere) {
   DrawSwing(folder_ / "swing", 2);
-  // The next 54 images have other content of the same size: some place always matches best.
+  // The next 54 images have other content. In each of them some place is the best match.
   cv::RNG random(2);
   for (int k = 2; k < 56; ++k) {
     cv::Mat image(180, 240, CV_8U);
@@ -383,7 +386,8 @@ TEST_F(StereoTarget, ABoxSaysWhereItIsAndThatItIsNot) {
   Write("config.yaml", R"(alidade: 1
 source: {type: stereo_target, left: pair/images/left, rate_hz: 20, boxes: boxes.csv}
 )");
-  // Four corners with errors of a pixel, and a row for an image without the target.
+  // Rows may give four corners, here with errors of a pixel. A row of nan marks an image without
+  // the target.
   Write("boxes.csv", "0,75,45,165,44,164,135,74,134\n5,nan,nan,nan,nan\n");
   ASSERT_EQ(Measure().code, 0);
   const Values depth = Depth(), scale = Found("inverse_scale");
@@ -392,7 +396,7 @@ source: {type: stereo_target, left: pair/images/left, rate_hz: 20, boxes: boxes.
   for (const auto& [frame, value] : scale) {
     EXPECT_NEAR(value, depth.at(frame) / depth.at(0), 5e-3 * value) << frame;
   }
-  // The first image with a box is black: the next box is used.
+  // The first image with a box is black, so the next box is used.
   Change(0, [](cv::Mat& image) { image.setTo(0); });
   Write("boxes.csv", "0,75,45,90,90\n1,75,45,90,90\n");
   ASSERT_EQ(Measure().code, 0);
@@ -451,7 +455,7 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
     std::filesystem::copy_file(example + name, folder_ / name,
                                std::filesystem::copy_options::overwrite_existing);
   }
-  // 1.8 s long: the target is near, so stereo is blind from 1.25 s on.
+  // The sequence is 1.8 s long. Stereo is blind from 1.25 s on because the target is too near.
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "pair", "--images", "images", "--set",
                              "source.duration_s=1.8"});
   ASSERT_EQ(made.code, 0) << made.err;
@@ -476,7 +480,7 @@ TEST_F(StereoTarget, Example28IsBetterThanItsSimulatedNoise) {
   }
 }
 
-/// 13 real stereo pairs of a chessboard, with the depth known from its corners.
+/// 13 real stereo pairs of a chessboard. Its corners determine the true depth.
 TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   const char* const data = std::getenv("ALIDADE_DATA");
   const std::filesystem::path boards =
@@ -521,8 +525,8 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
     cv::FileStorage stereo((folder_ / "stereo.yml").string(), cv::FileStorage::WRITE);
     stereo << "M1" << m1 << "D1" << d1 << "M2" << m2 << "D2" << d2 << "R" << r << "T" << t;
   }
-  // The source measures in the rectified left camera: the centre of the board there, from its
-  // corners.
+  // The source measures in the rectified left camera. The centre of the board in this camera is
+  // computed from the corners of the board.
   cv::Mat r1, r2, p1, p2, q;
   cv::stereoRectify(m1, d1, m2, d2, size, r, t, r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0.0);
   std::vector<double> depth_m;
@@ -571,10 +575,12 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   RecordProperty("median_by_scale", std::to_string(median(by_scale)));
 }
 
-/// Videos of faces with labelled boxes [Kalal2010]: one config, which has only the first box.
+/// Videos of faces with labelled boxes [Kalal2010]. All use the same config, which contains only
+/// the first box.
 class StereoTargetOfFaces : public StereoTarget {
  protected:
-  /// Checks the median relative error of the size, over at least `fewest` images.
+  /// Checks the median relative error of the target's size. At least `fewest` images must have a
+  /// measurement.
   void ExpectSizes(const std::string& name, std::size_t fewest) {
     const char* const data = std::getenv("ALIDADE_DATA");
     const auto video = std::filesystem::path(data == nullptr ? "" : data) / "tld-boxes" / name;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Checks the claims of docs/is_batch_the_truth.md on the batch as a reference, with
+// Checks the claims of docs/is_batch_the_truth.md about the batch as a reference. Uses
 // examples/10_slam_scene.
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ const std::pair<std::string, std::string> kWrongPrior = {"landmarks.prior",
 const Settings kNoKnownDepth = {{"estimators.ekf.sensors", "[pixels]"},
                                 {"estimators.batch.sensors", "[pixels]"}};
 
-/// Summaries of the filter and of the batch over seeds 1001 and 1002.
+/// Summaries of the filter and of the batch over the seeds 1001 and 1002.
 struct EkfAndBatch {
   SweepSummary ekf, batch;
 
@@ -47,8 +47,8 @@ bool HasCeres() {
 #endif
 }
 
-// With known depth the batch is right: its scale is 1 and its covariance agrees with its errors. It
-// smooths the whole trajectory, so only its last frame is comparable with a filter's.
+// With known depth the batch is correct: its scale is 1, and its covariance agrees with its errors.
+// The batch smooths the whole trajectory, so only its last frame can be compared with the filter.
 TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
   const EkfAndBatch means("batch.yaml", {});
@@ -62,8 +62,8 @@ TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   EXPECT_LE(last, 1.25);
 }
 
-// 40 priors with a mean of 1 / 0.8 of the truth are the only information on scale. The batch has a
-// larger error than the filter, and only NEES shows it.
+// 40 priors are the only information on scale. Their mean inverse distance is 1 / 0.8 times the
+// truth. The error of the batch is larger than that of the filter, and only NEES shows this.
 TEST(BatchReference, IsWrongWhereScaleIsVotedByPriors) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
   Settings settings = kNoKnownDepth;

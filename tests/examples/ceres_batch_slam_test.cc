@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Trajectory and map of the batch, compared with the filter: examples/10_slam_scene and
-// 13_slam_odometry_tracks.
+// Compares the trajectory and the map of the batch with those of the filter. Uses
+// examples/10_slam_scene and examples/13_slam_odometry_tracks.
 #include <filesystem>
 
 #include "alidade/sweep/sweep.h"
@@ -10,7 +10,8 @@
 namespace alidade {
 namespace {
 
-/// Summaries of the filter and of the batch over seeds 1001 to 1008 of a config of example 10.
+/// Summaries of the filter and of the batch over the seeds 1001 to 1008. Both use the same config
+/// of example 10.
 struct Pair {
   SweepSummary ekf, batch;
   double Ratio(const char* key) const {
@@ -31,7 +32,7 @@ Pair Eight(const char* name) {
   return {summaries.at(0), summaries.at(1)};
 }
 
-// The model generates the trajectory, so the batch is consistent. NEES is that of the whole
+// The model generates the trajectory, so the batch is consistent. The NEES covers the whole
 // trajectory.
 TEST(CeresBatchSlam, IsHonestOnAPathDrawnFromTheModelAndItsMapIsLittleBetterThanTheFilters) {
   const Pair pair = Eight("batch.yaml");
@@ -40,7 +41,7 @@ TEST(CeresBatchSlam, IsHonestOnAPathDrawnFromTheModelAndItsMapIsLittleBetterThan
   EXPECT_LE(pair.Ratio("map.sim3.rmse"), 1.10);
   EXPECT_GE(pair.Ratio("map.sim3.rmse"), 1.0);
   EXPECT_GE(pair.Ratio("final_error:cam.position"), 1.0);
-  EXPECT_GE(pair.Ratio("rmse:cam.position"), 1.5);  // the trajectory is smoothed
+  EXPECT_GE(pair.Ratio("rmse:cam.position"), 1.5);  // the batch smooths the trajectory
 }
 
 TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
@@ -52,7 +53,8 @@ TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
 
 class CeresBatchSlamDrives : public testing::DrivesTest {};
 
-// RMS errors of the position over the first frames in m, as reached by an independent batch.
+// `most` is the RMS error of the position over the first `frames` frames in m. An independent batch
+// reached it.
 TEST_F(CeresBatchSlamDrives, StaysWithinThePublishedErrorsWithARobustLoss) {
   const struct {
     const char* name;

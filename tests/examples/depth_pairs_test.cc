@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The arithmetic of the bench accuracy_depth_pairs. Example 07 on the real series that were not
-// used for tuning, compared with the line d = c s.
+// Checks the arithmetic of the bench accuracy_depth_pairs. Also runs example 07 on the real series
+// that were not used for tuning, and compares the filter with the line d = c s.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,8 @@ namespace {
 
 using bench::PairSeries;
 
-// f B = 400 px m, first 40 m ahead: d = 10 s without noise. The first two rows have a disparity.
+// f B = 400 px m and the first depth is 40 m, so d = 10 s without noise. Only the first two rows
+// have a disparity.
 PairSeries FourRows() {
   return {"made up",
           400.0,
@@ -37,8 +38,8 @@ TEST(PairSeries, TheLineIsExactWithoutNoise) {
   EXPECT_NEAR(LineRmse(FourRows()), 0.0, 1e-12);
 }
 
-// c = (11 * 1 + 12.5 * 1.25) / (1 + 1.5625) = 26.625 / 2.5625 px; 400 / c = 38.497653 m. The depth
-// is 3.7559 % too small: by 0.93897 m at 25 m and by 0.75117 m at 20 m.
+// c = (11 * 1 + 12.5 * 1.25) / (1 + 1.5625) = 26.625 / 2.5625 px; 400 / c = 38.497653 m.
+// The computed depth is 3.7559 % too small: by 0.93897 m at 25 m and by 0.75117 m at 20 m.
 TEST(PairSeries, TheLineIsFittedOverTheSeenHalf) {
   PairSeries series = FourRows();
   series.rows[0].disparity_px = 11.0;
@@ -49,13 +50,13 @@ TEST(PairSeries, TheLineIsFittedOverTheSeenHalf) {
   EXPECT_NEAR(LineRmse(series), 0.85027, 1e-5);
 }
 
-// The last scale is 2 % too large. With the distance known at masking the depths are 40 / 2.04 =
-// 19.6078 m instead of 20 m, and the exact 25 m. The best k: (25 / 1.6 + 20 / 2.04) / (1 / 2.56 + 1
-// / 4.1616) = 40.3020 m.
+// The last scale is 2 % too large. If the distance at the masking is known, the computed depths are
+// 25 m, which is exact, and 40 / 2.04 = 19.6078 m instead of 20 m. The best constant is
+// k = (25 / 1.6 + 20 / 2.04) / (1 / 2.56 + 1 / 4.1616) = 40.3020 m.
 TEST(PairSeries, WhatDriftLeaves) {
   PairSeries series = FourRows();
   series.rows[3].scale = 2.04;
-  series.rows[0].depth_m = 41.0;  // rows before the masking do not count
+  series.rows[0].depth_m = 41.0;  // rows before the masking have no effect
   EXPECT_NEAR(AnchoredRmse(series), (20.0 - 40.0 / 2.04) / std::sqrt(2.0), 1e-12);
   const double k = (25.0 / 1.6 + 20.0 / 2.04) / (1.0 / 2.56 + 1.0 / 4.1616);
   const double a = k / 1.6 - 25.0, b = k / 2.04 - 20.0;
@@ -65,7 +66,7 @@ TEST(PairSeries, WhatDriftLeaves) {
   EXPECT_LT(BestConstantRmse(series), bench::BlindRmse(series, k * 0.999));
 }
 
-// log(s Z) grows by 0, 0 and log(1.02) from row to row.
+// log(s Z) grows by 0, 0 and log(1.02) between consecutive rows.
 TEST(PairSeries, DriftIsTheGrowthOfScaleTimesDepth) {
   PairSeries series = FourRows();
   series.rows[3].scale = 2.04;
@@ -84,11 +85,12 @@ TEST(PairSeries, WhiteNoiseIsWhatBendsARamp) {
   for (auto& row : series.rows) row.depth_m += 0.2 * random.Normal();
   for (std::size_t i = series.seen_count; i < series.rows.size(); ++i)
     series.rows[i].depth_m = 1e6 * random.Normal();
-  // The mean of 998 overlapping squares has a standard deviation of about 6 %.
+  // The mean of 998 overlapping squares has a standard deviation of about 6 % of its value.
   EXPECT_NEAR(WhiteVariance(series, depth), 0.04, 0.008);
 }
 
-// For 400 normal values with sigma 2 the interval is close to mean -+ 1.96 * 2 / sqrt(400) = 0.196.
+// For 400 normal values with sigma 2, the interval is close to the mean -+ 1.96 * 2 / sqrt(400) =
+// 0.196.
 TEST(Bootstrap, IsTheIntervalOfTheMean) {
   Random random(1);
   std::vector<double> values(400);
@@ -98,7 +100,7 @@ TEST(Bootstrap, IsTheIntervalOfTheMean) {
   EXPECT_NEAR(interval.high, bench::Mean(values) + 0.196, 0.02);
 }
 
-// The mean of two draws of {0, 1} is 0, 1/2 or 1, with probability 1/4, 1/2 and 1/4.
+// The mean of two draws from {0, 1} is 0, 1/2 or 1, with probabilities 1/4, 1/2 and 1/4.
 TEST(Bootstrap, DrawsWithReplacement) {
   const Interval interval = bench::BootstrapOfMean({0.0, 1.0});
   EXPECT_EQ(interval.low, 0.0);
@@ -114,7 +116,7 @@ Experiment RealPairs(const std::filesystem::path& file, const PluginHost& host) 
   return BuildExperiment(config, host);
 }
 
-// The filter was tuned on the 1st, 3rd, ... series in order of name; this test uses the others.
+// The filter was tuned on the 1st, 3rd, ... series, sorted by name. This test uses the others.
 TEST(DepthPairs, FusedIsNoWorseThanTheLineOnTheReportedSeries) {
   const char* data = std::getenv("ALIDADE_DATA");
   const auto folder = std::filesystem::path(data == nullptr ? "" : data) / "kitti-depth-pairs";
@@ -134,7 +136,7 @@ TEST(DepthPairs, FusedIsNoWorseThanTheLineOnTheReportedSeries) {
         std::log(result.estimators.at(0).metrics.at("rmse:target.depth@blind") / line));
   }
   EXPECT_LE(bench::Mean(differences), 0.0);
-  // The filter would be significantly worse if the whole interval were above 0.
+  // If the whole interval were above 0, the filter would be significantly worse than the line.
   EXPECT_LT(bench::BootstrapOfMean(differences).low, 0.0);
 }
 

@@ -13,7 +13,8 @@
 
 namespace alidade::testing {
 
-/// Base class for tests of an example on real drives; skips if ALIDADE_DATA does not have them.
+/// Base class for tests of an example on real drives. The test is skipped if ALIDADE_DATA does not
+/// contain the drives.
 class DrivesTest : public ::testing::Test {
  protected:
   using Settings = std::vector<std::pair<std::string, std::string>>;

@@ -3,9 +3,9 @@
 #
 # tests/examples/embedded_test.sh COMPILER INCLUDE...
 #
-# Compiles examples/09_static_depth and the shipped models with COMPILER as C++17 without exceptions
-# and RTTI. Fails if the example would allocate or throw. INCLUDE: folders of the libraries and of
-# Eigen. Exit code 77 if this compiler is not installed.
+# Compiles examples/09_static_depth and the shipped models as C++17 with COMPILER, without
+# exceptions and RTTI. Fails if the example would allocate memory or throw. INCLUDE: include folders
+# of the libraries and of Eigen. If COMPILER is not installed, exits with code 77.
 set -euo pipefail
 compiler=$1
 shift
@@ -24,7 +24,7 @@ trap 'rm -f "$object"' EXIT
 printf '#include "%s"\n' alidade/model/static_ekf.h motion_models/*.h sensors/*.h |
   "$compiler" "${flags[@]}" -fsyntax-only -x c++ -
 "$compiler" "${flags[@]}" -c examples/09_static_depth/main.cc -o "$object"
-# -print-prog-name may print a bare name, which is then searched in PATH.
+# -print-prog-name may print a name without a folder. The shell then searches PATH for it.
 undefined=$("$("$compiler" -print-prog-name=nm)" -uC "$object")
 if grep -E 'operator (new|delete)|alloc|__cxa_[^a]|_Unwind|typeinfo' <<<"$undefined"; then
   echo "error: the lines above are of memory or exceptions"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Runs the shipped examples unchanged and compares them with the numbers in docs/experiments.md.
+// Runs the shipped examples unchanged and compares their results with the numbers in
+// docs/experiments.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +28,8 @@ constexpr bool kHasCeres = true;
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-/// Returns the plugins of the build, loaded once for all runs: no example names other plugins.
+/// Returns the plugins of the build. They are loaded once for all runs, because no example names
+/// other plugins.
 const PluginHost& Host() {
   static const PluginHost host(std::vector<std::filesystem::path>{});
   return host;
@@ -40,10 +42,10 @@ RunResult RunExample(const std::string& name, const Settings& settings) {
   return Run(experiment, {});
 }
 
-/// Means over those of the seeds 1001-1200 whose run did not diverge.
+/// Means over the runs of the seeds 1001 to 1200 that did not diverge.
 struct Means {
-  int diverged = 0;      ///< the number of other seeds
-  int inconsistent = 0;  ///< among the seeds that are included
+  int diverged = 0;      ///< number of runs that diverged
+  int inconsistent = 0;  ///< number of inconsistent runs among the others
   std::map<std::string, double> metrics;
   double operator[](const std::string& key) const { return metrics.at(key); }
 };
@@ -83,10 +85,10 @@ TEST(Examples, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
     if (!std::filesystem::exists(entry.path() / "config.yaml")) continue;
     if (!kHasCeres && entry.path().filename() == "08_depth_all_estimators") continue;
-    // The recorded drives are not in this repository; SlamOdometryTracks and SlamStereoTracks test
-    // them.
+    // The recorded drives are not in this repository. SlamOdometryTracks and SlamStereoTracks test
+    // these examples.
     if (entry.path().filename().string().ends_with("_tracks")) continue;
-    // these need rendered images
+    // these examples need rendered images
     if (entry.path().filename().string().ends_with("_images")) continue;
     ++count;
     const RunResult run = RunExample(entry.path().filename(), {});
@@ -97,8 +99,8 @@ TEST(Examples, EveryExampleRuns) {
   EXPECT_GE(count, 7);
 }
 
-// Experiment 4.1: the prediction crosses Z = 0 in about half of the runs, and the filter reports
-// it.
+// Experiment 4.1: the predicted depth crosses Z = 0 in about half of the runs, and the filter
+// reports its divergence.
 TEST(Examples, StereoOnlyReportsItsDivergence) {
   int diverged = 0;
   for (int seed = 1001; seed <= 1200; ++seed) {
@@ -128,7 +130,7 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   EXPECT_TRUE(HasEvent(ekf, EventKind::kUnobservable));
 }
 
-// Experiment 4.3: the trade-off between lag and noise.
+// Experiment 4.3: a larger R2 reduces the noise of the estimate but increases its lag.
 TEST(Examples, ScaleHeldTradesLagForNoise) {
   const auto means = Sweep("03_depth_scale_known");
   const Means &slow = means.at("R2_5"), &fast = means.at("R2_0_0005");
@@ -143,7 +145,7 @@ TEST(Examples, ScaleHeldTradesLagForNoise) {
   EXPECT_LT(fast["lag_ms:target.depth"], 8.0);
 }
 
-// Experiment 5, compared with the principled filter on the same seeds.
+// Experiment 5: compares the fused filter of 2017 with the principled filter on the same seeds.
 TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   const Means fused = Sweep("04_depth_fused_2017").at("ekf");
   EXPECT_EQ(fused.diverged + fused.inconsistent, 0);
@@ -165,7 +167,8 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   }
 }
 
-// The initial estimate is off by 5 cm and by 10 % in lambda, and the priors are as uncertain.
+// The initial estimate has errors of 5 cm in depth and 10 % in lambda. The prior sigmas equal these
+// errors.
 TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   const auto means = Sweep("06_depth_poor_initial");
   const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
@@ -178,7 +181,8 @@ TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   }
 }
 
-/// Returns the RMS difference of two estimates of a block over the series.
+/// Returns the RMS difference between the estimates of a block by the first two estimators of the
+/// example.
 double RmsApart(const std::string& name, int seed, const std::string& block) {
   Config config = Config::FromFile(kExamples / name / "config.yaml");
   config.Set("source.seed", std::to_string(seed), "--set");
@@ -197,7 +201,7 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
   return std::sqrt(squares / count);
 }
 
-// Experiment 5, "the order probably does not matter". A prototype had an RMS difference of 0.026
+// Experiment 5: "the order probably does not matter". The prototype had an RMS difference of 0.026
 // mm.
 TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   const auto means = Sweep("17_depth_update_order");
@@ -216,8 +220,8 @@ TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
   EXPECT_GE(apart, 1e-5) << "the second update is linearised at what the first one left";
 }
 
-/// Returns sigma of the depth of example 18 after `updates`. Uses the scalar form of the Riccati
-/// equation for x' = A x + G a, z = Z / Z0 + n, from P = 100 I.
+/// Returns sigma of the depth in example 18 after `updates` updates. Uses the scalar form of the
+/// Riccati equation for x' = A x + G a, z = Z / Z0 + n, and starts from P = 100 I.
 double RiccatiSigma(double r, int updates) {
   const double t = 0.033, h = 1.0 / 0.3;
   double p = 100.0, c = 0.0, v = 100.0;  // var(Z), cov(Z, rate), var(rate)
@@ -235,12 +239,13 @@ double RiccatiSigma(double r, int updates) {
   return std::sqrt(p);
 }
 
-/// Returns the standard deviation that belongs to a variance, as text.
+/// Returns the square root of `variance` as text.
 std::string RootText(const char* variance) {
   return internal::NumberText(std::sqrt(std::strtod(variance, nullptr)));
 }
 
-// Experiment 4.3 over decades of R2: lag against noise. The filter fails at both ends.
+// Experiment 4.3: R2 varies over decades. A larger R2 gives more lag and less noise, and the filter
+// fails at both ends.
 TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
   const auto with = [](const char* r) {
     return Sweep("18_depth_noise_lag", {{"sensors.scale.sigma_inverse_scale", RootText(r)}})
@@ -261,9 +266,9 @@ TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
     EXPECT_GT(ekf["lag_ms:target.depth"], 1.4 * lag) << r;
     lag = ekf["lag_ms:target.depth"];
   }
-  // R is a thousand times too small: errors stay beyond 10 sigma.
+  // R is a thousand times too small, so errors stay beyond 10 sigma.
   EXPECT_EQ(with("5e-9").inconsistent, 200);
-  // The RMSE is larger than that of a constant estimate of 0.3 m, which is 0.1 m / sqrt(2).
+  // A constant estimate of 0.3 m has an RMSE of 0.1 m / sqrt(2). The RMSE of the filter is larger.
   EXPECT_GT(with("5000")["rmse:target.depth"], 0.0707);
 }
 
@@ -284,7 +289,7 @@ TEST(Examples, TheGainSettlesWithinTheSeriesUpToR50) {
   }
 }
 
-/// Returns the 2nd, 4th, ... series: the noise was tuned on the others.
+/// Returns the 2nd, 4th, ... series. The noise was tuned on the other series.
 std::vector<std::filesystem::path> ReportingSeries() {
   const char* data = std::getenv("ALIDADE_DATA");
   const std::filesystem::path folder =
@@ -336,7 +341,8 @@ const Settings kPoorStart = {{"state.target.initial.depth", "{mean: 0.35, sigma:
                              {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"},
                              {"state.template.initial.inverse_distance", "{mean: 3, sigma: 1.5}"}};
 
-// A prototype's smoother and its batch over the same data: 1.03 mm, 11.7 mm/s, 99 %.
+// The smoother of a prototype and its batch had the errors 1.03 mm and 11.7 mm/s, and 99 % of the
+// NEES within the 95 % bound.
 TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
   if (!kHasCeres) GTEST_SKIP() << "built without Ceres";
   const auto means = Sweep("08_depth_all_estimators");
@@ -358,7 +364,8 @@ TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
   EXPECT_LE(means.at("ukf")["rmse:target.depth"], 0.0032);
 }
 
-// Depth 0.35 +- 0.1 m, lambda 3 +- 1.5 /m: sigma points at 3.9 sigma lie beyond both poles.
+// The prior is depth 0.35 +- 0.1 m and lambda 3 +- 1.5 /m. Sigma points at 3.9 sigma lie beyond the
+// poles of both.
 TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   Settings alone = kPoorStart;
   alone.emplace_back("estimators", "{ukf: {type: ukf, gate: 0.9999}}");
@@ -381,7 +388,8 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   }
 }
 
-// `simulate` writes a row for each satellite; `csv` reads them back as frames of six.
+// `simulate` writes one row for each satellite. `csv` combines six rows with one timestamp into a
+// frame.
 TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
   const testing::TemporaryFolder folder;
   const std::string example = "23_satellites";
@@ -398,7 +406,7 @@ TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
     EXPECT_EQ(read.estimators[i].counts, straight.estimators[i].counts);
     EXPECT_GT(read.estimators[i].counts.at("accepted:gnss"), 300);
     for (const auto& [key, value] : read.estimators[i].metrics) {
-      // the metrics that need no truth
+      // compares the metrics that need no truth
       EXPECT_EQ(value, straight.estimators[i].metrics.at(key)) << key;
     }
   }

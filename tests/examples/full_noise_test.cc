@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A full matrix R, as in docs/noise_models.md: from the config, in a user's own model, and with
-// each measurement.
+// Tests a full matrix R as in docs/noise_models.md. R comes from the config, from a user's own
+// model, or with each measurement.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,8 @@
 namespace alidade {
 namespace {
 
-/// The pixel of a landmark. u and v have different noises, which are correlated.
+/// Measures the pixel of a landmark. The noises of u and v have different sigmas and are
+/// correlated.
 template <class Representation>
 struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>, Representation> {
   static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
@@ -38,7 +39,7 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
     return pixel.PredictInCamera(h, rho, z);
   }
   template <class T>
-  void SqrtNoiseInCamera(const T*, const T&, T* L) const {  // R = L L', L row-major, zeroed before
+  void SqrtNoiseInCamera(const T*, const T&, T* L) const {  // R = L L', L row-major, zero before
     L[0] = T(sigma_u_px);
     L[2] = T(correlation * sigma_v_px);
     L[3] = T(std::sqrt(1.0 - correlation * correlation) * sigma_v_px);
@@ -51,7 +52,7 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   }
 };
 
-/// Returns example 12 with R given by `covariance` instead of `sigma_px`.
+/// Returns the config of example 12, with R given by `covariance` instead of `sigma_px`.
 Config WithCovariance(const std::string& covariance) {
   const std::string path = ALIDADE_SOURCE_DIR "/examples/12_slam_parameters/config.yaml";
   std::ifstream file(path);
@@ -81,7 +82,7 @@ TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
     by_model.Process(frame);
     by_config.Process(frame);
     for (Measurement& m : frame.measurements) {
-      if (m.values.size() == 2) m.covariance = {1.0, 0.6, 0.6, 4.0};  // 0.3 * 1 px * 2 px
+      if (m.values.size() == 2) m.covariance = {1.0, 0.6, 0.6, 4.0};  // 0.6 = 0.3 * 1 px * 2 px
     }
     for (const MeasurementReport& m : by_measurement.Process(frame).measurements()) {
       used += m.outcome == Outcome::kAccepted ? 1 : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The filter of a config, created for live use, compared with a run of the same config.
+// Creates the filter of a config for live use and compares it with a run of the same config.
 #include <gtest/gtest.h>
 
 #include <string>

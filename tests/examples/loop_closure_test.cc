@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Returns the summaries of `ekf` and `batch` over 10 seeds.
+/// Returns the summaries of the estimators `ekf` and `batch` over 10 seeds.
 auto SweepLoops(const std::string& radius_m) {
   Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                    "examples/30_loop_closure/config.yaml");
@@ -36,8 +36,8 @@ TEST(LoopClosure, TakesTheDriftOutOfFilterAndBatch) {
     EXPECT_NEAR(mean(closed[i], "nees.mean:cam"), 1.0, 0.3);
   }
   EXPECT_NEAR(mean(closed[0], "nis.mean:loops"), 1.0, 0.15);
-  // The batch also corrects the path before the first loop. At the end, both have the same data on
-  // the keyframes.
+  // The batch also corrects the path before the first loop closure. At the end, filter and batch
+  // have used the same data on the keyframes.
   EXPECT_LT(mean(closed[1], "rmse:cam.position"), 0.6 * mean(closed[0], "rmse:cam.position"));
   EXPECT_LT(mean(closed[0], "map.rmse"), 1.15 * mean(closed[1], "map.rmse"));
 }

@@ -5,10 +5,10 @@
 #
 # Runs the code blocks of README.md in a temporary folder. A block below `<!-- test: FILE -->` is
 # written to FILE. In a block below `<!-- test: output -->` each line that begins with `$ ` is run,
-# with PROGRAM for `alidade` and COMPILER for `g++`. The lines below it must appear in its output in
-# this order; other lines may come between them. Numbers may differ by 1 %: the seed is fixed, but
-# the last digits depend on the compiler. `output batch` needs the batch estimators. In a block of
-# the language sh each scripts/NAME must exist.
+# with PROGRAM for `alidade` and COMPILER for `g++`. The lines below the command must appear in its
+# output in this order; other lines may come between them. Numbers may differ by 1 %: the seed is
+# fixed, but the last digits depend on the compiler. A block marked `output batch` is skipped in a
+# build without the batch estimators. Each scripts/NAME in a block of the language sh must exist.
 set -euo pipefail
 program=$(realpath "$1")
 compiler=$(command -v "$2")
@@ -25,8 +25,8 @@ printf '#!/bin/sh\nexec "%s" "$@"\n' "$compiler" >"$work/bin/g++"
 chmod +x "$work/bin/alidade" "$work/bin/g++"
 export PATH=$work/bin:$PATH
 
-# Extracts the blocks: the files, and the commands with their expected lines as $work/N.command and
-# N.lines.
+# Extracts the blocks: files, and commands with their expected lines. A command is written to
+# $work/N.command, its lines to $work/N.lines.
 awk -v work="$work" '
   /^<!-- test: / { kind = $3; needs = $4 == "batch"; next }
   /^```/ && !inside { inside = 1; sh = $0 == "```sh"; next }
@@ -48,7 +48,7 @@ while read -r script; do
   [[ -x $script ]] || { echo "error: $script does not exist" >&2; exit 1; }
 done <"$work/scripts"
 
-# compare SHOWN PRINTED: checks that every line of SHOWN is in PRINTED, in order.
+# compare SHOWN PRINTED: checks that all lines of SHOWN are in PRINTED, in the same order.
 compare() {
   awk '
     function number(word) { return word ~ /^[-+]?[0-9][0-9.]*(e[-+]?[0-9]+)?$/ }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Compares all estimates of the examples with the recorded numbers in replay/NAME.csv. A change of
-// the engine that is not meant to change an estimate must not change these numbers.
+// the engine that is not meant to change an estimate must not change these numbers. This command
+// rewrites the files; the commit must give the reason for the change:
 //
 //   ALIDADE_REPLAY_WRITE=1 test_examples --gtest_filter=*Replay*
-//
-// rewrites the files; the commit must give the reason for the change.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,23 +28,20 @@ namespace alidade {
 namespace {
 
 using ReplaySettings = std::vector<std::pair<std::string, std::string>>;
-/// Row names and the numbers of each row.
+/// Numbers of each row, keyed by the name of the row.
 using Figures = std::map<std::string, std::vector<double>>;
 
 const std::filesystem::path kShipped = std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples";
 const std::filesystem::path kReplay =
     std::filesystem::path(ALIDADE_SOURCE_DIR) / "tests/examples/replay";
 
-/// Relative tolerance: on other machines sin and cos are rounded differently, and a filter
-/// propagates the difference.
+/// Relative tolerance. Other machines round sin and cos differently, and a filter propagates the
+/// difference.
 constexpr double kTolerance = 1e-7;
 
-/// Records every n-th estimate: values of the problem's blocks,
-/// x
-/// ^2, tr P and
-/// P
-/// ^2 with the landmarks. Also records how many measurements had each outcome since the previous
-/// record.
+/// Records every n-th estimate: the values of the problem's blocks, and |x|^2, tr P and |P|^2
+/// including the landmarks. Also records the number of measurements with each outcome since the
+/// previous record.
 class Recording : public RunObserver {
  public:
   explicit Recording(int every) : every_(every) {}
@@ -129,8 +125,8 @@ void Compare(const Figures& found, const std::string& name) {
     ASSERT_EQ(now.size(), values.size()) << row;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (now[i] == values[i]) continue;
-      // A value near 0 may be the difference of values near 1, so its digits are those of such a
-      // difference.
+      // A value near 0 may be the difference of two values near 1. It is then only as accurate as
+      // these values.
       if (std::abs(now[i] - values[i]) <= kTolerance * std::max(std::abs(values[i]), 1e-3))
         continue;
       ADD_FAILURE() << row << ", number " << i + 1 << ": " << now[i] << ", was " << values[i];
@@ -140,7 +136,7 @@ void Compare(const Figures& found, const std::string& name) {
 }
 
 struct Replayed {
-  std::string name, config;  ///< names of the recorded file and of the config under examples/
+  std::string name, config;  ///< name of the recorded file, and path of the config under examples/
   int every;
   ReplaySettings settings;
 };
@@ -187,7 +183,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& instance) { return instance.param.name; });
 #endif
 
-/// For recorded drives only the metrics are stored.
+/// For recorded drives only the metrics are stored, not the estimates.
 class ReplayOfDrives : public testing::DrivesTest {};
 
 TEST_F(ReplayOfDrives, GivesTheMetricsOfBefore) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A state with the extrinsics of a camera on a vehicle with odometry, and with the speed scale of
-// the odometry.
+// Tests a state that contains the extrinsics of a camera on a vehicle with odometry. The state also
+// contains the speed scale of the odometry.
 #include <gtest/gtest.h>
 
 #include "alidade/sweep/sweep.h"
@@ -9,8 +9,9 @@
 namespace alidade {
 namespace {
 
-// The odometry is the camera's own, so the true vehicle_from_cam is the identity. The config
-// rotates it by 0.03 rad about x (pitch) and by 0.02 rad about y.
+// The odometry is measured in the frame of the camera, so the true vehicle_from_cam is the
+// identity. The vehicle_from_cam of the config is rotated by 0.03 rad about x (pitch) and by 0.02
+// rad about y.
 constexpr const char* kConfig = R"(
 alidade: 1
 camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
@@ -73,8 +74,8 @@ std::vector<SweepSummary> Ten() {
   return Summarise(Sweep(config, host, options));
 }
 
-// If wrong extrinsics are estimated or considered, the path stays accurate and the filter
-// consistent.
+// The extrinsics in the config are wrong. If they are estimated or considered, the path stays
+// accurate and the filter stays consistent.
 TEST(SlamExtrinsics, MayBeWrongWhereItIsInTheState) {
   const auto summaries = Ten();
   const auto& without = summaries.at(0).metrics;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/27_slam_inverse_depth_prior: a prior of 1 is right for points about 1 m away; at other
-// distances it gives a wrong scale.
+// Tests examples/27_slam_inverse_depth_prior. A prior of 1 /m is correct for points about 1 m away.
+// For points at other distances it gives a wrong scale.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Returns the summary of seeds 1001 to 1008.
+/// Returns the summary of the seeds 1001 to 1008.
 SweepSummary EightWithPrior(const std::string& file, const std::string& prior) {
   Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                    "examples/27_slam_inverse_depth_prior" / file);
@@ -37,8 +37,8 @@ TEST(SlamInverseDepthPrior, OneIsRightAboutOneMetreAway) {
   EXPECT_LE(near.metrics.at("nees.mean:cam").mean, 2.0);
 }
 
-// The two scenes differ in size by 1 / 0.39 but have the same pixels, so the estimates are the
-// same.
+// One scene is 1 / 0.39 times as large as the other. Both have the same pixels, so the estimates
+// are the same.
 TEST(SlamInverseDepthPrior, TheSameFilterMakesTheSameMapOfALargerScene) {
   const double larger = 1.0 / 0.39;
   const SweepSummary near = EightWithPrior("config.yaml", kOne);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/13_slam_odometry_tracks on real drives, compared with a published filter and with dead
-// reckoning.
+// Runs examples/13_slam_odometry_tracks on real drives. Compares the errors with those of a
+// published filter and of dead reckoning.
 #include <cmath>
 
 #include "drives.h"
@@ -9,8 +9,9 @@
 namespace alidade {
 namespace {
 
-/// A drive, its number of frames, and RMS errors of the position in m: the published ones of dead
-/// reckoning and of a sliding window over 10 frames, and the limit of this test.
+/// A drive, its number of frames, and three RMS errors of the position in m. `dead_reckoning` and
+/// `published` (a sliding window over 10 frames) are published errors; `most` is the limit of this
+/// test.
 struct Drive {
   const char* name;
   int frames;
@@ -48,9 +49,8 @@ TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
   EXPECT_LE(std::exp(log_ratio), 0.90);
 }
 
-// A truth that jitters by 0.035 m makes no filter inconsistent. In drive 0095 the speed of the
-// odometry is 1.6 % off: this makes the filter inconsistent, because it does not model such an
-// error.
+// The truth jitters by 0.035 m, which makes no filter inconsistent. In drive 0095 the odometry has
+// a speed error of 1.6 %. The filter does not model such an error, so it is inconsistent.
 TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
   for (const Drive& drive : kDrives) {
     const EstimatorResult ekf = Ekf(drive);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/12_slam_parameters: checks its README's claims on the parameters.
+// Checks the claims about parameters in the README of examples/12_slam_parameters.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Returns the summary of ten seeds from 1001, with one key changed.
+/// Returns the summary of ten seeds, 1001 to 1010, with one key changed.
 SweepSummary Ten(const std::string& key, const std::string& value) {
   Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                    "examples/12_slam_parameters/config.yaml");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/15_slam_representations: one filter with different landmark representations.
+// Tests examples/15_slam_representations: the same filter with different landmark representations.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// Returns the summaries of seeds 1001 to 1004 by estimator.
+/// Returns the summaries of the seeds 1001 to 1004, keyed by estimator.
 std::map<std::string, SweepSummary> Four() {
   const Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                          "examples/15_slam_representations/config.yaml");
@@ -40,7 +40,8 @@ TEST(SlamRepresentations, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
   }
   EXPECT_LE(mean("inverse_depth", "nees.mean:cam"), 1.4);
   EXPECT_GE(mean("inverse_depth", "nees.within95:cam"), 0.85);
-  // [Civera2008]: with a threshold of 40 % the filter is inconsistent, with 60 % even more so.
+  // Conversion at a linearity index [Civera2008] of 40 % makes the filter inconsistent, and 60 %
+  // makes it more inconsistent.
   EXPECT_GE(mean("xyz_40", "nees.mean:cam"), 1.6);
   EXPECT_LE(mean("xyz_40", "nees.within95:cam"), 0.75);
   EXPECT_GT(mean("xyz_60", "nees.mean:cam"), mean("xyz_40", "nees.mean:cam"));

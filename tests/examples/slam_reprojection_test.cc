@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/11_slam_reprojection and the scenes of 10, compared with the claim of 2015: after its
-// initial peak the reprojection error settles, in a number of frames that does not depend on the
-// noise. The claim holds only if the filter assumes the true noise.
+// Tests examples/11_slam_reprojection and the scenes of example 10 against a claim of 2015. After
+// its initial peak the reprojection error settles, in a number of frames that does not depend on
+// the noise. The claim holds only if the filter assumes the true noise.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ constexpr std::array kNoise = {"source.sigma_px"};
 constexpr std::array kNoiseAndR = {"source.sigma_px", "sensors.pixels.sigma_px",
                                    "sensors.known.sigma_px"};
 
-/// Returns the summary of seeds 1001 to 1020 with these keys set to `noise_px`.
+/// Returns the summary of the seeds 1001 to 1020. Each of the `keys` is set to `noise_px`.
 SweepSummary Twenty(const std::string& name, std::span<const char* const> keys,
                     const std::string& noise_px) {
   Config config = Config::FromFile(kExamples / name);
@@ -43,18 +43,19 @@ TEST(SlamReprojection, SettlesInAsManyFramesIfTheFilterKnowsTheNoise) {
       const SweepSummary ekf = Twenty(name, kNoiseAndR, noise_px);
       EXPECT_EQ(ekf.used, 20);
       const Spread frames = ekf.metrics.at("settling_frames:pixels");
-      EXPECT_LE(frames.p95, 12.0) << noise_px;  // measured: 6 to 11
+      EXPECT_LE(frames.p95, 12.0) << noise_px;  // the measured values are 6 to 11
       least = std::min(least, frames.mean);
       most = std::max(most, frames.mean);
-      // The innovation consists of the noise and a small prediction error.
+      // The innovation consists of the noise and of a small prediction error.
       EXPECT_NEAR(ekf.metrics.at("reprojection:pixels").mean, 1.03 * level_px, 0.04 * level_px);
     }
-    EXPECT_LE(most - least, 4.0);  // measured: 2.7, 3.1, 2.8
+    EXPECT_LE(most - least, 4.0);  // the measured values are 2.7, 3.1 and 2.8
   }
 }
 
-// A filter that assumes 1 px settles at frame 5.8 if the true noise is 1 px. Measured: frame 11.8
-// with 0.25 px; frame 50 and NEES 710 with 4 px. The bounds are the geometric means.
+// The filter assumes a noise of 1 px. It settles at frame 5.8 if the true noise is 1 px. With
+// 0.25 px it settles at frame 11.8. With 4 px it settles at frame 50, and its NEES is 710. The
+// bounds are the geometric means.
 TEST(SlamReprojection, SettlesLaterIfTheFilterAssumesAnotherNoise) {
   const char* const name = "11_slam_reprojection/config.yaml";
   const auto frames = [](const SweepSummary& ekf) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/16_slam_room: the shape of a room, estimated on a straight path through it.
+// Tests examples/16_slam_room: a filter estimates the shape of a room on a straight path through
+// it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +14,8 @@
 namespace alidade {
 namespace {
 
-/// Mean of a coordinate over the landmarks of a wall with a sigma of at most 0.1 m.
+/// Mean of one coordinate over the landmarks of a wall. The caller adds only landmarks with a sigma
+/// of at most 0.1 m.
 class Wall {
  public:
   Wall(int axis, double at) : axis_(axis), at_(at) {}
@@ -61,7 +63,7 @@ TEST(SlamRoom, ItsShapeIsRecovered) {
       ++count;
     }
     for (const Wall* wall : {&left, &right, &ceiling, &floor, &ahead}) EXPECT_GE(wall->count(), 2);
-    // Each run reaches an accuracy of 3 % of the room.
+    // In each run the size of the room has an error of at most 3 %.
     EXPECT_NEAR(right.place() - left.place(), 3.0, 0.09);
     EXPECT_NEAR(floor.place() - ceiling.place(), 2.4, 0.07);
     EXPECT_NEAR(ahead.place(), 4.0, 0.12);

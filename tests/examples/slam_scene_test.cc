@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/10_slam_scene, compared with the numbers in its README.
+// Compares examples/10_slam_scene with the numbers in its README.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +15,7 @@ const std::filesystem::path kFolder =
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-/// Returns the summary of seeds 1001 to 1020.
+/// Returns the summary of the seeds 1001 to 1020.
 SweepSummary Twenty(const std::string& name, const Settings& settings = {}) {
   Config config = Config::FromFile(kFolder / name);
   for (const auto& [key, value] : settings) config.Set(key, value, "--set");
@@ -83,7 +83,8 @@ TEST(SlamScene, WhoseMotionIsSlowKeepsItsDepthWhereLandmarksWaitForTheMotion) {
   EXPECT_GE(Twenty("slow_sweep.yaml", {{"landmarks.prior.min_observations", "1"}}).inconsistent, 1);
 }
 
-// Wrong priors of 36 points, 1.25 times the truth, show in NEES but not in NIS.
+// The priors of 36 points are wrong: the inverse distance is 1.25 times the truth. NEES shows this,
+// but NIS does not.
 TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"landmarks.prior", "{inverse_distance: 0.49, sigma: 0.11}"}});
@@ -92,8 +93,8 @@ TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
 }
 
-// Without known depth the same prior makes the trajectory and the map too small by the same factor.
-// The map keeps its shape.
+// If no depth is known, the same prior makes the trajectory and the map too small by the same
+// factor. The map keeps its shape.
 TEST(SlamScene, ScaleIsThePriorsWhereNoDepthIsKnown) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"estimators.ekf.sensors", "[pixels]"},

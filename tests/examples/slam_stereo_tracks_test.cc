@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/14_slam_stereo_tracks on real drives: the final error as a share of the path length.
+// Runs examples/14_slam_stereo_tracks on real drives. Checks the final error as a share of the path
+// length.
 #include <cmath>
 #include <tuple>
 
@@ -9,7 +10,8 @@
 namespace alidade {
 namespace {
 
-/// A drive, its number of frames from the example's first one, and the length of its true path.
+/// A drive, its number of frames from the first frame of the example, and the length of the true
+/// path.
 struct Drive {
   const char* name;
   int frames;
@@ -17,11 +19,11 @@ struct Drive {
 };
 constexpr Drive kDrives[] = {
     {"drive_0001", 90, 90.7}, {"drive_0036", 232, 165.8}, {"drive_0095", 132, 121.1}};
-constexpr double kMost = 0.03;  // share of the path length; a prototype had 0.013 to 0.019
+constexpr double kMost = 0.03;  // as a share of the path length; a prototype had 0.013 to 0.019
 
 class SlamStereoTracks : public testing::DrivesTest {
  protected:
-  /// Checks for each drive that the final position error is at most kMost of the path length.
+  /// Checks for each drive that the final position error is at most kMost times the path length.
   void ExpectExact(const Settings& settings) const {
     for (const Drive& drive : kDrives) {
       const Config config = ConfigOf("14_slam_stereo_tracks", drive.name, drive.frames, settings);

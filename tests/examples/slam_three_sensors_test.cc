@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/26_slam_three_sensors: one scene seen by one camera, by a stereo pair and by a depth
-// camera.
+// Tests examples/26_slam_three_sensors: a single camera, a stereo pair and a depth camera measure
+// the same scene.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Returns the summaries of seeds 1001 to 1008 by estimator.
+/// Returns the summaries of the seeds 1001 to 1008, keyed by estimator.
 std::map<std::string, SweepSummary> EightOfThreeSensors(const std::string& file,
                                                         const std::string& key = "",
                                                         const std::string& value = "") {

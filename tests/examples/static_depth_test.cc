@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/09_static_depth, compared with the engine on the same numbers.
+// Compares examples/09_static_depth with the engine on the same numbers.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
   std::FILE* printed = ::popen(ALIDADE_BINARY_DIR "/bin/example_static_depth", "r");
   ASSERT_NE(printed, nullptr);
   char line[128];
-  ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);  // column names
+  ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);  // skips the column names
   int used = 0, k = 0;
   for (const static_depth::Row& row : kRows) {
     Frame frame;
@@ -67,7 +67,7 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
     double t = 0.0, depth = 0.0, sigma = 0.0;
     ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);
     ASSERT_EQ(std::sscanf(line, "%lf %lf %lf", &t, &depth, &sigma), 3) << line;
-    constexpr double kPrinted = 5.01e-7;  // half of the sixth decimal
+    constexpr double kPrinted = 5.01e-7;  // half of the sixth decimal, the last one printed
     EXPECT_NEAR(t, Seconds(frame.timestamp), 5e-4);
     EXPECT_NEAR(depth, engine.state().values()[0], kPrinted);
     EXPECT_NEAR(sigma, std::sqrt(engine.state().covariance().Variance(0)), kPrinted);
@@ -79,7 +79,7 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
       std::sscanf(line, "%d rows, %d measurements used, rmse %lf", &rows, &accepted, &rmse_mm), 3);
   EXPECT_EQ(rows, k);
   EXPECT_EQ(accepted, used);
-  EXPECT_LT(rmse_mm, 2.5);  // example 05 has 2.05 mm over the whole series
+  EXPECT_LT(rmse_mm, 2.5);  // example 05 has an RMSE of 2.05 mm over the whole series
   EXPECT_EQ(::pclose(printed), 0);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A fixed number of landmarks in a filter composed at compile time, as in docs/static_filter.md,
-// compared with the engine.
+// Tests a filter composed at compile time with a fixed number of landmarks, as in
+// docs/static_filter.md. Compares it with the engine.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,16 +17,17 @@
 namespace alidade {
 namespace {
 
-// The state: a camera and four points with uncertain positions.
+// The state contains a camera and four points with uncertain positions.
 using Point = Constant<3>;
 using PointsFilter = StaticEkf<QuaternionPose, Point, Point, Point, Point>;
 constexpr int kPosition = 0, kOrientation = 1, kFirstPoint = 4, kPoints = 4;
 
-// The landmark of a measurement is known at run time, its block at compile time.
+// Updates the block of landmark `point`. The landmark is known only at run time, but its block must
+// be chosen at compile time.
 template <class Filter, class Model, int... I>
 StaticOutcome UpdateOf(int point, Filter& filter, const Model& sensor, const double* pixel,
                        std::integer_sequence<int, I...>) {
-  StaticOutcome outcome = StaticOutcome::kInvalid;  // for an unknown landmark
+  StaticOutcome outcome = StaticOutcome::kInvalid;  // the outcome for an unknown landmark
   ((point == I ? void(outcome = filter.template Update<kPosition, kOrientation, kFirstPoint + I>(
                           sensor, pixel))
                : void()),
@@ -34,8 +35,7 @@ StaticOutcome UpdateOf(int point, Filter& filter, const Model& sensor, const dou
   return outcome;
 }
 
-// The points are approximately those of examples/10_slam_scene. The initial pose of the camera is
-// known.
+// The points are close to those of examples/10_slam_scene. The initial pose of the camera is known.
 const std::string kFourPoints = R"(
 alidade: 1
 camera: {model: pinhole, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
@@ -66,7 +66,7 @@ estimators: {ekf: {type: ekf, fuse: per_measurement}}
 
 const Camera kLens(640, 480, 525.0, 525.0, 320.0, 240.0);
 
-/// Sets the camera's blocks to the initial values in kFourPoints.
+/// Sets the blocks of the camera to the initial values in kFourPoints.
 template <class Filter>
 void SetCamera(Filter& filter) {
   const double position[] = {0, 0, 0}, orientation[] = {1, 0, 0, 0};
@@ -78,8 +78,8 @@ void SetCamera(Filter& filter) {
   filter.template Set<3>(angular_velocity, 0.05 * 0.05 * one);
 }
 
-/// Runs the engine and the filter and compares the camera at each frame. `first` processes the
-/// filter's first frame.
+/// Runs the engine and the filter and compares their cameras at each frame. `first` processes the
+/// measurements of the first frame for the filter.
 template <class Filter, class Model, class First>
 void ExpectTheEnginesCamera(const Config& config, Filter& filter, const Model& sensor,
                             const First& first) {
@@ -101,7 +101,7 @@ void ExpectTheEnginesCamera(const Config& config, Filter& filter, const Model& s
                        std::make_integer_sequence<int, kPoints>{}) == StaticOutcome::kAccepted;
     }
     const State& state = engine.state();
-    const double tolerance = 1e-8;  // the summation order differs, over 100 frames
+    const double tolerance = 1e-8;  // the summation order differs over 100 frames
     for (int i = 0; i < 3; ++i) {
       ASSERT_NEAR(filter.template value<0>()[i],
                   state.value(state.layout().Find("cam.position"))[i], tolerance)
@@ -138,8 +138,8 @@ TEST(StaticLandmarks, PointsThatAreKnownToSomeExtentAreBlocks) {
   ExpectTheEnginesCamera(config, filter, sensor, [](const Measurement&) { return false; });
 }
 
-/// Initialises a landmark from its pixel in a camera at the origin and the inverse distance 0.4 +-
-/// 0.1 1/m: P = J diag(1 px, 1 px, 0.1 1/m)^2 J'.
+/// Initialises a landmark from a pixel and a prior. The camera is at the origin, and the inverse
+/// distance is 0.4 +- 0.1 1/m. P = J diag(1 px, 1 px, 0.1 1/m)^2 J'.
 template <int... I, class Filter, class Model>
 void SetFrom(const Measurement& seen, Filter& filter, const Model& sensor,
              std::integer_sequence<int, I...>) {
@@ -159,7 +159,7 @@ void SetFrom(const Measurement& seen, Filter& filter, const Model& sensor,
   ((seen.landmark == I ? filter.template Set<kFirstPoint + I>(y, p) : void()), ...);
 }
 
-// The first pose is known, so the landmarks of the first frame are uncorrelated.
+// The first pose is known, so the landmarks of the first frame are uncorrelated with each other.
 TEST(StaticLandmarks, LandmarksOfTheFirstFrameMayBeOfInverseDepth) {
   const Config config = Config::FromText(kFourPoints +
                                              "landmarks: {representation: inverse_depth, prior: "

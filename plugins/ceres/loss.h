@@ -9,9 +9,9 @@
 
 namespace alidade::ceres_batch {
 
-/// RobustLoss as a loss function of Ceres, on s = d^2. Ceres counts half of it in the cost:
+/// RobustLoss as a loss function rho_c of Ceres, with s = d^2. Ceres adds rho_c / 2 to the cost:
 ///
-///   rho_c(s) = 2 rho(d),   rho_c'(s) = w(d),   rho_c''(s) = w'(d) / 2 d
+///   rho_c(s) = 2 rho(d),   rho_c'(s) = w(d),   rho_c''(s) = w'(d) / (2 d)
 class Loss : public ceres::LossFunction {
  public:
   explicit Loss(const RobustLoss& loss) : loss_(loss) {}

@@ -47,7 +47,8 @@ class CalibrationFile {
     root.RejectUnread();
   }
 
-  /// Returns the text with blanks instead of OpenCV's directive and tags, which are not YAML.
+  /// Returns the text of the file, in which blanks replace the directive and the tags of OpenCV.
+  /// These are not YAML.
   static std::string PlainYaml(const std::filesystem::path& file) {
     std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
       throw Error(code, ErrorLine({file.string()}, {}, std::strerror(error)));
@@ -64,7 +65,7 @@ class CalibrationFile {
     const Node matrix = root.At("camera_matrix").At("data");
     const std::vector<double> k = matrix.Numbers(9);
     if (k[1] != 0.0 || k[3] != 0.0 || k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
-      matrix.Fail("not a camera matrix without skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+      matrix.Fail("not a camera matrix with zero skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
     }
     SetIntrinsics({k[0], k[4], k[2], k[5]}, matrix.place());
     Copy(root.At("image_width"), "camera.width");
@@ -98,7 +99,7 @@ class CalibrationFile {
     for (std::size_t i = 0; i < 4; ++i) SetNumber(kKeys[i], fx_fy_cx_cy[i], place);
   }
 
-  /// Sets k1 k2 p1 p2 [k3], or k1 to k4 of an equidistant camera. Further coefficients must be 0.
+  /// Sets k1 k2 p1 p2 [k3], or k1 to k4 if `equidistant` is true. Further coefficients must be 0.
   void SetDistortion(const Node& node, bool equidistant) {
     constexpr const char* kRadtan[] = {"camera.k1", "camera.k2", "camera.p1", "camera.p2",
                                        "camera.k3"};

@@ -27,8 +27,8 @@ namespace alidade {
 ///   camera_model: pinhole, intrinsics, distortion_model: radial-tangential or equidistant,
 ///   distortion_coefficients, resolution                      sensor of EuRoC
 ///
-/// The last three forms omit everything that does not belong to the camera itself. All forms omit
-/// `sigma_px`, which is for `alidade bundle`.
+/// From the last three forms, only the values of the camera itself are read. The key `sigma_px`,
+/// which is for `alidade bundle`, is not read from any form.
 ///
 /// Errors       kBadData with file, line and column; kInputMissing.
 Config ReadCalibrationFile(const std::filesystem::path& file);

@@ -9,10 +9,11 @@
 
 #include "alidade/io/number_rows.h"
 
-/// Files next to a file of tracks, which are read together with it.
+/// Readers of the files next to a file of tracks. These files are read together with the tracks.
 namespace alidade {
 
-/// Rows `frame,t_s`, one for each frame, with both increasing. A header line is optional.
+/// Reader of rows `frame,t_s`, one row for each frame. Both columns increase. A header line is
+/// optional.
 class TimestampRows {
  public:
   TimestampRows(const std::filesystem::path& path, const Place& place, const std::string& key);
@@ -31,13 +32,14 @@ class TimestampRows {
 
 using OdometryValues = std::array<double, 6>;  ///< vx vy vz in m/s, wx wy wz in rad/s
 
-/// Rows with a frame and six velocities. A header names the columns, which have any order.
+/// Reader of rows with a frame and six velocities. A header names the columns; they can have any
+/// order.
 class OdometryRows {
  public:
   OdometryRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// Returns the row of `frame`, or nullopt if it has no row. `frame` may not decrease between
-  /// calls.
+  /// Returns the row of `frame`, or nullopt if the file has no row of this frame. `frame` may not
+  /// decrease between calls.
   std::optional<OdometryValues> At(std::int64_t frame);
   /// Returns the first row after the frame of the last call of At.
   std::optional<OdometryValues> Following() const;
@@ -68,14 +70,15 @@ struct Pose {
   Pose In(const Pose& c) const;
 };
 
-/// Trajectory in TUM format: `t x y z qx qy qz qw`, with increasing times. A quaternion whose
-/// length differs from 1 by more than 1e-3 is rejected; the run normalises the others.
+/// Reader of a trajectory in TUM format: `t x y z qx qy qz qw`, with increasing times. A quaternion
+/// is rejected if its length differs from 1 by more than 1e-3. Otherwise the run normalises it.
 class TumRows {
  public:
   TumRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// Returns the pose nearest to `timestamp` if it is within `tolerance`. If two are equally near,
-  /// it returns the earlier one. `timestamp` may not decrease between calls.
+  /// Returns the pose nearest in time to `timestamp`, or nullopt if no pose is within `tolerance`.
+  /// If two poses are equally near, returns the earlier one. `timestamp` may not decrease between
+  /// calls.
   std::optional<Pose> At(Timestamp timestamp, Timestamp tolerance);
 
  private:
@@ -83,9 +86,9 @@ class TumRows {
 
   NumberRows rows_;
   bool has_next_ = false;
-  Timestamp timestamp_ = 0;  ///< of the last row
+  Timestamp timestamp_ = 0;  ///< time of the last row that was read
   Pose pose_{};
-  Timestamp nearest_timestamp_ = 0;  ///< of the row before the last one
+  Timestamp nearest_timestamp_ = 0;  ///< time of the row before
   std::optional<Pose> nearest_;
 };
 

@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Returns a value that is uniform in [0, 1), and the same for the same arguments.
+/// Returns a pseudo-random value, uniform in [0, 1), that depends only on the arguments.
 double LatticeValue(std::uint64_t texture, std::uint64_t octave, std::int64_t x, std::int64_t y) {
   std::uint64_t bits = texture * 0x9e3779b97f4a7c15U + octave;
   for (const std::int64_t number : {x, y}) {
@@ -53,7 +53,7 @@ double Brightness(const Rectangle& rectangle, double x, double y, double sample_
 
 /// First surface on a ray.
 struct Hit {
-  int surface = -1;  ///< -1: none
+  int surface = -1;  ///< -1: the ray hits no surface
   double brightness = 0.0;
 };
 
@@ -118,7 +118,7 @@ class SurfaceView {
  private:
   struct Plane {
     Eigen::Vector3d normal, right, down;  ///< unit normal; edges divided by their squared length
-    double distance, width, height;       ///< signed distance of the camera, m; sides, m
+    double distance, width, height;       ///< distance of the camera, signed, m; sides, m
   };
   const std::vector<Rectangle>& surfaces_;
   const Camera& camera_;

@@ -12,17 +12,18 @@
 /// Textured surfaces of a simulated world, and their images in a camera.
 namespace alidade {
 
-/// Rectangle that looks the same from both sides. Its texture has structures of `grain_m` and
-/// smaller.
+/// Rectangle that looks the same from both sides. The largest structures of its texture have the
+/// size `grain_m`.
 struct Rectangle {
   Eigen::Vector3d corner, right, down;  ///< m, world; `right` and `down` are its edges
   double grain_m;
-  std::uint64_t texture;  ///< equal numbers have equal textures
+  std::uint64_t texture;  ///< number of the texture; equal numbers give equal textures
 };
 
 /// Renders the image of a camera at `position`, `orientation` (world_from_cam, w x y z), with grey
-/// noise N(0, noise_grey^2). Pixels without a surface are black. A pixel is one ray, or at edges
-/// the mean of 4 x 4 rays: a texture is smooth over a pixel, an edge is not.
+/// noise N(0, noise_grey^2). Pixels without a surface are black. A pixel inside a surface is
+/// computed from one ray, because textures are smooth over a pixel. A pixel at an edge is the mean
+/// of 4 x 4 rays.
 GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
                  const double* position, const double* orientation, double noise_grey,
                  Random& noise);

@@ -60,7 +60,8 @@ class CsvSource : public Source {
     return true;
   }
 
-  /// Appends the row to the frame, whose first `count` measurements are already filled.
+  /// Appends the measurements of the row to `frame`, of which the first `count` are already filled.
+  /// Increases `count`.
   void AppendRow(SourceFrame& frame, std::size_t& count) {
     for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
       if (count == frame.measurements.size()) frame.measurements.emplace_back();
@@ -93,8 +94,9 @@ class CsvSource : public Source {
     return path == "-" ? path : folder / path;
   }
 
-  /// Reads the next line that is neither a comment nor blank. A blank line is a row if the table
-  /// has a single column, because its cell may be missing, or if rows determine the time.
+  /// Reads the next line that is neither a comment nor blank. A blank line is also a row in two
+  /// cases: if the table has a single column, whose cell may be missing, and if the number of the
+  /// row determines the time.
   bool NextRow() {
     while (reader_.Next(line_)) {
       if (line_.starts_with('#')) {
@@ -173,7 +175,8 @@ class CsvSource : public Source {
     return std::find(layout_.missing.begin(), layout_.missing.end(), cell) != layout_.missing.end();
   }
 
-  /// Reads the values of a field. Returns false and no values if one of its cells is "missing".
+  /// Reads the values of a field. Returns false, and no values, if one of its cells marks a missing
+  /// value.
   bool ReadField(const CsvField& field, std::vector<double>& values) const {
     values.clear();
     for (const CsvColumn& column : field.columns) {
@@ -190,7 +193,7 @@ class CsvSource : public Source {
     return !values.empty();
   }
 
-  /// Reads the known values of a field. Returns false if one of its cells is "missing".
+  /// Reads the known values of a field. Returns false if one of their cells marks a missing value.
   bool ReadKnown(const CsvField& field, std::vector<double>& known) const {
     known.clear();
     for (const CsvColumn& column : field.known) {
@@ -264,9 +267,9 @@ class CsvSource : public Source {
 
   std::string_view line_;
   std::vector<std::string_view> cells_;
-  bool has_row_ = false;     ///< a row has been read that is not in a frame yet
-  Timestamp timestamp_ = 0;  ///< of the row that was read last
-  std::int64_t rows_ = 0;    ///< rows in frames so far
+  bool has_row_ = false;     ///< true if a row was read that is not in a frame yet
+  Timestamp timestamp_ = 0;  ///< time of the row that was read last
+  std::int64_t rows_ = 0;    ///< number of rows in frames so far
   Timestamp last_timestamp_ = 0;
   int last_line_ = 0;
 };

@@ -20,15 +20,15 @@ inline constexpr const char* kCsvKeys =
     "blind_after    fraction of the rows, in [0, 1], after which streams are dropped; default 1\n"
     "blind          streams that blind_after drops; default the first";
 
-/// Creates a source of measurements and truth from the columns of a table: a file, a pipe, or
-/// standard input.
+/// Creates a source of measurements and truth, read from the columns of a table. The table is a
+/// file, a pipe, or standard input.
 ///
-/// A frame is one row, or with `repeats` all consecutive rows of one time; such a frame is complete
-/// when the next one begins. The first line that is neither blank nor a comment (`#`) names the
-/// columns. The source ignores columns that the config does not name. A cell that marks a missing
-/// value omits its stream, or truth value, from the frame, without a replacement. Times without an
-/// exponent are read exactly: ns since 1970 keep every digit. Comments above the header can contain
-/// the calibration, see CsvCalibration.
+/// A frame is one row. With `repeats` a frame is all consecutive rows with one time; it is complete
+/// when the next frame begins. The first line that is neither blank nor a comment (`#`) names the
+/// columns. The source ignores columns that the config does not name. If a cell marks a missing
+/// value, its stream or truth value is not in the frame, and nothing replaces it. Times without an
+/// exponent are read exactly, also in ns since 1970. Comments above the header can contain the
+/// calibration: see CsvCalibration.
 ///
 /// Keys         kCsvKeys.
 /// Errors       kBadData with file, line and column of the first invalid cell; kInputMissing; kIo

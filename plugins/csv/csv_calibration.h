@@ -18,11 +18,11 @@ namespace alidade {
 ///   baseline_m=             m     baseline_m, camera.baseline_m
 class CsvCalibration {
  public:
-  /// Records the numbers of a comment, which begins in column 1 of `line`.
+  /// Records the numbers in a comment that begins in column 1 of `line`.
   void Record(std::string_view comment, const std::string& file, int line);
 
-  /// Returns the calibration, as Source::Calibration. Errors: kBadData if a value is not a number
-  /// or occurs twice.
+  /// Returns the calibration in the form of Source::Calibration. Errors: kBadData if a value is not
+  /// a number or occurs twice.
   std::optional<Config> Get() const;
 
  private:

@@ -66,7 +66,7 @@ char ReadSeparator(const Node& node) {
   return text[0];
 }
 
-/// Reads the text of a cell that marks a missing value.
+/// Reads a text that marks a missing value if a cell contains it.
 std::string ReadMissing(const Node& word) {
   const std::string text = word.Text();
   if (text == ".nan" || text == ".NaN" || text == ".NAN") {
@@ -99,7 +99,8 @@ void ReadBlind(const Node& entry, CsvLayout& layout) {
   }
 }
 
-/// Returns `, or 'source.separator: ";"'` if the only column appears to contain several, else "".
+/// Returns the remedy `, or 'source.separator: ";"'` if the header has one name that appears to
+/// contain several, else "".
 std::string OtherSeparator(const std::vector<std::string>& names) {
   if (names.size() != 1) return {};
   for (const char separator : {';', '\t', '|', ',', ' '}) {

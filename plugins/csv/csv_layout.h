@@ -11,28 +11,28 @@
 
 namespace alidade {
 
-/// Column that the config names, and its index in the header.
+/// Column that the config names, with its index in the header.
 struct CsvColumn {
   std::string name;
   Node node;  ///< place in the config
   std::size_t index = 0;
 };
 
-/// Stream or truth value: v = gain x, or gain / x, for each of its columns.
+/// Stream or truth value. It has one value for each of its columns: v = gain x, or v = gain / x.
 struct CsvField {
   StreamInfo info;
   std::vector<CsvColumn> columns;
-  std::vector<CsvColumn> known;  ///< unchanged numbers that belong to each measurement
+  std::vector<CsvColumn> known;  ///< columns of the known numbers of a measurement
   double gain = 1.0;
   bool reciprocal = false;
-  bool goes_blind = false;  ///< dropped after `blind_after`
+  bool goes_blind = false;  ///< true if it is dropped after `blind_after`
 };
 
 /// Layout of a table according to the config: see kCsvKeys in csv.h.
 struct CsvLayout {
-  std::optional<CsvColumn> time;  ///< empty if the rate is rate_hz
-  std::size_t time_digits = 9;    ///< decimal digits from the unit of time to ns
-  bool time_repeats = false;      ///< consecutive rows of one time are one frame
+  std::optional<CsvColumn> time;  ///< empty if rate_hz determines the times
+  std::size_t time_digits = 9;    ///< decimal power from the unit of time to ns: s 9
+  bool time_repeats = false;      ///< true if consecutive rows with one time are one frame
   double rate_hz = 0.0;
   std::vector<CsvField> streams, truths;
   char separator = ',';

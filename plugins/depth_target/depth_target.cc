@@ -82,7 +82,7 @@ class DepthTarget : public Source {
       const Eigen::Vector3d x(side_m, 0.0, 0.0), y(0.0, side_m, 0.0), middle(0.0, 0.0, depth);
       return Rectangle{middle - 0.5 * (x + y), x, y, grain_m, texture};
     };
-    constexpr double kWidest = 20.0;  // times the depth of the wall: fills the image
+    constexpr double kWidest = 20.0;  // size / depth of the wall, which then fills the image
     const std::vector<Rectangle> surfaces = {square(target_m_, depth_m_, 0.25 * target_m_, 0),
                                              square(kWidest * wall_m_, wall_m_, 0.5 * wall_m_, 1)};
     const double eye[3] = {view * baseline_m_, 0.0, 0.0}, level[4] = {1.0, 0.0, 0.0, 0.0};
@@ -103,7 +103,7 @@ class DepthTarget : public Source {
     const double disparity_px = exact_px + sigma_disparity_px_ * disparity_noise_.Normal();
     const bool is_in_range =
         !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
-    // Poor texture: no match, or a wrong match anywhere in the search range.
+    // Simulates poor texture: no match, or a wrong match anywhere in the search range.
     const double nearest_px = bf_px_m_ / (depth_mean_m_ - amplitude_m_);
     const bool is_missing = texture_.Uniform() < missing_;
     const bool is_wrong = texture_.Uniform() < outlier_share_;
@@ -140,7 +140,7 @@ class DepthTarget : public Source {
   double depth_mean_m_, amplitude_m_, frequency_hz_, step_s_, sigma_disparity_px_;
   double focal_px_, baseline_m_, bf_px_m_, wall_m_, target_m_, image_noise_grey_;
   int width_px_, height_px_;
-  double depth_m_ = 0.0;  ///< of the last frame
+  double depth_m_ = 0.0;  ///< true depth in the last frame
   double disparity_limit_px_, relative_sigma_, template_depth_m_;
   bool blind_by_true_depth_;
   std::int64_t count_, index_ = 0;

@@ -18,8 +18,8 @@ namespace alidade {
 ///   Zm       depth_mean_m        m     cam    0.3    mean depth; > 0
 ///   A        amplitude_m         m     cam    0.1    amplitude; 0 <= A < Zm
 ///   f        frequency_hz        Hz    -      0.4    frequency of the motion
-///   t        rate_hz             Hz    -      30.3   t = 0, 1 / rate_hz, 2 / rate_hz, ...
-///            duration_s          s     -      5      ... <= duration_s
+///   t        rate_hz             Hz    -      30.3   samples per second: t = 0, 1 / rate_hz, ...
+///            duration_s          s     -      5      upper limit of t
 ///   F        focal_px            px    -      400    rectified focal length
 ///   B        baseline_m          m     -      0.065  stereo baseline
 ///   sigma_d  sigma_disparity_px  px    left   1      disparity noise, 1 sigma
@@ -28,29 +28,30 @@ namespace alidade {
 ///   Z0       template_depth_m    m     cam    0.3    depth at which the template was recorded
 ///   sigma_e  sigma_edge_px      px    cam    1      noise of one edge of the target, 1 sigma
 ///            missing             1     -      0      probability that the disparity is missing
-///            outliers.share      1     -      0      probability that d is U(0, its largest)
+///            outliers.share      1     -      0      probability of d ~ U(0, F B / (Zm - A))
 ///
 ///   stream                  size  unit  when
-///   disparity               1     px    while stereo measures, except for missing disparities
-///   disparity_all           1     px    except for missing ones, for a sensor that checks validity
+///   disparity               1     px    while stereo measures, if not missing
+///   disparity_all           1     px    if not missing, for a sensor that checks validity
 ///   inverse_scale           1     -     always
-///   inverse_scale_seeing    1     -     the same value, while stereo measures
-///   inverse_scale_blind     1     -     the same value, while stereo does not measure
+///   inverse_scale_seeing    1     -     while stereo measures; value of inverse_scale
+///   inverse_scale_blind     1     -     while stereo does not measure; value of inverse_scale
 ///
-/// n1 and n2 come from streams 0 and 1 of the seed. Each sample draws one of each, regardless of
-/// the measurements that are emitted.
+/// n1 and n2 come from streams 0 and 1 of the seed. Each sample draws both, regardless of the
+/// measurements that are emitted.
 ///
-/// In the images the target is a textured square of w Z0 / F metres that faces the pair. It is on
-/// the axis of the left camera, in front of a textured wall. Images have image.width times
+/// In the images the target is a textured square of w Z0 / F metres that faces the pair. The square
+/// is on the axis of the left camera, in front of a textured wall. Images have image.width times
 /// image.height pixels and their principal points in the middle. Image noise comes from stream 2 of
 /// the seed; missing and wrong disparities come from stream 3.
 ///
-/// Differences from the notebook: it applies the threshold to the NOISY disparity. This biases the
-/// accepted disparities: by -0.85 px if F B / Z is within 1 px of the limit, by -0.33 px within 3
-/// px (sigma_d 1 px, example 01). `blind_test: true_depth` applies the threshold to F B / Z
-/// instead. The text of the notebook has 25 cm and 1 Hz; its code has 30 cm and 0.4 Hz, the
-/// defaults here. The notebook replaces a blind disparity by 1e9 px; here it is missing. Its scale
-/// noise adds both edges linearly, 2 sigma_e, as here.
+/// Differences from the notebook: the notebook compares the NOISY disparity with the limit, as
+/// `blind_test: measured` does. This biases the accepted disparities: by -0.85 px if F B / Z is
+/// within 1 px of the limit, by -0.33 px within 3 px (sigma_d 1 px, example 01). `blind_test:
+/// true_depth` compares F B / Z with the limit instead. The text of the notebook has 25 cm and 1
+/// Hz; its code has 30 cm and 0.4 Hz, which are the defaults here. The notebook replaces a blind
+/// disparity by 1e9 px; here it is missing. As here, its scale noise adds the errors of both edges
+/// linearly: 2 sigma_e.
 ///
 /// Defined for  A < Zm; else the configuration is rejected.
 /// Source       [Ekf2017] sec. 2-4.

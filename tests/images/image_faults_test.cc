@@ -220,7 +220,7 @@ TEST_F(ImageFaults, AnImageWithoutATimeEndsTheRun) {
   Write("images/timestamps.csv", rows);
   const Outcome outcome = Simulate({"--set", "source.rate_hz=0"});
   EXPECT_EQ(outcome.code, 65) << outcome.err;
-  EXPECT_TRUE(Contains(outcome.err, "has no time for image 9")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "no time for image 9")) << outcome.err;
 }
 
 // The image jumps by half its size and back. No feature is tracked across the jump, and no two

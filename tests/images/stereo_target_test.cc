@@ -421,7 +421,7 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   expect({"--set", "camera={width: 320, height: 180}"}, 65,
          "000000.png: 240x180 px, but the camera of --set");
   Write("times.csv", "0,0\n1,1\n2,2\n4,4\n");
-  expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: has no time for image 3");
+  expect({"--set", "source.timestamps=times.csv"}, 65, "times.csv:4: no time for image 3");
   Write("boxes.csv", "frame,x,y,width,height\n0,75,45,2,90\n");
   expect({"--set", "source.boxes=boxes.csv"}, 65, "boxes.csv:2:");
   Write("boxes.csv", "0,165,45,75,45,75,134,165,134\n");

@@ -20,9 +20,10 @@
 namespace alidade::ceres_batch {
 namespace {
 
-constexpr int kPoint = 3, kPose = 7;  // ambient sizes; a pose is position and orientation
+// Ambient sizes of a point and of a pose, which is a position and an orientation.
+constexpr int kPoint = 3, kPose = 7;
 
-/// Callback that reports the progress, and ends the solve on request.
+/// Callback that reports the progress of the solve, and ends the solve if requested.
 class ProgressCallback : public ceres::IterationCallback {
  public:
   explicit ProgressCallback(const BundleOptions& options) : options_(options) {}
@@ -86,7 +87,7 @@ class Bundle {
     for (const auto& point : problem_data_.points)
       points_.insert(points_.end(), point.begin(), point.end());
   }
-  /// Returns the kind of cost with W = L^-1, which the first call creates.
+  /// Returns the kind of cost for the given W = L^-1. The first call with this W creates the kind.
   const CostKind<SensorModel>& KindOf(const std::vector<double>& w) {
     auto& kind = kinds_[w];
     if (kind != nullptr) return *kind;
@@ -158,10 +159,10 @@ class Bundle {
   const BundleProblem& problem_data_;
   const BundleOptions& options_;
   Geometry lens_;
-  std::vector<bool> fixed_;            ///< elements of the intrinsics
-  bool lens_in_camera_block_ = false;  ///< the block of a camera contains its intrinsics
+  std::vector<bool> fixed_;            ///< by element of the intrinsics: true if it is constant
+  bool lens_in_camera_block_ = false;  ///< true if the block of a camera contains its intrinsics
   std::vector<double> cameras_, lenses_, points_;
-  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< by W
+  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< keys: W
   ceres::Problem ceres_problem_;
 };
 
@@ -187,7 +188,7 @@ void Bundle::Eliminate(ceres::Solver::Options& options) {
     add(camera(i), points_first ? 1 : 0);
   for (int i = 0; i < static_cast<int>(problem_data_.intrinsics.size()); ++i) add(lens(i), 1);
   options.linear_solver_ordering = ordering;
-  constexpr int kDense = 1000;  // remaining unknowns
+  constexpr int kDense = 1000;  // unknowns after elimination, up to which the solver is dense
   options.linear_solver_type =
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }
@@ -209,14 +210,15 @@ double Bundle::StepTolerance() const {
 ceres::Solver::Options Bundle::SolverOptions() const {
   ceres::Solver::Options options;
   options.max_num_iterations = options_.max_iterations;
-  // A cost is a sum of squares; its rounding error is about epsilon times the root of their number.
+  // A cost is a sum of n squares. Its relative rounding error is about epsilon sqrt(n).
   const double rounding =
       std::numeric_limits<double>::epsilon() *
       std::sqrt(static_cast<double>(std::max(1, ceres_problem_.NumResiduals())));
   options.function_tolerance = std::max(options_.function_tolerance, rounding);
   options.gradient_tolerance = 1e-12;
   options.parameter_tolerance = StepTolerance();
-  // A step that cannot be computed halves the trust region; a distant start needs several of them.
+  // A step that cannot be computed halves the trust region. If the start is distant, several steps
+  // in a row may fail in this way.
   options.max_num_consecutive_invalid_steps = 50;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
@@ -260,7 +262,7 @@ int Bundle::Rank() {
   const int n = sparse.num_cols, batch_rows = 4 * n;
   if (n == 0) return 0;
   Eigen::MatrixXd rows =
-      Eigen::MatrixXd::Zero(n + batch_rows, n);  // R of the previous rows, then new rows
+      Eigen::MatrixXd::Zero(n + batch_rows, n);  // R of the previous rows, above the new rows
   for (int first = 0; first < sparse.num_rows; first += batch_rows) {
     for (int r = first; r < std::min(first + batch_rows, sparse.num_rows); ++r) {
       for (auto k = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r)]);

@@ -11,7 +11,8 @@
 
 namespace alidade::ceres_batch {
 
-/// Place of the value of a role: `offset` numbers after the start of parameter block `block`.
+/// Place of the value of a role in the parameter blocks: the value starts at element `offset` of
+/// parameter block `block`.
 struct RolePlace {
   int block = -1;  ///< -1 if the role is optional and not bound
   int offset = 0;
@@ -24,9 +25,9 @@ struct JacobianElement {
 
 namespace detail {
 
-/// Geometry of a measurement, which is never a product of geometries.
+/// Geometry of a measurement. A measurement never has a product of several geometries.
 struct Measured {
-  std::uint32_t geometry;  ///< its number in the C table
+  std::uint32_t geometry;  ///< number of the geometry in the C table
   int ambient, tangent;
 };
 
@@ -83,15 +84,16 @@ template <class Sensor>
 struct CostKind {
   using Traits = detail::SensorTraits<Sensor>;
 
-  /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
-  /// row-major, of the tangent size of z. Two roles may not overlap. The sensor must outlive this.
+  /// `blocks` are the ambient sizes of the parameter blocks. `whiten` is W: lower triangular,
+  /// row-major, with the tangent size of z. The places of two roles may not overlap. `model` must
+  /// outlive this object.
   CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
            const std::vector<double>& whiten)
       : sensor(model), sizes(blocks), w(whiten) {
     const std::vector<Geometry> geometries = Traits::Geometries(model);
     const auto m = static_cast<std::size_t>(measured().tangent);
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
-    std::vector<std::vector<bool>> bound, written;  // elements of each block
+    std::vector<std::vector<bool>> bound, written;  // by block and element
     for (const int size : blocks) bound.emplace_back(static_cast<std::size_t>(size), false);
     written = bound;
     role_count_ = static_cast<int>(roles.size());
@@ -128,14 +130,15 @@ struct CostKind {
   const Sensor& sensor;
   double scale = 1.0;
   bool isotropic = true;                   ///< true if W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< an array, because each evaluation reads it
-  int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians with respect to the roles
+  RolePlace places[Traits::kMaxRoles];     ///< by role; an array, because each evaluation reads it
+  int strides[Traits::kMaxRoles] = {};     ///< by role: row length of its Jacobian
   std::vector<int> sizes;                  ///< ambient sizes of the blocks
   std::vector<double> w;                   ///< W, row-major
-  std::vector<JacobianElement> unwritten;  ///< by the model; the cost sets them to zero
+  std::vector<JacobianElement> unwritten;  ///< elements that the model does not write: 0
 
  private:
-  /// True if the compiler knows the type of the sensor; role_count() and measured() are constants.
+  /// True if the compiler knows the type of the sensor. role_count() and measured() are then
+  /// constants.
   static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
   int role_count_ = 0;
   detail::Measured measured_ = Traits::Measured(sensor);

@@ -18,10 +18,10 @@ namespace alidade::ceres_batch {
 ///   d(x (+) d)/dd  := [I; 0] for each part: its tangent in the first rows; a constant part has no
 ///                     column
 ///
-/// This is not the derivative of the ambient values, which models of alidade do not provide. It is
-/// the counterpart of the Jacobian [J | 0] that a cost writes, with J in the tangent: Ceres
-/// computes [J | 0] [I; 0] = J. Only costs that do so, such as SensorCost, may use a block with
-/// this manifold. Ceres' own QuaternionManifold has another convention.
+/// [I; 0] is not the derivative of the ambient values, which models of alidade do not provide. It
+/// is the counterpart of the Jacobian [J | 0] that a cost writes, with J in the tangent: Ceres
+/// computes [J | 0] [I; 0] = J. Only costs that write [J | 0], such as SensorCost, may use a block
+/// with this manifold. Ceres' own QuaternionManifold has another convention.
 class GeometryManifold : public ceres::Manifold {
  public:
   struct Part {
@@ -73,7 +73,8 @@ class GeometryManifold : public ceres::Manifold {
   }
 
  private:
-  /// Sets j to 0, and to 1 at (ambient row, tangent column) of each element that moves.
+  /// Sets the elements of j to 0, except for a 1 at (ambient row, tangent column) of each element
+  /// that moves.
   void Select(double* j, int row_stride, int column_stride) const {
     std::fill_n(j, ambient_ * tangent_, 0.0);
     int row = 0, column = 0;

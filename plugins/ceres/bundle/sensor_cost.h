@@ -14,17 +14,18 @@ namespace alidade::ceres_batch {
 ///
 ///   r = -W (z (-) h(roles)),   W = L^-1,   R = L L'
 ///
-/// The sign does not affect the cost; with this sign the Jacobian W H needs no pass if W is 1.
-/// Jacobians are in the tangent of each role, [J | 0] in its ambient columns: see GeometryManifold.
-/// `Sensor` is SensorModel or the type of a model. Evaluate returns false if h is not defined, and
-/// does not allocate. The object is small, because in a large problem it is rarely in the cache.
+/// The sign does not affect the cost. With this sign the Jacobian is W H, and equals H if W = I.
+/// The Jacobian with respect to a role is in the tangent of the role, and is padded to the ambient
+/// columns: [J | 0], see GeometryManifold. `Sensor` is SensorModel or the type of a model. Evaluate
+/// returns false if h is not defined, and does not allocate. The object is small, because in a
+/// large problem it is rarely in the cache.
 template <class Sensor>
 class SensorCost final : public ceres::CostFunction {
   using Traits = detail::SensorTraits<Sensor>;
 
  public:
-  /// `z` has ambient size. The kind must outlive the cost, and so must a z of more than three
-  /// numbers.
+  /// `z` has ambient size. `kind` must outlive the cost. If `z` has more than three numbers, the
+  /// array must outlive the cost too.
   SensorCost(const CostKind<Sensor>& kind, const double* z) : kind_(kind) {
     if (kind.measured().ambient <= kInlineSize) {
       std::copy_n(z, kind.measured().ambient, z_.inline_values);
@@ -38,7 +39,7 @@ class SensorCost final : public ceres::CostFunction {
   ALIDADE_SCALAR_LOOPS bool Evaluate(const double* const* blocks, double* residuals,
                                      double** jacobians) const override {
     const double* const z = kind_.measured().ambient <= kInlineSize ? z_.inline_values : z_.pointer;
-    __builtin_prefetch(z);  // needed only after h has been computed
+    __builtin_prefetch(z);  // prefetched: z is read only after h has been computed
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j);
@@ -143,8 +144,8 @@ class SensorCost final : public ceres::CostFunction {
   const CostKind<Sensor>& kind_;
   static constexpr int kInlineSize = 3;
   union {
-    double inline_values[kInlineSize];  ///< z of at most this size
-    const double* pointer;              ///< to a longer z
+    double inline_values[kInlineSize];  ///< z, if it has at most kInlineSize numbers
+    const double* pointer;              ///< points to a longer z
   } z_;
 };
 

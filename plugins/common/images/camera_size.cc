@@ -13,7 +13,7 @@ std::string SizeText(cv::Size size) {
 
 CameraSize::CameraSize(const SourceArguments& arguments, const Source& source) {
   if (arguments.config == nullptr) return;
-  const Config config = arguments.config->Copy();  // does not mark the keys of the original as read
+  const Config config = arguments.config->Copy();  // a copy: keys of the original stay unread
   const Node root = config.root();
   const auto use = root.At("source").Find("calibration");
   std::optional<Config> calibration;
@@ -35,8 +35,8 @@ void CameraSize::Check(cv::Size found, const Place& image) const {
                 ErrorLine(image, {},
                           SizeText(found) + ", but the camera of " + camera.place + " is " +
                               SideText(camera.width) + "x" + SideText(camera.height) + " px",
-                          "images of that camera, or the 'camera' of these images: its width and "
-                          "height, and fx, fy, cx, cy in their pixels"));
+                          "images of that camera, or a 'camera' with the width and height of these "
+                          "images, and with fx, fy, cx, cy in their pixels"));
   }
 }
 

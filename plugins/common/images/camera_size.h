@@ -14,16 +14,17 @@ namespace alidade {
 
 std::string SizeText(cv::Size size);
 
-/// Size that the images must have: `camera.width` and `camera.height`, as the sensors of the
-/// source's streams read them. They are in the sensor's entry, the config, or the calibration that
-/// comes with the images. Without such a sensor only the last two are read.
+/// Size that the images must have: `camera.width` and `camera.height` of each sensor that reads a
+/// stream of the source. Each key is read from the sensor's entry, else from the root of the
+/// config, else from the calibration of the images. If no sensor reads a stream of the source, only
+/// the root and the calibration are read.
 class CameraSize {
  public:
   CameraSize() = default;
   CameraSize(const SourceArguments& arguments, const Source& source);
 
-  /// Rejects an image of another size, because its pixels belong to another camera. Errors:
-  /// kBadData.
+  /// Checks the size of an image. Error: kBadData if `found` is another size, because the image is
+  /// then from another camera.
   void Check(cv::Size found, const Place& image) const;
 
  private:
@@ -37,7 +38,7 @@ class CameraSize {
 
   static std::vector<Node> SensorsOn(const std::vector<StreamInfo>& streams, const Node& root);
 
-  /// Reads each side from the first of the maps that contains it.
+  /// Reads the width and the height, each from the first map that contains it.
   void Read(const std::vector<Node>& maps);
 
   std::vector<Camera> cameras_;

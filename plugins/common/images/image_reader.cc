@@ -33,11 +33,12 @@ ImageReader::ImageReader(std::filesystem::path path, const std::string& names, c
                           "a video, a folder of images, or a camera"));
   }
   if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
-  throw Error(ExitCode::kBadData,
-              ErrorLine({path_.string()}, {},
-                        is_live_ ? "not a camera that OpenCV reads, or another program uses it"
-                                 : "not a video that OpenCV reads",
-                        "a video, a folder of images, or a camera such as /dev/video0"));
+  throw Error(
+      ExitCode::kBadData,
+      ErrorLine({path_.string()}, {},
+                is_live_ ? "OpenCV cannot read this camera, or another program uses the camera"
+                         : "not a video that OpenCV reads",
+                "a video, a folder of images, or a camera such as /dev/video0"));
 }
 
 bool ImageReader::Next(cv::Mat& image) {
@@ -131,7 +132,7 @@ bool ImageReader::ReadFile(cv::Mat& image) {
     Fail(bytes.empty() ? "an empty file"
          : is_cut      ? "the image is cut short"
                        : "not an image that OpenCV reads",
-         "a complete image; `images` selects the files");
+         "a complete image, or a pattern `images` that excludes this file");
   }
   return true;
 }

@@ -13,11 +13,11 @@
 
 namespace alidade {
 
-/// Reader of 8-bit grey images, one at a time: of a folder, a video or a camera. The images of a
-/// folder are in the order of their names (2.png before 10.png). A camera is a device such as
-/// /dev/video0; its images are those that it captures.
+/// Reads 8-bit grey images, one at a time, from a folder, a video or a live camera. The images of a
+/// folder are read in the order of their names (2.png before 10.png). A camera is a device such as
+/// /dev/video0.
 ///
-/// Errors       kInputMissing: no such path, no image in the folder. kBadData, with the file: an
+/// Errors       kInputMissing: no such path, or no image in the folder. kBadData, with the file: an
 ///              image that cannot be decoded, is cut short, or has another size than the first.
 class ImageReader {
  public:
@@ -29,7 +29,7 @@ class ImageReader {
   bool Next(cv::Mat& image);
 
   bool is_video() const { return files_.empty(); }
-  /// True for a camera: Next captures an image, and never returns false.
+  /// Returns true for a camera. Next() then captures an image, and never returns false.
   bool is_live() const { return is_live_; }
   /// Returns the number of the last image, counted from 0.
   std::int64_t number() const { return number_; }
@@ -39,11 +39,12 @@ class ImageReader {
   std::string name(std::int64_t k) const;
   /// Returns the number of images: for a video, the number that its header states; for a camera, 0.
   std::int64_t size() const;
-  /// Returns the images per second that a video states, or 0.
+  /// Returns the frame rate that a video states, Hz. Returns 0 for a folder or a camera.
   double rate_hz() const { return is_video() && !is_live_ ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
 
  private:
-  /// Decides by the name only: an empty or broken image is an error, and is not skipped.
+  /// Returns true if the name has the ending of an image file. The content does not matter, because
+  /// an empty or broken image is an error and must not be skipped.
   static bool EndsLikeAnImage(const std::filesystem::path& file);
 
   void List(const std::string& names, const Node& key);
@@ -59,7 +60,7 @@ class ImageReader {
   [[noreturn]] void Fail(const std::string& what, std::string_view expected) const;
 
   std::filesystem::path path_;
-  std::vector<std::filesystem::path> files_;  ///< of a folder; empty for a video
+  std::vector<std::filesystem::path> files_;  ///< images of a folder; empty for a video
   cv::VideoCapture video_;
   bool is_live_ = false;
   cv::Mat colour_;

@@ -50,11 +50,11 @@ void ImageTimes::Check(const ImageReader& images, std::int64_t first,
       max_count > 0 ? std::min(images.size(), first + max_count) : images.size();
   for (std::int64_t k = first; k < end; ++k) {
     const Row& row = RowOf(k, images.name(k));
-    if (k == first || by_name_.empty()) continue;  // times by number are known to increase
+    if (k == first || by_name_.empty()) continue;  // times by number were checked on reading
     const Row& previous = RowOf(k - 1, images.name(k - 1));
     if (row.t > previous.t) continue;
     Fail(row.line,
-         "has a time for image " + images.name(k) + " that is not later than for " +
+         "the time of image " + images.name(k) + " is not later than the time of image " +
              images.name(k - 1) + " in line " + std::to_string(previous.line),
          "increasing times, in the order of the names of the images");
   }
@@ -70,7 +70,7 @@ Timestamp ImageTimes::At(std::int64_t number, const std::string& name) {
 void ImageTimes::End(std::int64_t count) const {
   const auto surplus = by_number_.lower_bound(count);
   if (surplus == by_number_.end()) return;
-  Fail(surplus->second.line, "has a time for image " + std::to_string(surplus->first) +
+  Fail(surplus->second.line, "a time for image " + std::to_string(surplus->first) +
                                  ", but there are " + std::to_string(count) +
                                  " images, counted from 0");
 }
@@ -108,13 +108,13 @@ void ImageTimes::ReadPlain(NumberRows&& rows) {
 const ImageTimes::Row& ImageTimes::RowOf(std::int64_t number, const std::string& name) const {
   if (!by_name_.empty()) {
     const auto found = by_name_.find(name);
-    if (found == by_name_.end()) Fail(0, "has no time for image " + name);
+    if (found == by_name_.end()) Fail(0, "no time for image " + name);
     return found->second;
   }
   const auto found = by_number_.lower_bound(number);
   if (found != by_number_.end() && found->first == number) return found->second;
   const auto nearest = found == by_number_.end() ? std::prev(found) : found;
-  Fail(nearest->second.line, "has no time for image " + std::to_string(number));
+  Fail(nearest->second.line, "no time for image " + std::to_string(number));
 }
 
 Timestamp ImageTimes::ElapsedTime() {

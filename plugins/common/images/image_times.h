@@ -16,14 +16,14 @@
 namespace alidade {
 
 /// Times of images: from a table `frame,t_s`, from a table of file names, at a constant rate, or
-/// from the clock. The constructor reads a whole table.
+/// from the clock. A table is read as a whole, before the first image.
 ///
 /// Errors       kBadData with file and line, if an image has no time, if times do not increase, or
-///              if a table by number has a time without an image. With a missing image, the times
-///              of the images after it would be wrong.
+///              if a table by number has a time without an image. If an image were missing, all
+///              later images would have wrong times.
 class ImageTimes {
  public:
-  /// Times by the clock, counted from the first image, for a live camera.
+  /// Creates times for a live camera: read from the clock, counted from the first image.
   ImageTimes() = default;
   explicit ImageTimes(double rate_hz) : rate_hz_(rate_hz) {}
   ImageTimes(const std::filesystem::path& table, const Node& key);
@@ -40,13 +40,14 @@ class ImageTimes {
   static std::optional<ImageTimes> FindNextTo(const std::filesystem::path& folder, bool by_layout,
                                               const Node& key);
 
-  /// Checks that each image of a folder from number `first` on has a time after that of the image
-  /// before it. Checks `max_count` images, or all if it is 0. The times of a video are checked as
-  /// its images are read.
+  /// Checks that each image of a folder, from number `first` on, has a time, and that these times
+  /// increase. Checks `max_count` images, or all if `max_count` is 0. The times of a video are
+  /// checked later, when its images are read.
   void Check(const ImageReader& images, std::int64_t first, std::int64_t max_count) const;
   /// Returns the time of image `number`, counted from 0, with the file name `name`.
   Timestamp At(std::int64_t number, const std::string& name);
-  /// Checks, after the last image, that the table has no times for images beyond `count`.
+  /// Checks that the table has no time for an image with a number of `count` or more. `count` is
+  /// the number of images, which is known after the last one.
   void End(std::int64_t count) const;
 
  private:
@@ -64,7 +65,7 @@ class ImageTimes {
                          const char* expected = "a time for each image") const;
 
   double rate_hz_ = 0.0;
-  std::string table_;  ///< file of the times below, or ""
+  std::string table_;  ///< path of the table; "" if there is no table
   std::map<std::string, Row> by_name_;
   std::map<std::int64_t, Row> by_number_;
   std::optional<std::chrono::steady_clock::time_point> first_;

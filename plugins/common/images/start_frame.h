@@ -17,13 +17,14 @@ class StartFrame {
   StartFrame(Params& p, const Node& entry);
 
   std::int64_t number() const { return number_; }
-  /// Returns the number of images of `count` that remain.
+  /// Returns the number of images that remain if the source has `count` images.
   std::int64_t Remaining(std::int64_t count) const {
     return std::max<std::int64_t>(0, count - number_);
   }
-  /// Fails if `count` images end before it. Errors: kBadConfig.
+  /// Checks that a source of `count` images contains image `start_frame`. Error: kBadConfig.
   void Check(std::int64_t count) const;
-  /// Checks the images of a folder before they are read. A video only reports its size at its end.
+  /// Checks the images of a folder before they are read. Does not check a video, because its number
+  /// of images is known only at its end.
   void Check(const ImageReader& images) const;
 
  private:

@@ -45,7 +45,7 @@ TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
   const Outcome outcome = Call(With(kStereo, {"--states", "100000", "--timeout", "0.01"}));
   EXPECT_EQ(outcome.code, 1) << outcome.out;
   EXPECT_TRUE(Contains(outcome.out, "\n  FAIL ")) << outcome.out;
-  EXPECT_TRUE(Contains(outcome.out, "the check took longer than 0.01 s (--timeout); it was "))
+  EXPECT_TRUE(Contains(outcome.out, "the check took longer than 0.01 s (--timeout); it ended "))
       << outcome.out;
 }
 

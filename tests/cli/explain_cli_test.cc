@@ -88,10 +88,11 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   // The config has 3.3 +- 0.5.
   const Outcome one =
       Call({"explain", "config.yaml", "--set", "state.template.constant=[inverse_distance]"});
-  for (const char* part : {"inverse_distance  3.3, exact\n",
-                           "    constant: known exactly, without covariance; never changes\n",
-                           "template  constant           none ",
-                           "template.inverse_distance  -       knows     -         knows\n"}) {
+  for (const char* part :
+       {"inverse_distance  3.3, exact\n",
+        "    constant: the value is known exactly and never changes; it has no covariance\n",
+        "template  constant           none ",
+        "template.inverse_distance  -       knows     -         knows\n"}) {
     EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
   }
   EXPECT_FALSE(Contains(one.out, "no effect for")) << one.out;

@@ -198,8 +198,8 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(policy.policy, OutOfSequence::kRollback);
   EXPECT_EQ(policy.window, 250'000'000);
   EXPECT_NE(Explain(config, experiment)
-                .find("out-of-sequence frames: rollback: the estimators go back and process them "
-                      "in order, up to "
+                .find("out-of-sequence frames: rollback: the estimators return to an earlier "
+                      "state and process all frames in order, up to "
                       "0.25 s behind"),
             std::string::npos);
   std::map<std::string, int> ranks;

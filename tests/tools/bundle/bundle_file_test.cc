@@ -172,16 +172,16 @@ TEST_F(BundleFiles, RefusesBadBal) {
   std::string text = kBal;
   ExpectBad(text.replace(text.find("100"), 3, "-10"),
             {":9:1: the focal length is not positive", "px above 0"});
-  ExpectBad(kBal + "5\n", {":15:1: more numbers than the file announces"});
+  ExpectBad(kBal + "5\n", {":15:1: the file contains more numbers than its counts announce"});
   for (const char* magic : {"\x1F\x8B\x08", "BZh9",
                             "\xFD"
                             "7zXZ",
                             "\x28\xB5\x2F\xFD"})
-    ExpectBad(
-        magic,
-        {":1:1: the file is compressed; expected text, as from zcat, bzcat, xzcat or zstdcat"});
+    ExpectBad(magic,
+              {":1:1: the file is compressed; expected uncompressed text, for example from zcat"});
   ExpectBad(std::string("1 1 1\0", 6), {":1:1: the file is not text; expected a problem of BAL"});
-  ExpectBad("frame,feature,dim,value\n", {":1:1: columns with commas", "--camera FILE"});
+  ExpectBad("frame,feature,dim,value\n",
+            {":1:1: the columns are separated by commas", "--camera FILE"});
 }
 
 TEST_F(BundleFiles, RefusesBadBundler) {

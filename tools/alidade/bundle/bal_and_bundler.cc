@@ -11,9 +11,11 @@ namespace alidade::internal {
 namespace {
 
 constexpr std::int64_t kMaxIndex = INT32_MAX;
-/// Rotation by pi about x, its own inverse: converts y up, -z ahead to y down, +z ahead.
+/// Quaternion of the rotation by pi about x, which is its own inverse. It converts between a frame
+/// with y up and -z ahead and a frame with y down and +z ahead.
 constexpr double kHalfTurn[4] = {0, 1, 0, 0};
-/// Both formats project by p = -P / P_z, whatever the sign of P_z.
+/// Sensor of both formats. They project by p = -P / P_z for either sign of P_z, so the domain is
+/// projective.
 const char* const kRadial =
     "{model: self_calibrating_feature, lens: radial, domain: projective, sigma_px: 1}";
 
@@ -25,7 +27,7 @@ void AppendLine(std::string& text, const double* values, std::size_t count) {
   text += '\n';
 }
 
-/// Returns the 6 numbers of a camera's pose in a BAL file: angle-axis and t.
+/// Returns the pose of camera i as the 6 numbers of a BAL file: angle-axis vector and t.
 std::array<double, 6> BalPose(const BundleFile& file, std::size_t i) {
   std::array<double, 6> pose;
   if (const double* const numbers = UnmovedNumbers(file, i)) {
@@ -38,7 +40,7 @@ std::array<double, 6> BalPose(const BundleFile& file, std::size_t i) {
   return pose;
 }
 
-/// Returns R (row-major) and t of a camera in a Bundler file.
+/// Returns the pose of camera i as the 12 numbers of a Bundler file: R (row-major) and t.
 std::array<double, 12> BundlerPose(const BundleFile& file, std::size_t i) {
   std::array<double, 12> pose;
   if (const double* const numbers = UnmovedNumbers(file, i)) {
@@ -52,7 +54,7 @@ std::array<double, 12> BundlerPose(const BundleFile& file, std::size_t i) {
   return pose;
 }
 
-/// Reads f, k1, k2. `may_be_missing` accepts f = 0, which marks an unregistered image.
+/// Reads f, k1 and k2. If `may_be_missing`, f = 0 is accepted; it marks an unregistered image.
 void ReadLens(BundleCursor& cursor, bool may_be_missing, double* lens) {
   lens[0] = cursor.Number("focal length of a camera");
   if (!(lens[0] > 0.0) && !(may_be_missing && lens[0] == 0.0))
@@ -109,7 +111,7 @@ BundleCamera CameraFromTransform(const double* q, const double* t, bool looks_ba
   BundleCamera camera;
   const double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
   UnitQuaternion::Rotate(inverse, t, camera.position.data());
-  for (double& x : camera.position) x = 0.0 - x;  // never yields -0
+  for (double& x : camera.position) x = 0.0 - x;  // 0.0 - x is never -0
   if (looks_back) {
     UnitQuaternion::Multiply(inverse, kHalfTurn, camera.orientation.data());
   } else {

@@ -21,7 +21,8 @@ namespace {
                 "sensor '" + sensor.name() + "' cannot be used in a bundle adjustment: " + reason));
 }
 
-/// Connected components of cameras and points that used observations join, as a union-find forest.
+/// Connected components of the graph whose nodes are cameras and points and whose edges are the
+/// used observations. The components are computed with a union-find forest.
 class Components {
  public:
   explicit Components(const BundleProblem& problem)
@@ -48,7 +49,7 @@ class Components {
   std::set<std::size_t> roots_;
 };
 
-/// Computes |z (-) h|^2; nullopt if h is undefined or the result is not finite.
+/// Computes |z (-) h|^2. Returns nullopt if h is undefined or the result is not finite.
 std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles& roles,
                                    const BundleProblem& problem,
                                    const BundleObservation& observation) {
@@ -61,7 +62,7 @@ std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles&
   return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
 }
 
-/// Gauge of a problem: its first used camera and its extent, see BundleResult::extent_before.
+/// Gauge of a problem: the first used camera and the extent (BundleResult::extent_before).
 class Gauge {
  public:
   explicit Gauge(const BundleProblem& problem)
@@ -91,7 +92,7 @@ class Gauge {
     std::ranges::nth_element(distances, median);
     return *median;
   }
-  /// Scales the used cameras and points about the first camera. No pixel changes.
+  /// Scales the used cameras and points about the first camera. The predicted pixels do not change.
   void Scale(double factor, BundleProblem& problem) const {
     const std::array<double, 3> eye = problem.cameras[first_].position;
     const auto scale = [&](std::array<double, 3>& x) {
@@ -106,9 +107,9 @@ class Gauge {
   }
 
  private:
-  std::vector<bool> cameras_, points_;  ///< true: used
+  std::vector<bool> cameras_, points_;  ///< true: used by an observation
   std::size_t first_ = 0;
-  bool uses_points_ = false;  ///< there is no camera at another position than the first
+  bool uses_points_ = false;  ///< true: Extent() uses the points, not the cameras
 };
 
 /// Returns true if the sensor measures at most two numbers, which do not determine the scale.
@@ -121,7 +122,7 @@ std::string ShortText(double value) {
   return text;
 }
 
-/// Returns `1 point is`, `3 points are`.
+/// Returns a count with a noun and a verb, as in `1 point is` or `3 points are`.
 std::string Count(std::ptrdiff_t count, const std::string& noun) {
   return std::to_string(count) + ' ' + noun + (count == 1 ? " is" : "s are");
 }
@@ -151,7 +152,7 @@ BundleRoles RolesOf(const SensorModel& sensor) {
     }
   }
   if (std::max({roles.position, roles.orientation, roles.point}) == kNone)
-    FailRoles(sensor, "it lacks one of position, orientation and a point");
+    FailRoles(sensor, "it does not have the roles position, orientation and a point");
   const Geometry& z = sensor.measurement().geometry;
   if (!z.is_vector() || z.ambient > 4) FailRoles(sensor, "it measures " + ToString(z));
   if (sensor.known_size() > 0) FailRoles(sensor, "it needs known numbers with each measurement");
@@ -177,9 +178,10 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
   if (roles.intrinsics < 0) {
     for (const std::string& name : fixed) {
       if (name == "intrinsics") continue;
-      throw Error(ExitCode::kUsage, ErrorLine({}, "--fix", '\'' + name + "' cannot be fixed",
-                                              "intrinsics (sensor '" + sensor.name() +
-                                                  "' does not estimate intrinsics)"));
+      throw Error(ExitCode::kUsage, ErrorLine({}, "--fix",
+                                              '\'' + name + "' cannot be fixed: sensor '" +
+                                                  sensor.name() + "' does not estimate intrinsics",
+                                              "only 'intrinsics'"));
     }
     return {};
   }
@@ -280,14 +282,13 @@ std::vector<std::string> DescribeUndetermined(const BundleProblem& problem,
   }
   const auto unseen = std::ranges::count(seen_by, 0), blind = std::ranges::count(sees, 0);
   const auto seen_once = std::ranges::count(seen_by, 1);
-  if (blind > 0) lines.push_back(Count(blind, "camera") + " without observations and unchanged");
-  if (unseen > 0) lines.push_back(Count(unseen, "point") + " not seen by any camera and unchanged");
+  if (blind > 0) lines.push_back(Count(blind, "camera") + " unchanged for lack of observations");
+  if (unseen > 0) lines.push_back(Count(unseen, "point") + " unchanged: not seen by any camera");
   if (mono && seen_once > 0)
     lines.push_back(Count(seen_once, "point") + " seen only once: the depth is undetermined");
   if (const std::size_t components = Components(problem).count(); components > 1) {
-    lines.push_back(std::to_string(components) +
-                    " components share no observation: the relative poses of the components are "
-                    "undetermined");
+    lines.push_back("cameras and points form " + std::to_string(components) +
+                    " separate components, whose relative poses are undetermined");
   }
   const int scale = mono ? 1 : 0;
   const int undetermined = result.unknowns - scale - result.rank;

@@ -15,13 +15,13 @@
 ///
 ///   argmin  sum_i rho(|r_i|),   r_i = L^-1 (z_i (-) h(camera_i, point_i)),   R = L L'
 ///
-/// h is a sensor model with the roles `position`, `orientation`, optionally `intrinsics`, and one
-/// more role, the point. rho(d) = d^2 / 2, or the robust loss.
+/// h is a sensor model with the roles `position`, `orientation` and optionally `intrinsics`. One
+/// other role is the point. rho(d) is d^2 / 2 or a robust loss.
 namespace alidade {
 
 /// Pose of a camera and the index of its intrinsics.
 struct BundleCamera {
-  std::array<double, 3> position{};               ///< in the world
+  std::array<double, 3> position{};               ///< position in the world
   std::array<double, 4> orientation{1, 0, 0, 0};  ///< world_from_cam, w x y z
   int intrinsics = 0;                             ///< index into BundleProblem::intrinsics
 };
@@ -30,31 +30,32 @@ struct BundleCamera {
 struct BundleObservation {
   int camera = 0, point = 0;
   std::array<double, 4> z{};
-  bool used = true;  ///< false: excluded by ExcludeUndefined
+  bool used = true;  ///< false: ExcludeUndefined() has excluded the observation
 };
 
 struct BundleProblem {
-  /// Sensor in YAML, as in a config: `model` and its parameters.
+  /// Entry of the sensor in YAML, as in a config: `model` and the parameters of the model.
   std::string sensor;
   std::vector<BundleCamera> cameras;
   std::vector<std::vector<double>> intrinsics;  ///< empty if the sensor has no such role
-  std::vector<std::array<double, 3>> points;    ///< in the world
+  std::vector<std::array<double, 3>> points;    ///< positions in the world
   std::vector<BundleObservation> observations;
 };
 
-/// Bounds of the scale of a robust loss, in standard deviations. Below the lower bound all
-/// residuals exceed the scale and the gradient vanishes; above the upper bound no residual does.
+/// Bounds of the scale of a robust loss, in standard deviations. Below the lower bound, all
+/// residuals exceed the scale and the gradient vanishes. Above the upper bound, no residual exceeds
+/// the scale.
 inline constexpr double kBundleLossScaleMin = 1e-3, kBundleLossScaleMax = 1e6;
 
 struct BundleOptions {
   int max_iterations = 500;
   /// The solution has converged if a step changes the cost by at most this fraction. A change
-  /// within the rounding error of the cost counts as no change, whatever the tolerance.
+  /// within the rounding error of the cost counts as no change for any tolerance.
   double function_tolerance = 1e-8;
   RobustLoss loss;
-  std::vector<std::string> fixed;     ///< constant elements of the intrinsics; `intrinsics`: all
-  std::function<bool()> stop;         ///< returns true to end after the current iteration
-  std::function<void(int)> progress;  ///< receives the number of completed iterations
+  std::vector<std::string> fixed;     ///< elements of the intrinsics to fix; `intrinsics` fixes all
+  std::function<bool()> stop;         ///< if it returns true, the current iteration is the last
+  std::function<void(int)> progress;  ///< called with the number of completed iterations
 };
 
 enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
@@ -64,54 +65,57 @@ const char* ToString(BundleEnd end);
 /// Result of a bundle adjustment.
 struct BundleResult {
   BundleEnd end = BundleEnd::kFailed;
-  std::string message;  ///< of the solver
-  int iterations = 0;   ///< steps tried
+  std::string message;  ///< message of the solver
+  int iterations = 0;   ///< number of steps that the solver tried
   double cost_before = 0.0, cost_after = 0.0;
-  int residuals = 0;  ///< scalars
-  int unknowns = 0;   ///< estimated tangent elements, without the constant first pose
-  /// Median distance from the first used camera to the other used cameras. If these are all at one
-  /// position, the median distance to the used points. 0 if there are no distances.
+  int residuals = 0;  ///< number of scalar residuals
+  int unknowns = 0;   ///< number of estimated tangent elements; the constant first pose is excluded
+  /// Extent of the problem: the median distance from the first used camera to the other used
+  /// cameras. If this median is 0, the median distance to the used points replaces it. Without
+  /// any distance, the extent is 0.
   double extent_before = 0.0, extent_after = 0.0;
-  /// Rank of the Jacobian at the solution. -1 if it was not computed: more unknowns than
-  /// kBundleRankUnknowns, or a Jacobian that is not finite.
+  /// Rank of the Jacobian at the solution. It is -1 if there are more than kBundleRankUnknowns
+  /// unknowns, or if the Jacobian is not finite.
   int rank = -1;
 };
 inline constexpr int kBundleRankUnknowns = 600;
 
-/// Indices of a camera's roles among the roles of its sensor model.
+/// Indices of the roles of a bundle adjustment in SensorModel::roles().
 struct BundleRoles {
   std::size_t position, orientation, point;
-  int intrinsics = -1;  ///< -1: the sensor has no such role
+  int intrinsics = -1;  ///< -1: the sensor does not have this role
 };
-/// Finds the roles by name; the point is the role with any other name. Error: kInternal if the
-/// sensor is not a camera, or does not measure 1 to 4 numbers.
+/// Finds the roles by name. A role of three numbers with any other name is the point. Error:
+/// kInternal if the sensor is not a camera, or does not measure 1 to 4 numbers.
 BundleRoles RolesOf(const SensorModel& sensor);
 /// Returns pointers into `problem` to the values of an observation's roles, in the sensor's order.
 std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,
                                       const BundleObservation& observation);
 
-/// Returns for each element of the intrinsics whether it is fixed; empty if the sensor has no such
-/// role. Error: kUsage if `fixed` names an unknown element.
+/// Returns a flag for each element of the intrinsics, which is true if the element is fixed. The
+/// result is empty if the sensor does not have the role `intrinsics`. Error: kUsage if `fixed`
+/// contains the name of an unknown element.
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
 
 /// Creates the sensor of `problem`. Errors: kPlugin, kBadConfig.
 SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
-/// Clears BundleObservation::used for observations whose h is undefined at the problem's values (a
-/// point behind its camera; for a projective camera, a point in the camera's plane), and for those
-/// whose |z (-) h|^2 is not finite. Returns the number of excluded observations.
+/// Excludes observations: sets BundleObservation::used to false if h is undefined or |z (-) h|^2 is
+/// not finite at the values of the problem, otherwise to true. h is undefined for a point behind the
+/// camera. For a projective camera, h is undefined for a point in the plane of the camera. Returns
+/// the number of excluded observations.
 int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Computes the unweighted RMS reprojection error of the used observations:
 ///
 ///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n the number of observations
 ///
-/// in the unit of z, px; 0 if no observation is used.
+/// in px, the unit of z. Returns 0 if no observation is used.
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
 inline constexpr const char* kBundleAdjusterKind = "bundle adjuster";
 
-/// Factory that a bundle adjustment plugin exports: the adjustment function itself.
+/// Entry that a bundle adjustment plugin exports. It contains the adjustment function.
 struct BundleAdjusterEntry {
   BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
                          const BundleOptions& options);
@@ -121,16 +125,16 @@ constexpr CppEntry EntryOf(const BundleAdjusterEntry& adjuster) {
 }
 
 /// Adjusts cameras, points and the free intrinsics of `problem` to minimise the cost. The pose of
-/// the first used camera is constant. Two measured numbers do not determine the scale: cameras and
-/// points are then scaled about the first camera after the solution, to restore the initial extent
-/// (BundleResult). The plugin of the Ceres solver computes the solution. It is loaded at the first
-/// use, from `folder`, or if that is "" from the folder of the library.
+/// the first used camera is constant. A sensor that measures at most two numbers does not determine
+/// the scale. The solution is then scaled about the first camera to the initial extent
+/// (BundleResult). The plugin of the Ceres solver computes the solution. This plugin is loaded from
+/// `folder` at the first use. If `folder` is empty, it is loaded from the folder of the library.
 /// Errors: kPlugin if the plugin is missing; kNotTrusted; kBadData if no observation is used;
-/// kUsage as FixedElements, and if the scale of the loss is out of bounds.
+/// kUsage as for FixedElements(), and if the scale of the loss is out of bounds.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 
-/// Describes the quantities that the used observations do not determine, in one line each: the
+/// Describes the quantities that the used observations do not determine, one in each line: the
 /// gauge, separate components, points observed once, directions without information.
 std::vector<std::string> DescribeUndetermined(const BundleProblem& problem,
                                               const SensorModel& sensor,

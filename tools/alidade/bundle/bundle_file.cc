@@ -31,7 +31,7 @@ void RejectBinary(const std::string& name, std::string_view beginning) {
                                               "\x28\xB5\x2F\xFD"};
   if (std::ranges::any_of(kCompressed, [&](auto magic) { return beginning.starts_with(magic); })) {
     FailFormat(name, "the file is compressed",
-               "text, as from zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
+               "uncompressed text, for example from zcat FILE | alidade bundle -");
   }
   if (beginning.find('\0') != beginning.npos)
     FailFormat(name, "the file is not text", "a problem of BAL, Bundler or libmv");
@@ -79,7 +79,8 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   }
   const std::size_t first = std::min(view.find('\n'), view.size());
   if (view.substr(0, first).find(',') != view.npos) {
-    FailFormat(name, "columns with commas: tracks need a calibration and initial poses",
+    FailFormat(name,
+               "the columns are separated by commas: tracks need a calibration and initial poses",
                "--camera FILE and --start FILE");
   }
   return internal::ReadBal(view, name);

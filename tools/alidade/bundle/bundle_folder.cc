@@ -49,7 +49,7 @@ std::string PointsCsv(const BundleFile& file) {
   return text;
 }
 
-/// Adds the numbers of items that were read but not used in the solution.
+/// Adds the counts of the items that were read but are not used in the solution.
 void AddExclusions(const BundleFile& file, internal::Json& json) {
   const BundleProblem& problem = file.problem;
   std::vector<bool> camera_used(problem.cameras.size()), point_used(problem.points.size());

@@ -13,16 +13,17 @@ namespace internal {
 class OutputFolder;
 }
 
-/// Output folder of a solution.
+/// Output folder of a bundle adjustment.
 ///
 ///   file         rows
-///   problem.EXT  adjusted problem in its own format: .txt, .out or .bin; omitted for tracks
-///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera;
-///                registered cameras only
+///   problem.EXT  adjusted problem in the format of the input; omitted for tracks. EXT is txt (bal),
+///                out (bundler) or bin (libmv)
+///   poses.tum    t x y z qx qy qz qw, world_from_cam, of registered cameras; t is the time in s or
+///                the number of the camera
 ///   points.csv   point,x,y,z
-///   bundle.json  result of AdjustBundle, and the numbers of excluded items
+///   bundle.json  result of AdjustBundle(), and the counts of excluded items
 ///
-/// The folder appears when all files are written. `force` replaces an existing folder. The
+/// The folder appears after all files have been written. `force` replaces an existing folder. The
 /// constructor reserves the path, so a conflict is reported before the problem is solved.
 class BundleFolder {
  public:
@@ -30,7 +31,7 @@ class BundleFolder {
   BundleFolder(const std::filesystem::path& folder, bool force);
   ~BundleFolder();
 
-  /// Writes the files and returns their names. Call it once. Errors: kCannotCreate, kIo.
+  /// Writes the files and returns their names. Call this function once. Errors: kCannotCreate, kIo.
   std::vector<std::string> Save(const BundleFile& file, const BundleResult& result,
                                 double rms_before, double rms_after);
 

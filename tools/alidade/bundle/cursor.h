@@ -11,8 +11,8 @@
 
 namespace alidade::internal {
 
-/// Reader of numbers separated by white space. A parameter `quantity` names the expected value in
-/// error messages, as in `a focal length`. Errors: kBadData with the position in the file.
+/// Reader of numbers separated by white space. The parameter `quantity` of a function is the name of
+/// the expected value in error messages, as in `a focal length`. Errors: kBadData with the position in the file.
 class BundleCursor {
  public:
   BundleCursor(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
@@ -53,7 +53,8 @@ class BundleCursor {
   void ExpectEnd(const char* quantity) {
     SkipBlanks();
     word_start_ = offset_;
-    if (offset_ < text_.size()) Fail("more numbers than the file announces", quantity);
+    if (offset_ < text_.size())
+      Fail("the file contains more numbers than its counts announce", quantity);
   }
   /// Skips the remainder of the line.
   void SkipLine() {

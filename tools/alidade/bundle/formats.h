@@ -6,7 +6,8 @@
 
 #include "alidade/bundle/bundle_file.h"
 
-/// Readers and writers of the formats. `text` is the whole file; `name` names it in messages.
+/// Readers and writers of the bundle formats. `text` is the whole file; `name` is the name of the
+/// file in messages.
 namespace alidade::internal {
 
 BundleFile ReadBal(std::string_view text, const std::string& name);
@@ -19,13 +20,14 @@ std::string LibmvBytes(const BundleFile& file);
 
 inline constexpr std::string_view kBundlerHeader = "# Bundle file v0.3";
 
-/// Converts x_cam = R(q) x_world + t to a camera. `looks_back`: the camera frame of q and t has y
-/// up and the camera looks along -z.
+/// Converts x_cam = R(q) x_world + t to a camera. If `looks_back`, the camera frame of q and t has y
+/// up, and the camera looks along -z.
 BundleCamera CameraFromTransform(const double* q, const double* t, bool looks_back);
 /// Computes q and t of a camera: the inverse of CameraFromTransform.
 void TransformFromCamera(const BundleCamera& camera, bool looks_back, double* q, double* t);
 
-/// Returns the numbers of camera i in the file if its pose has not changed since; else null.
+/// Returns the numbers of the pose of camera i in the file. Returns null if the pose has changed
+/// since the file was read.
 const double* UnmovedNumbers(const BundleFile& file, std::size_t i);
 
 }  // namespace alidade::internal

@@ -12,8 +12,8 @@
 namespace alidade {
 namespace {
 
-/// Reads the next row of `count` columns `names`, after an optional header `frame,...`. Returns
-/// false at the end.
+/// Reads the next row and checks that it has the `count` columns `names`. Skips a header that begins
+/// with `frame`. Returns false at the end of the file.
 bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
   const bool first = rows.line() == 0;
   if (!rows.Next() || (first && rows.text(0) == "frame" && !rows.Next())) return false;
@@ -21,10 +21,10 @@ bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
   return true;
 }
 
-/// Measurement of one feature in one frame: values by dim, and their line numbers in the file.
+/// Measurement of one feature in one frame: the value and the line number of each dim.
 struct TrackEntry {
   std::array<double, 4> z{};
-  std::array<int, 4> lines{};  ///< 0: no value
+  std::array<int, 4> lines{};  ///< line number of each value in the file; 0: no value
 };
 using Tracks = std::map<std::int64_t, std::map<std::int64_t, TrackEntry>>;  // frame, feature
 
@@ -37,8 +37,8 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
     TrackEntry& entry = tracks[rows.Index(0, "frame")][rows.Index(1, "feature")];
     const auto d = static_cast<std::size_t>(dim);
     if (entry.lines[d] != 0) {
-      rows.FailLine("the same frame, feature and dim as line " + std::to_string(entry.lines[d]),
-                    "one row each");
+      rows.FailLine("frame, feature and dim equal those of line " + std::to_string(entry.lines[d]),
+                    "one row for each frame, feature and dim");
     }
     entry.z[d] = rows.Number(3, "value");
     entry.lines[d] = rows.line();
@@ -80,7 +80,8 @@ Start ReadStart(const std::filesystem::path& path) {
   return start;
 }
 
-/// Finds the index of the pose of each frame. `times`: the file of timestamps, "" for none.
+/// Finds the index of the pose of each frame. `times` is the file of timestamps. If it does not
+/// exist, pose k belongs to frame k.
 std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& start,
                                             const std::filesystem::path& times) {
   std::map<std::int64_t, std::size_t> poses;
@@ -104,8 +105,8 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
   return poses;
 }
 
-/// Computes A^+ of a symmetric A >= 0. Eigenvalues up to `tolerance` times the largest count as
-/// zero.
+/// Computes the pseudo-inverse A^+ of a symmetric, positive semi-definite A. Eigenvalues up to
+/// `tolerance` times the largest eigenvalue count as zero.
 Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
   const auto [values, vectors] = internal::EigenOf(a);
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
@@ -120,7 +121,7 @@ Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
 ///
 ///   point = (sum W)^-1 sum W y,   W = (J J')^+
 ///
-/// A single camera contributes only across its ray. The weight of a stereo pair along the ray
+/// An observation of a single camera constrains the point only across the ray. The weight of a stereo pair along the ray
 /// decreases with the distance of y. Returns nullopt if the rays are almost parallel.
 std::optional<std::array<double, 3>> Triangulate(
     const SensorModel& sensor, const BundleProblem& problem,
@@ -153,8 +154,8 @@ std::optional<std::array<double, 3>> Triangulate(
   return point;
 }
 
-/// Creates the sensor of tracks from the camera file, so that errors name that file. Sets `text` to
-/// its YAML.
+/// Creates the sensor of a problem of tracks from the camera file. Errors name that file. Sets `text`
+/// to the YAML of the sensor.
 SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
   Config config = Config::FromFile(sources.camera);
@@ -219,8 +220,8 @@ BundleFile ReadBundleTracks(const BundleTracks& sources, const PluginHost& host)
   }
   if (problem.cameras.empty()) {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{sources.start.string()}, {}, "no pose has the time of a frame",
-                          "the times of timestamps.csv in the folder of the tracks"));
+                ErrorLine(Place{sources.start.string()}, {}, "no pose has the timestamp of a frame",
+                          "the timestamps of timestamps.csv in the folder of the tracks"));
   }
   return file;
 }

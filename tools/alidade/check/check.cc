@@ -21,7 +21,7 @@ using internal::ChildEnd;
 using internal::Context;
 using internal::NumberText;
 
-/// First characters of the child's answer: a set-up error, or a verdict.
+/// First character of the child's answer: kError for a set-up error, otherwise one of kVerdicts.
 constexpr char kError = 'E';
 constexpr char kVerdicts[] = {'+', '-', '0'};
 
@@ -37,13 +37,13 @@ Finding Decode(const std::string& answer) {
   return {static_cast<Finding::Verdict>(verdict - kVerdicts), "", answer.substr(1)};
 }
 
-/// Describes how the child ended, and in which call.
+/// Describes how the child ended, and names the call in which it ended.
 std::string EndText(const ChildEnd& end, const internal::CallRecord& record, double timeout_s) {
   const std::string state = record.state().empty() ? "" : " at " + record.state();
   if (end.timed_out) {
     const std::string place =
         record.call().empty() ? "before its first call" : "in " + record.call() + state;
-    return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it was " +
+    return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it ended " +
            place;
   }
   std::string text = record.call().empty() ? "the check" : record.call();
@@ -75,15 +75,16 @@ Finding RunCheck(const Check& check, const PluginEntry& entry, const Node& param
       end.answered ? Decode(end.text) : internal::Fail(EndText(end, record, options.timeout_s));
   if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
       !end.printed.empty()) {
-    finding = internal::Fail("the model prints, which would mix with the output of a run: '" +
+    finding = internal::Fail("the model prints text, which would mix with the output of a run: '" +
                              end.printed + "'");
   }
   const auto contains = [&](const char* words) {
     return finding.text.find(words) != std::string::npos;
   };
-  // A thread whose stack cannot be allocated throws the second error.
+  // The second text is that of a thread whose stack cannot be allocated.
   if (contains("std::bad_alloc") || contains("Resource temporarily unavailable")) {
-    finding.text += "; the limit is " + std::to_string(options.memory_mb) + " MB (--memory)";
+    finding.text +=
+        "; the limit of memory is " + std::to_string(options.memory_mb) + " MB (--memory)";
   }
   return finding;
 }

@@ -7,19 +7,21 @@
 
 #include "alidade/plugin/plugin_host.h"
 
-/// Checks that a plugin's models obey the rules of plugin_abi.h, in separate processes.
+/// Checks that the models of a plugin obey the rules of plugin_abi.h. Each check runs in a separate
+/// process.
 namespace alidade {
 
-/// Tested states and resource limits.
+/// Number of tested states, and resource limits.
 struct CheckOptions {
   std::uint64_t seed = 1;   ///< seed of the random states
-  int states = 48;          ///< number of random states; edge states are added
-  double timeout_s = 10.0;  ///< wall-clock time of one check
+  int states = 48;          ///< number of random states, in addition to the edge states
+  double timeout_s = 10.0;  ///< limit of the wall-clock time of one check
   int memory_mb = 1024;     ///< memory that the model may allocate
-  /// Order up to which Step must be additive in dt (2: Euler). 0: the order that the model
-  /// declares, or exactly if it declares none.
+  /// Step must be additive in dt up to an error of this order (2: Euler). 0: the order that the
+  /// model declares; if the model does not declare an order, Step must be exactly additive.
   int step_order = 0;
-  /// Accepts parameters that the model does not read, as in an entry of a run's config.
+  /// True: accepts parameters that the model does not read, such as the keys of a sensor entry that
+  /// concern the estimator.
   bool allows_unread_keys = false;
 };
 
@@ -27,8 +29,8 @@ struct CheckOptions {
 struct Finding {
   enum class Verdict { kOk, kFail, kSkipped };
   Verdict verdict = Verdict::kSkipped;
-  std::string check;  ///< `jacobian`
-  std::string text;   ///< result of the check; for a failure the call, the state and the numbers
+  std::string check;  ///< name of the check, as in `jacobian`
+  std::string text;   ///< result; a failure reports the call, the state and the numbers
 };
 
 /// Checks the model that `entry` creates from `parameters`. Each check runs in a child process with
@@ -37,9 +39,9 @@ struct Finding {
 std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
                                 const CheckOptions& options = {});
 
-/// Finds the sensors and motion models of `plugin`: a file, the name of a file on the search path
-/// without `alidade_` and `.so`, or the name of a model. `model` selects one of them by name; "":
-/// all. Errors: kPlugin if there is no such model.
+/// Finds sensors and motion models. `plugin` is a file, the name of a file on the search path without
+/// `alidade_` and `.so`, or the name of a model. If `model` is not empty, only the model of that name
+/// is returned. Error: kPlugin if no model matches.
 std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& plugin,
                                     const std::string& model = "");
 

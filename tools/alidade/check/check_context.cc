@@ -9,9 +9,10 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kLarge = 1e6;  // the largest edge of RandomStates
+constexpr double kLarge = 1e6;  // largest element of an edge state, see RandomStates()
 
-/// Returns true if a value is infinite at a large state, which is not an error of the model.
+/// Returns true if an output is infinite at a state with a large element. This overflow is not an
+/// error of the model.
 bool Overflows(const CheckedState& state, const Answer& answer) {
   bool large = false, infinite = false;
   for (const auto& value : state.values) {
@@ -55,7 +56,7 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
-  std::string thrown;  // the host reports an exception of a destructor as a warning only
+  std::string thrown;  // the host only logs a warning if a destructor throws
   record_.Enter("destroy");
   {
     const auto record_text = [&](LogLevel, std::string_view text) { thrown = text; };

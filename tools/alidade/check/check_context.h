@@ -9,17 +9,17 @@
 #include "alidade/check/child_process.h"
 #include "alidade/check/model_under_test.h"
 
-/// Checks of `alidade check`, one function each.
+/// Checks of `alidade check`: one function for each check.
 namespace alidade::internal {
 
-/// Values of all slots of a model. If `defined`, Predict or Step is defined at the state, and the
-/// measurement slot of a sensor contains the result of Predict.
+/// Tested state: the values of all slots of a model. If Predict is defined, the measurement slot of a
+/// sensor contains the result of Predict.
 struct CheckedState {
   Values values;
-  bool defined = false;
+  bool defined = false;  ///< true: Predict or Step is defined at the state
 };
 
-/// The model under test and its states, in the child process of a check.
+/// Context of a check in the child process: the model under test and its states.
 class Context {
  public:
   Context(const PluginEntry& entry, const Node& parameters, const CheckOptions& options,
@@ -41,7 +41,7 @@ class Context {
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
-  /// Destroys `model` and records this as a call. Error: kPlugin if the destruction throws.
+  /// Destroys `model` and records the destruction as a call. Error: kPlugin if the destruction throws.
   void Destroy(std::unique_ptr<ModelUnderTest> model) const;
   /// Returns the inputs of `f` at a state.
   static Values Inputs(const Function& f, const CheckedState& state);
@@ -73,10 +73,10 @@ inline Finding Skip(std::string text) { return {Finding::Verdict::kSkipped, "", 
 struct Check {
   const char* name;
   Finding (*run)(Context&);
-  bool needed;  ///< all later checks depend on it
+  bool needed;  ///< true: if this check fails, all later checks are skipped
 };
 
-// Rules of the plugin ABI.
+// Checks of the rules of the plugin ABI.
 Finding CheckCreate(Context& context);
 Finding CheckCalls(Context& context);
 Finding CheckBounds(Context& context);
@@ -86,7 +86,7 @@ Finding CheckPure(Context& context);
 Finding CheckOutputs(Context& context);
 Finding CheckFailure(Context& context);
 Finding CheckLeaks(Context& context);
-// Mathematics.
+// Checks of the mathematics.
 Finding CheckSameValue(Context& context);
 Finding CheckJacobian(Context& context);
 Finding CheckNoise(Context& context);

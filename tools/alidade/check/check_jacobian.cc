@@ -7,14 +7,16 @@
 #include "alidade/check/check_values.h"
 #include "alidade/check/derivative.h"
 
-/// Checks of Jacobians: they agree with differences, and requesting them does not change a value.
+/// Checks of Jacobians. Jacobians must agree with numeric differences. A request for Jacobians must
+/// not change a value.
 namespace alidade::internal {
 namespace {
 
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-/// Describes a difference of two answers beyond rounding error; "" if they agree.
+/// Describes the difference between two answers if it exceeds the rounding error. Otherwise returns
+/// "".
 std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
   if (a.code != b.code) {
     return "status " + std::to_string(a.code) + " and " + std::to_string(b.code);
@@ -26,18 +28,18 @@ std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, con
   return StateText(f.outputs, x) + ", " + RoundedText(distance) + " apart";
 }
 
-/// An entry of the model's Jacobian and the numeric derivative.
+/// One entry of a Jacobian: the value from the model and the numeric derivative.
 struct Entry {
   double model = 0.0, numeric = 0.0;
   Eigen::Index row = 0;
-  bool is_judged = false;  ///< the numeric derivative is accurate enough to compare with
+  bool is_judged = false;  ///< true: the numeric derivative is accurate enough for a comparison
   bool is_wrong = false;
   double Distance() const {
     return std::abs(model - numeric) / std::max(std::abs(model), std::abs(numeric));
   }
 };
 
-/// Compares the Jacobian of a function at one state with differences.
+/// Comparison of the Jacobian of a function at one state with numeric differences.
 class JacobianTest {
  public:
   JacobianTest(const Context& context, const Function& f, const Values& inputs)
@@ -50,7 +52,7 @@ class JacobianTest {
   }
   bool defined() const { return defined_; }
 
-  /// Compares the column of tangent element `k` of input `i`, column `column` of the Jacobian.
+  /// Compares column `column` of the Jacobian, which belongs to tangent element `k` of input `i`.
   std::vector<Entry> Column(std::size_t i, int k, Eigen::Index column) const {
     double h = 0.1;
     Input(i).geometry.ForEachPart([&](const Geometry& part, int a, int t) {
@@ -61,7 +63,8 @@ class JacobianTest {
     constexpr int kMaxLengths = 6;
     std::vector<Entry> entries;
     // Shorten a step that leaves the domain, crosses a kink, or spans several periods of the
-    // function, in which case differences agree on its mean slope.
+    // function. Over several periods, the differences agree on the mean slope, which is not the
+    // derivative.
     for (int tries = 0, lengths = 0; tries < 40 && h > 1e-12; ++tries) {
       const auto derivative = Differentiate(curve, h);
       if (derivative) {
@@ -114,7 +117,7 @@ class JacobianTest {
   Values centre_;
 };
 
-/// Results of CheckJacobian so far.
+/// Intermediate results of CheckJacobian().
 struct JacobianTally {
   long judged = 0;     ///< number of compared entries
   double worst = 0.0;  ///< relative distance of the worst wrong entry
@@ -146,13 +149,14 @@ void TestJacobian(const Context& context, const Function& f, const CheckedState&
   }
 }
 
-/// Returns a text such as `Predict: analytic Jacobian, Initialise: automatic differentiation`.
+/// Returns the kind of each Jacobian, as in
+/// `Predict: analytic Jacobian, Initialise: automatic differentiation`.
 std::string KindsText(const ModelUnderTest& model) {
   const bool analytic = (model.instance->capabilities() & ALIDADE_ANALYTIC_JACOBIAN) != 0;
   std::string text;
   for (const Function& f : model.functions) {
     if (f.differentiated == 0) continue;
-    const bool is_analytic = analytic && f.name != "Initialise";  // always differentiated
+    const bool is_analytic = analytic && f.name != "Initialise";  // differentiated automatically
     text += (text.empty() ? "" : ", ") + f.name +
             (is_analytic ? ": analytic Jacobian" : ": automatic differentiation");
   }
@@ -174,7 +178,7 @@ Finding CheckSameValue(Context& context) {
         if (defect.empty()) continue;
         return Fail(context.CallText(f, state) +
                     ": the value with all Jacobians differs from the value with " +
-                    (matrix == kNoMatrix ? "none: " : "only one: ") + defect);
+                    (matrix == kNoMatrix ? "no Jacobian: " : "only one Jacobian: ") + defect);
       }
     }
   }

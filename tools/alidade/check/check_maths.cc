@@ -9,7 +9,7 @@
 #include "alidade/check/check_values.h"
 #include "alidade/state/dense_algebra.h"
 
-/// Checks of the mathematics other than Jacobians: noise, rotations, inverse model, time.
+/// Checks of the mathematics other than Jacobians: noise, rotations, inverse model, steps in time.
 namespace alidade::internal {
 namespace {
 
@@ -21,10 +21,10 @@ constexpr double kRounding = 1e-9;
 
 /// Largest deviation of a value from its expected value, relative to the tolerance.
 struct WorstDeviation {
-  double ratio = 1.0;  ///< a deviation beyond this is a failure
+  double ratio = 1.0;  ///< largest deviation / tolerance so far; at least 1
   std::string failure;
 
-  /// Calls `text` only for a failure.
+  /// Records a failure if the deviation is the largest so far. `text` describes the failure.
   template <class Text>
   void Add(double distance, double tolerance, const Text& text) {
     if (!(distance > tolerance * ratio)) return;
@@ -45,10 +45,11 @@ std::string DefectOfR(const MatrixXd& l, const Space& z) {
   const MatrixXd correlation = scale.asDiagonal() * r * scale.asDiagonal();
   const double smallest = EigenvaluesOf(correlation)[0];
   if (smallest > 1e-12) return {};
-  return "R is singular: smallest eigenvalue of its correlations " + RoundedText(smallest);
+  return "R is singular: the smallest eigenvalue of the correlation matrix is " +
+         RoundedText(smallest);
 }
 
-/// Computes a step over dt from `blocks` without noise; nullopt if it is not defined.
+/// Computes a step over dt from `blocks` without noise. Returns nullopt if the step is not defined.
 std::optional<Values> StepOver(const Context& context, const Function& f, Values inputs,
                                const Values& blocks, double dt_s) {
   std::copy(blocks.begin(), blocks.end(), inputs.begin());
@@ -60,7 +61,7 @@ std::optional<Values> StepOver(const Context& context, const Function& f, Values
   return OutputValues(answer);
 }
 
-/// Difference between one step over dt and two steps over its parts.
+/// Difference between the results of one step over dt and of two steps over two parts of dt.
 struct Additivity {
   double defect = 0.0, size = 0.0;
   Eigen::Index row = 0;  ///< tangent element with the largest difference
@@ -80,7 +81,7 @@ std::optional<Additivity> TestAdditivity(const Context& context, const Function&
   return result;
 }
 
-/// Estimates p in defect ~ dt^p, from steps of 20 ms and 10 ms.
+/// Estimates the order p in defect ~ dt^p from steps of 20 ms and 10 ms.
 double OrderOf(const Context& context, const Function& f, const Values& inputs,
                const Values& blocks) {
   const auto coarse = TestAdditivity(context, f, inputs, blocks, 0.02);
@@ -88,7 +89,7 @@ double OrderOf(const Context& context, const Function& f, const Values& inputs,
   return coarse && fine ? std::log2(coarse->defect / fine->defect) : 0.0;
 }
 
-/// A step without noise: x', F, and N = G Lq.
+/// Result of a step with w = 0: x', F and N = G Lq.
 struct NoisyStep {
   Values next;
   MatrixXd f, n;
@@ -111,10 +112,10 @@ std::optional<NoisyStep> StepWithNoise(const Context& context, Values inputs, co
                    ToMatrix(step.matrices[1]) * ToMatrix(noise.matrices[0])};
 }
 
-/// Relative difference between the noise covariance over two parts of dt and that over dt.
+/// Relative difference between the noise covariances over two parts of dt and over the whole dt.
 struct PartsDefect {
-  double discrete = 0.0;    ///< for the same w in both parts
-  double continuous = 0.0;  ///< for an independent w in each part
+  double discrete = 0.0;    ///< if both parts have the same w
+  double continuous = 0.0;  ///< if each part has an independent w
 };
 
 std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& inputs,
@@ -135,7 +136,7 @@ std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& i
   return PartsDefect{(discrete - q).norm() / q.norm(), (continuous - q).norm() / q.norm()};
 }
 
-/// Estimates the limit for dt -> 0, which removes the integration error.
+/// Estimates the limit of DefectOfParts() for dt -> 0, at which the integration error vanishes.
 std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedState& state) {
   const Values inputs = Context::Inputs(context.main(), state);
   const Values blocks(inputs.begin(),
@@ -154,8 +155,9 @@ std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedSta
 /// Describes the remedy for noise that is not of the declared kind.
 std::string NoiseKindRemedy(bool discrete, bool other_fits) {
   if (!other_fits) {
-    return "its noise depends on the number of steps. Discrete noise, such as an acceleration, is "
-           "constant over dt, and its Lq does not depend on dt; continuous noise has "
+    return "its noise is neither discrete nor continuous. Discrete noise, such as an acceleration, "
+           "is "
+           "constant over dt, and Lq does not depend on dt. Continuous noise satisfies "
            "Q(dt) = F Q(dt_1) F' + Q(dt_2)";
   }
   return discrete ? "the noise adds up over the parts: omit noise_kind(), or return "
@@ -164,13 +166,13 @@ std::string NoiseKindRemedy(bool discrete, bool other_fits) {
                     "const { return NoiseKind::kDiscrete; }`, or let Q grow with dt";
 }
 
-/// Compares f for q and -q, the quaternion at `offset` of its input i.
+/// Compares the results of f for q and -q, with q the quaternion at `offset` of input i.
 void CompareCovers(Context& context, const Function& f, std::size_t i, int offset,
                    WorstDeviation& worst) {
   const std::string& name = context.model().slots[static_cast<std::size_t>(f.slots[i])].name;
   for (const CheckedState& state : context.states()) {
     Values negated = Context::Inputs(f, state);
-    // For a half turn, the sign of zero determines the sign of the logarithm.
+    // Skip a half turn: there, the sign of a zero determines the sign of the logarithm.
     if (negated[i].empty() || negated[i][static_cast<std::size_t>(offset)] == 0.0) continue;
     for (double& element : std::span(negated[i]).subspan(offset, 4)) element = -element;
     const Answer a = context.Call(f, state), b = context.CallWith(f, negated, kAllMatrices);
@@ -293,27 +295,27 @@ Finding CheckStep(Context& context) {
     const double previous_ratio = additive.ratio;
     additive.Add(split->defect, kRounding * split->size, [&] {
       return context.CallText(f, state) +
-             ", w = 0: one step over dt and two steps over its parts end " +
-             RoundedText(split->defect) + " apart in " +
-             names[static_cast<std::size_t>(split->row)];
+             ", w = 0: one step over dt and two steps over two parts of dt differ by " +
+             RoundedText(split->defect) + " in " + names[static_cast<std::size_t>(split->row)];
     });
     if (additive.ratio > previous_ratio) order = OrderOf(context, f, inputs, blocks);
   }
   if (!identity.failure.empty()) return Fail(identity.failure);
-  if (additive.failure.empty()) return Ok("additive in dt, and the identity for dt = 0");
+  if (additive.failure.empty()) return Ok("Step is additive in dt, and is the identity for dt = 0");
   const int option = context.options().step_order;
   const int expected = option > 0 ? option : context.model().instance->step_order();
   if (expected > 0 && order > expected - 0.2) {
-    return Ok("additive in dt to order " + RoundedText(order, 2) + ", and the identity for dt = 0");
+    return Ok("Step is additive in dt to order " + RoundedText(order, 2) +
+              ", and is the identity for dt = 0");
   }
-  return Fail(additive.failure + "; the error is of order " + RoundedText(order, 2) + " in dt" +
-              (expected > 0 ? ", not " + std::to_string(expected) : "") +
+  return Fail(additive.failure + "; the difference is of order " + RoundedText(order, 2) +
+              " in dt" + (expected > 0 ? ", not " + std::to_string(expected) : "") +
               ". If the model is a discretisation of order N, declare `static constexpr int "
               "kStepOrder = N;`, or pass --step-order N");
 }
 
-// The defect of a wrong kind is at least 0.47 for every dt; that of the right kind vanishes with
-// dt.
+// If the declared kind is wrong, the defect is at least 0.47 for every dt. If it is correct, the
+// defect vanishes for dt -> 0.
 Finding CheckNoiseKind(Context& context) {
   constexpr double kMaxDefect = 0.1;
   if (context.model().is_sensor()) return Skip("not a motion model");

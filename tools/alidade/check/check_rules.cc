@@ -19,8 +19,8 @@ extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 namespace alidade::internal {
 namespace {
 
-/// Calls `test(function, state)` for all functions at all states, noise functions at defined states
-/// only. Returns the first failure, or "".
+/// Calls `test(function, state)` for each function at each state. A noise function is tested only at
+/// defined states. Returns the first failure, or "" if no test fails.
 template <class Test>
 std::string FirstFailure(Context& context, const Test& test) {
   for (const Function& f : context.model().functions) {
@@ -38,7 +38,7 @@ Finding ToFinding(const std::string& failure, const std::string& success_text) {
 
 std::string Count(Context& context) { return std::to_string(context.states().size()) + " states"; }
 
-/// Describes an invalid return code of `f`; "" if the code is valid.
+/// Describes an invalid return code of `f`. Returns "" if the code is valid.
 std::string CodeDefect(const Context& context, const Function& f, std::int32_t code) {
   if (code == ALIDADE_ERROR) {
     const std::string text = [&] {
@@ -50,7 +50,7 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
   const bool may_refuse = f.name == "Valid" || f.name == "Initialise";
   if (code == ALIDADE_OK || (code == ALIDADE_INVALID && may_refuse)) return {};
   if (code == ALIDADE_OUT_OF_DOMAIN && f.name != "Valid") {
-    return f.is_noise ? "is out of domain although " + context.main().name + " is not" : "";
+    return f.is_noise ? "is out of domain, although " + context.main().name + " is defined" : "";
   }
   return "returned " + std::to_string(code) + ", which is not a valid status of this function";
 }
@@ -62,7 +62,7 @@ struct NumberSettings {
   locale_t thread_locale = uselocale(nullptr);
 };
 
-/// Describes a changed setting; "" if none has changed.
+/// Describes the setting that has changed. Returns "" if no setting has changed.
 std::string ChangeBetween(const NumberSettings& previous, const NumberSettings& current) {
   if (current.rounding != previous.rounding) return "changed the rounding mode";
   if (current.locale != previous.locale || current.thread_locale != previous.thread_locale) {
@@ -89,13 +89,13 @@ int OpenDescriptors() {
   return count;
 }
 
-/// Describes the defect of one output number of a model; "" if it is valid.
+/// Describes the defect of one number that a model has returned. Returns "" if the number is valid.
 std::string CellDefect(double cell) {
   if (Unwritten(cell)) return "is not written";
   return std::isfinite(cell) ? "" : "is " + NumberText(cell);
 }
 
-/// Describes the first defect of the values of an answer; "" if they are valid.
+/// Describes the first defect of the values of an answer. Returns "" if the values are valid.
 std::string ValueDefect(const Function& f, const Answer& answer) {
   for (std::size_t i = 0; i < f.outputs.size(); ++i) {
     const Space& space = f.outputs[i];
@@ -113,12 +113,12 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
   return {};
 }
 
-/// Describes the first defect of the Jacobians of an answer; "" if they are valid.
+/// Describes the first defect of the Jacobians of an answer. Returns "" if they are valid.
 std::string JacobianDefect(const Function& f, const CheckedState& state, const Answer& answer) {
   for (std::size_t i = 0; i < answer.matrices.size(); ++i) {
     const Buffer& j = answer.matrices[i];
     if (f.jacobian_per_input() && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
-      continue;  // Jacobian by an unbound role
+      continue;  // an unbound role has no Jacobian
     }
     for (int cell = 0; cell < j.rows() * j.columns(); ++cell) {
       const int r = cell / j.columns(), c = cell % j.columns();
@@ -150,7 +150,8 @@ Finding CheckCalls(Context& context) {
   if (!failure.empty()) return Fail(failure);
   const std::string text =
       context.main().name + " is defined at " + std::to_string(defined) + " of " + Count(context);
-  if (defined == 0) return Fail(text + ", so nothing can be checked; --states N tests more states");
+  if (defined == 0)
+    return Fail(text + ", so the model cannot be checked; use --states N to test more states");
   return Ok(text);
 }
 
@@ -169,12 +170,12 @@ Finding CheckBounds(Context& context) {
             const std::string output = buffers == &answer.outputs ? f.outputs[i].name
                                        : f.is_noise               ? "factor"
                                                                   : "Jacobian " + std::to_string(i);
-            return context.CallText(f, state) + ": writes outside its buffer of " + output;
+            return context.CallText(f, state) + ": writes outside the buffer of " + output;
           }
         }
         return std::string();
       });
-  return ToFinding(failure, "writes nothing but its outputs");
+  return ToFinding(failure, "each function writes only to its outputs");
 }
 
 Finding CheckEnvironment(Context& context) {
@@ -201,7 +202,9 @@ Finding CheckDeterministic(Context& context) {
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         static_cast<void>(context.Call(f, state));
         const Answer second = context.Call(f, state), third = context.Call(f, state);
-        return second == third ? "" : context.CallText(f, state) + ": two consecutive calls differ";
+        return second == third ? ""
+                               : context.CallText(f, state) +
+                                     ": two consecutive calls return different results";
       });
   return ToFinding(failure, "consecutive calls return the same bits");
 }
@@ -213,7 +216,7 @@ Finding CheckPure(Context& context) {
     return std::string();
   };
   static_cast<void>(FirstFailure(context, record_answer));
-  // Repeat the calls in reverse order, first with an instance that has not been called before.
+  // Repeat the calls in reverse order, first with a new instance, then with the same instance.
   std::unique_ptr<ModelUnderTest> second_instance = context.Create();
   std::string failure;
   for (const ModelUnderTest* model :
@@ -225,18 +228,18 @@ Finding CheckPure(Context& context) {
         const CheckedState& state = context.states()[s];
         if (f.is_noise && !state.defined) continue;
         if (context.Call(f, state) == first[--k]) continue;
-        failure = context.CallText(f, state) + ": depends on earlier calls";
+        failure = context.CallText(f, state) + ": the result depends on earlier calls";
       }
     }
   }
   context.Destroy(std::move(second_instance));
-  return ToFinding(failure, "independent of earlier calls and other instances");
+  return ToFinding(failure, "results do not depend on earlier calls or other instances");
 }
 
 Finding CheckOutputs(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
-        if (f.is_noise) return std::string();  // tested by check `noise`
+        if (f.is_noise) return std::string();  // the check `noise` tests these functions
         const Answer full = context.Call(f, state), value = context.Call(f, state, kNoMatrix);
         std::string defect;
         if (value.ok()) defect = ValueDefect(f, value);
@@ -244,7 +247,7 @@ Finding CheckOutputs(Context& context) {
         if (defect.empty() && full.ok()) defect = JacobianDefect(f, state, full);
         return defect.empty() ? defect : context.CallText(f, state) + ": " + defect;
       });
-  return ToFinding(failure, "all outputs are written, finite and on their geometries");
+  return ToFinding(failure, "all outputs are written, finite and valid points of their geometry");
 }
 
 Finding CheckFailure(Context& context) {
@@ -267,7 +270,8 @@ Finding CheckFailure(Context& context) {
 }
 
 Finding CheckLeaks(Context& context) {
-  // The allocator retains a limited amount of freed memory; a leak grows in every part.
+  // The allocator retains a limited amount of freed memory, so the heap grows in some parts of the
+  // test without a leak. With a leak, it grows in every part.
   constexpr int kWarmUp = 5, kRounds = 100, kParts = 10;
   const auto find_leak = [&](const std::string& call, const auto& round) -> std::string {
     for (int i = 0; i < kWarmUp; ++i) round();
@@ -290,7 +294,7 @@ Finding CheckLeaks(Context& context) {
     if (!failure.empty() || defined == states.end()) break;
     failure = find_leak(f.name, [&] { static_cast<void>(context.Call(f, *defined)); });
   }
-  return ToFinding(failure, "memory and open files do not grow");
+  return ToFinding(failure, "allocated memory and number of open files do not grow");
 }
 
 }  // namespace alidade::internal

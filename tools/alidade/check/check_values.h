@@ -10,12 +10,12 @@
 /// Conversions of values, their differences and Jacobians to Eigen.
 namespace alidade::internal {
 
-/// Returns the largest magnitude.
+/// Returns the largest magnitude of all elements.
 double Largest(const Values& values);
 
 Values OutputValues(const Answer& answer);
 
-/// Computes a (-) b, with all spaces stacked.
+/// Computes a (-) b of each space, and stacks the results.
 Eigen::ArrayXd Difference(const std::vector<Space>& spaces, const Values& a, const Values& b);
 
 Eigen::MatrixXd ToMatrix(const Buffer& buffer);

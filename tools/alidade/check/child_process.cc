@@ -64,7 +64,7 @@ rlim_t AddressSpace() {
   return pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// Runs `work` in the child and sends the answer, zero-terminated so that truncation is detectable.
+/// Runs `work` in the child and sends the answer. A final zero byte marks the answer as complete.
 [[noreturn]] void RunChild(const ChildLimits& limits, pid_t parent, const Pipe& answer,
                            const Pipe& output, const std::function<std::string()>& work) noexcept {
   setpgid(0, 0);
@@ -88,7 +88,7 @@ rlim_t AddressSpace() {
   _exit(0);
 }
 
-/// Reads until a zero or the end of the pipe. Returns false after the deadline.
+/// Reads up to a zero byte or the end of the pipe. Returns false if the deadline has passed.
 bool ReadAnswer(int pipe_end, Clock::time_point deadline, std::string& text) {
   char buffer[4096];
   while (text.empty() || text.back() != '\0') {
@@ -126,7 +126,7 @@ CallRecord::CallRecord() {
   void* const memory =
       mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED)
-    throw Error(ExitCode::kInternal, "out of memory shared with a child process");
+    throw Error(ExitCode::kInternal, "cannot allocate memory that is shared with a child process");
   shared_ = new (memory) Shared();
 }
 
@@ -157,7 +157,7 @@ ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  kill(-child, SIGKILL);  // processes that the child has started
+  kill(-child, SIGKILL);  // kills the processes that the child has started
   end.answered = !text.empty() && text.back() == '\0';
   if (end.answered) {
     end.text = text.substr(0, text.size() - 1);

@@ -4,11 +4,12 @@
 #include <functional>
 #include <string>
 
-/// Runs work in a child process, so that it may crash, exit, hang or exhaust memory.
+/// Runs a function in a child process. If the function crashes, exits, hangs or exhausts memory, the
+/// program continues.
 namespace alidade::internal {
 
-/// The current call of a child process, in memory that it shares with its parent: if the child
-/// dies, the parent reports this call.
+/// Current call of a child process, stored in memory that is shared with the parent process. If the
+/// child dies, the parent reports this call.
 class CallRecord {
  public:
   /// Error: kInternal.
@@ -17,7 +18,7 @@ class CallRecord {
   CallRecord(const CallRecord&) = delete;
   CallRecord& operator=(const CallRecord&) = delete;
 
-  /// Records the current call and its state, both truncated if they are too long.
+  /// Records the name and the state of the current call. Long texts are truncated.
   void Enter(const char* call, const std::string& state = {});
   std::string call() const { return shared_->call; }
   std::string state() const { return shared_->state; }
@@ -31,20 +32,21 @@ class CallRecord {
 
 struct ChildLimits {
   double timeout_s = 10.0;
-  int memory_mb = 0;  ///< in addition to the present memory of the program; 0: no limit
+  int memory_mb = 0;  ///< limit, in addition to the memory already in use; 0: no limit
 };
 
 struct ChildEnd {
   bool answered = false;
   bool timed_out = false;  ///< killed because it exceeded the time limit
-  /// The answer, or how the child ended: `crashed (signal 11, Segmentation fault)`.
+  /// The answer. If the child did not answer, a description of its end, as in
+  /// `crashed (signal 11, Segmentation fault)`.
   std::string text;
-  std::string printed;  ///< first line of its output, truncated
+  std::string printed;  ///< first line that the child printed, truncated
 };
 
-/// Runs `work` in a child process and returns its answer. The child has the default signal
-/// handlers and its own process group, which is killed when the child exceeds `limits` or ends.
-/// Its output is captured and core dumps are disabled.
+/// Runs `work` in a child process and returns its answer. The child has the default signal handlers
+/// and its own process group. The group is killed when the child ends or exceeds `limits`. The
+/// output of the child is captured, and core dumps are disabled.
 ChildEnd RunInChild(const ChildLimits& limits, const std::function<std::string()>& work);
 
 }  // namespace alidade::internal

@@ -10,7 +10,7 @@ std::optional<Derivative> Differentiate(const Curve& y, double h) {
   constexpr int kSteps = 10;
   constexpr double kShrink = 1.4;
   Derivative best;
-  // Rows of the tableau; column j is of order h^(2 j + 2).
+  // Rows of the extrapolation tableau. The error of column j is of order h^(2 j + 2).
   std::vector<Eigen::ArrayXd> previous_row, row;
   for (int i = 0; i < kSteps; ++i, h /= kShrink) {
     const auto forward = y(h), backward = y(-h);

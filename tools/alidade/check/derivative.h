@@ -12,12 +12,12 @@ struct Derivative {
   Eigen::ArrayXd value, error;
 };
 
-/// t -> y(t), or nullopt if y is not defined at t.
+/// Function y(t). Returns nullopt if y is not defined at t.
 using Curve = std::function<std::optional<Eigen::ArrayXd>(double t)>;
 
 /// Computes dy/dt at t = 0 from central differences with steps h, h/1.4, h/1.4^2, ... extrapolated
-/// to step 0 (Richardson). Each element is the tableau entry with the smallest change
-/// [Ridders1982]. Returns nullopt if y is not defined at one of the steps.
+/// to step 0 (Richardson). Each element of the result is the tableau entry with the smallest error
+/// estimate [Ridders1982]. Returns nullopt if y is not defined at one of the steps.
 std::optional<Derivative> Differentiate(const Curve& y, double h);
 
 /// Smallest step of Differentiate, as a fraction of h.

@@ -40,7 +40,8 @@ const char* StatusText(BlockStatus status) {
   return "constant";
 }
 
-/// Formats values as a list. A single value, or with `merge_equal` equal values, become one number.
+/// Formats values as a list. A single value is formatted as a number. With `merge_equal`, equal
+/// values are formatted as one number.
 std::string ListText(const std::vector<double>& values, bool merge_equal = false) {
   const bool equal = std::equal(values.begin() + 1, values.end(), values.begin());
   if (values.size() == 1 || (merge_equal && equal)) return NumberText(values[0]);
@@ -68,7 +69,8 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + SigmasText(prior.covariance);
 }
 
-/// Lists the blocks, explains `constant`, and states for each unused truth why it is unused.
+/// Returns a table of the blocks, followed by an explanation of `constant` and by a line for each
+/// unused truth with the reason.
 std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& truths) {
   const std::vector<int> block_truths = internal::MatchTruths(problem.layout, truths);
   std::vector<TextRow> rows = {
@@ -91,7 +93,7 @@ std::string StateTable(const Problem& problem, const std::vector<StreamInfo>& tr
   std::string text = TextTable(rows, kIndent);
   const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kConstant; };
   if (std::ranges::any_of(problem.layout.blocks(), is_fixed)) {
-    text += "    constant: known exactly, without covariance; never changes\n";
+    text += "    constant: the value is known exactly and never changes; it has no covariance\n";
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const std::string reason = internal::WhyNoBlock(problem.layout, truths, t);
@@ -109,7 +111,8 @@ std::string InputText(const MotionBinding& motion) {
                                          : "");
 }
 
-/// Returns a line for a state or sensor entry whose noise is a covariance in the config; else "".
+/// Returns a line for a state or sensor entry whose noise is a covariance in the config. Otherwise
+/// returns "".
 std::string ConfigNoise(const std::string& name, const std::vector<double>& root, int size) {
   if (root.empty()) return "";
   const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
@@ -185,7 +188,8 @@ const char* EffectText(const Block& block, RoleMode mode) {
   return considers ? "considers" : "corrects";
 }
 
-/// Returns a table of effects: a row for each block, a column for each motion entry and sensor.
+/// Returns a table of effects with a row for each block and a column for each motion entry and
+/// sensor.
 std::string EffectTable(const Problem& problem) {
   std::vector<TextRow> rows(1 + problem.layout.blocks().size());
   rows[0].push_back("block");
@@ -214,7 +218,7 @@ std::string EffectTable(const Problem& problem) {
   return TextTable(rows, kIndent);
 }
 
-/// Returns a text such as "target.depth together with target.depth_rate".
+/// Returns the names of a direction, as in `target.depth together with target.depth_rate`.
 std::string DirectionText(const std::vector<std::string>& names) {
   const std::string other_names = Join({names.begin() + 1, names.end()});
   return names[0] + (other_names.empty() ? "" : " together with " + other_names);
@@ -250,9 +254,8 @@ std::string Unobservable(const Problem& problem) {
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=
-          "    scale, of trajectory and map alike, is determined by the prior alone; depth, a "
-          "stereo "
-          "pair,\n    odometry or known landmarks would make it observable\n";
+          "    the prior alone determines the scale of trajectory and map; depth, a stereo pair,\n"
+          "    odometry or known landmarks would make the scale observable\n";
     }
   }
   return text + NeedExcitation(problem, unobservable);
@@ -285,20 +288,23 @@ std::string CapabilitiesText(const std::string& type) {
          (unsupported.empty() ? "" : "\n    Not supported: " + unsupported + '.') + '\n';
 }
 
-/// Describes the treatment of out-of-sequence frames; "" for the default.
+/// Describes the treatment of out-of-sequence frames. Returns "" for the default treatment.
 std::string OutOfSequenceText(const OutOfSequencePolicy& handling) {
   if (handling.policy == OutOfSequence::kReject) return "";
   const bool buffer = handling.policy == OutOfSequence::kBuffer;
-  const char* const action = buffer ? "buffer: frames are delayed"
-                                    : "rollback: the estimators go back and process them in order";
+  const char* const action =
+      buffer
+          ? "buffer: frames are delayed"
+          : "rollback: the estimators return to an earlier state and process all frames in order";
   return std::string("  out-of-sequence frames: ") + action +
          (handling.window ? ", up to " + internal::RoundedText(Seconds(*handling.window), 6) +
-                                " s behind the newest"
+                                " s behind the newest frame"
                           : " to the end of the run") +
          '\n';
 }
 
-/// Appends a row of key, value and position for each parameter of the calibration of the data.
+/// Appends a row for each parameter in the calibration of the data: key, value and position in the
+/// file.
 void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow>& rows) {
   for (const auto& [name, value] : map.Entries()) {
     const std::string path = key.empty() ? name : key + '.' + name;

@@ -23,8 +23,8 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
     std::string prior = "inverse distance " + NumberText(options.prior->inverse_distance) + " +- " +
                         NumberText(options.prior->sigma) + " 1/m";
     if (const int n = options.prior->adapt_after; n > 0) {
-      prior += "; the median of the landmarks in view, once " + std::to_string(n) +
-               " of them have converged";
+      prior += "; replaced by the median of the landmarks in view after " + std::to_string(n) +
+               " of these have converged";
     }
     if (const int n = options.prior->min_observations; n > 0) {
       prior += "; applied at observation " + std::to_string(n);
@@ -35,7 +35,8 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
                                ? "at first observation"
                                : "at observation " + std::to_string(options.min_observations);
   if (options.max_per_frame < LandmarkOptions::kUnlimited) {
-    initialise += ", while fewer than " + std::to_string(options.max_per_frame) + " are measured";
+    initialise +=
+        ", if fewer than " + std::to_string(options.max_per_frame) + " landmarks are measured";
   }
   add("initialise", initialise);
   std::vector<std::string> prune;
@@ -44,7 +45,7 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
   }
   if (options.min_match_ratio > 0.0) {
     prune.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
-                    std::to_string(options.min_attempts) + " or more measurements accepted");
+                    std::to_string(options.min_attempts) + " or more measurements are accepted");
   }
   if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
     prune.emplace_back("inverse distance not above 0");
@@ -52,7 +53,7 @@ std::vector<TextRow> LandmarkRows(const Problem& problem) {
   add("prune", prune.empty() ? "never" : Join(prune, "; "));
   add("convert to xyz",
       options.max_linearity_index > 0.0
-          ? "below an index of linearity of " + NumberText(options.max_linearity_index)
+          ? "if the index of linearity is below " + NumberText(options.max_linearity_index)
           : "never");
   if (!options.known.empty()) add("known", std::to_string(options.known.size()));
   return rows;

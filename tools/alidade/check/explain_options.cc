@@ -53,9 +53,9 @@ std::string RejectionRecoveryText(const EkfOptions& options, const Problem& prob
   if (!unaffected.empty()) after += "; no effect for " + Join(unaffected);
   switch (options.rejection_recovery) {
     case RejectionRecovery::kReset:
-      return "reset its blocks from the measurement, or inflate them," + after;
+      return "reset the blocks of the sensor from the measurement, or inflate them," + after;
     case RejectionRecovery::kInflate:
-      return "inflate its blocks," + after;
+      return "inflate the blocks of the sensor," + after;
     case RejectionRecovery::kNone:
       break;
   }
@@ -82,8 +82,9 @@ std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec) {
     rows = {{"gate", GateText(options, problem)}, {"fuse", FuseText(options.fuse, problem)}};
     if (type->capabilities.recovery)
       rows.push_back({"rejection_recovery", RejectionRecoveryText(options, problem)});
-    rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
-                                                                : "none: a gap is one step"});
+    rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s)
+                                    ? NumberText(options.max_dt_s)
+                                    : "none: a gap of any length is one step"});
     rows.insert(rows.end(), type_rows.begin(), type_rows.end());
   }
   if (const auto use = entry.Find("use"); use && use->is_map()) {

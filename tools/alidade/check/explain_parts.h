@@ -8,10 +8,11 @@
 
 namespace alidade::internal {
 
-/// Describes how landmarks are initialised, converted and pruned. Requires problem.landmarks.
+/// Returns rows that describe how landmarks are initialised, converted and pruned. Requires
+/// problem.landmarks.
 std::vector<TextRow> LandmarkRows(const Problem& problem);
 
-/// Describes the options of an estimator's entry: a row of key and value for each.
+/// Returns a row of key and value for each option of an estimator.
 std::vector<TextRow> OptionRows(const Node& entry, const EstimatorSpec& spec);
 
 }  // namespace alidade::internal

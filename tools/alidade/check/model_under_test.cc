@@ -44,7 +44,8 @@ std::vector<int> FirstSlots(int count) {
   return slots;
 }
 
-/// Copies the n x n noise factor of the config to `l`, if any. Returns false if there is no factor.
+/// Copies `root`, the n x n noise factor of the config, to `l`. Returns false if the config does not
+/// contain a factor.
 bool CopyConfigNoise(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
   for (int i = 0; i < n && !root.empty(); ++i) std::copy_n(root.data() + i * n, n, l + i * stride);
   return !root.empty();
@@ -101,7 +102,7 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   }
 }
 
-/// Copies the values of several outputs to one row, followed by the guard words after the last one.
+/// Copies the values of several outputs to one row. The guard words after the last output follow.
 std::vector<double> Gather(const std::vector<Space>& outputs, const double* const* out) {
   constexpr int kGuardWords = 8;
   std::vector<double> row;
@@ -112,7 +113,7 @@ std::vector<double> Gather(const std::vector<Space>& outputs, const double* cons
   return row;
 }
 
-/// Copies a row of Gather back to the outputs, with the values that a call has written.
+/// Copies a row of Gather(), to which a call may have written, back to the outputs.
 void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
              double* const* out) {
   const double* begin = row.data();
@@ -123,7 +124,8 @@ void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
   }
 }
 
-/// Adds y = g(other roles, z, prior). y is one role or all roles of a landmark.
+/// Adds the function Initialise: y = g(other roles, z, prior). y is one role, or all roles of a
+/// landmark.
 void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
                    ModelUnderTest& model) {
   const AlidadeSensor sensor = *c.sensor;
@@ -300,7 +302,7 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   std::vector<const double*> arguments;
   std::vector<double*> out, requested;
   std::vector<std::int32_t> strides;
-  const Values passed(inputs.begin(), inputs.end());  // a copy that the model may write to
+  const Values passed(inputs.begin(), inputs.end());  // copy that a faulty model may overwrite
   for (const auto& input : passed) arguments.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);
@@ -310,7 +312,7 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   for (Buffer& buffer : answer.outputs) out.push_back(buffer.data());
   for (std::size_t i = 0; i < function.matrices.size(); ++i) {
     Buffer& buffer = answer.matrices[i];
-    // The Jacobian by an unbound role does not exist.
+    // An unbound role has no Jacobian.
     const bool exists =
         buffer.columns() > 0 && (!function.jacobian_per_input() || arguments[i] != nullptr);
     const bool selected = matrices == kAllMatrices || matrices == static_cast<int>(i);

@@ -14,8 +14,8 @@ namespace alidade::internal {
 /// One value per space; an empty value is an unbound optional role.
 using Values = std::vector<std::vector<double>>;
 
-/// Row-major matrix, or vector as one row. Its cells contain 1e302 until they are written. Guard
-/// words that a callee must not write surround the matrix and separate its rows.
+/// Row-major matrix, or vector as one row. A cell contains 1e302 until it is written. Guard words
+/// surround the matrix and separate the rows. A callee must not write to the guard words.
 class Buffer {
  public:
   Buffer(int rows, int columns);
@@ -28,7 +28,7 @@ class Buffer {
 
   bool Untouched() const;
   bool GuardsIntact() const;
-  /// Compares the bits.
+  /// Returns true if all bits are equal.
   friend bool operator==(const Buffer& a, const Buffer& b);
 
  private:
@@ -47,16 +47,16 @@ struct Shape {
   int rows, columns;
 };
 
-/// One function of the plugin ABI. Its concatenated Jacobians are d outputs / d inputs, in the
-/// tangents, for the first `differentiated` inputs in order.
+/// One function of the plugin ABI. The concatenated Jacobians are the derivatives of all outputs with
+/// respect to the first `differentiated` inputs, in tangent coordinates.
 struct Function {
   std::string name;        ///< name in the C++ interface: `Predict`
   std::vector<int> slots;  ///< the inputs, as indices into ModelUnderTest::slots
   std::vector<Space> outputs;
   std::vector<Shape> matrices;  ///< Jacobians, or the factor of a covariance
   int differentiated = 0;
-  bool is_noise = false;  ///< the only matrix is a factor L, which is always written
-  /// `matrices` has null entries for matrices that are not requested.
+  bool is_noise = false;  ///< true: the only matrix is a noise factor L; every call computes it
+  /// An entry of `matrices` is null if that matrix is not requested.
   std::function<std::int32_t(const double* const* inputs, double* const* outputs,
                              double* const* matrices, const std::int32_t* strides)>
       call;
@@ -74,7 +74,7 @@ struct Answer {
   friend bool operator==(const Answer&, const Answer&) = default;
 };
 
-/// Matrices that a call requests: none, all, or the one with an index >= 0.
+/// Values of the parameter `matrices`: no matrix or all. An index >= 0 requests one matrix.
 enum : int { kNoMatrix = -1, kAllMatrices = -2 };
 
 /// Model under test: its functions and the spaces of their inputs.
@@ -89,8 +89,8 @@ struct ModelUnderTest {
   std::vector<int> InitialisedRoles() const;
 
   std::shared_ptr<const ModelInstance> instance;
-  /// Sensor: roles, measurement, `prior` of Initialise if it needs one, known numbers if any.
-  /// Motion: blocks, noise `w`, control input if any, `dt`.
+  /// Slots of a sensor: roles, measurement, `prior` if Initialise needs it, known numbers if any.
+  /// Slots of a motion model: blocks, noise `w`, control input if any, `dt`.
   std::vector<Space> slots;
   int known_slot = -1;  ///< slot of the known numbers; -1: none
   std::vector<Function> functions;

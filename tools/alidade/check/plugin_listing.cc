@@ -26,7 +26,7 @@ using internal::Json;
 using internal::TextRow;
 using internal::TextTable;
 
-/// Returns the position of a kind in a list.
+/// Returns the position of a kind in the order of the listing.
 std::ptrdiff_t RankOf(const std::string& kind) {
   constexpr std::array kOrder = {kSensorKind, kMotionKind, kSourceKind, kEstimatorKind};
   return std::ranges::find(kOrder, kind) - kOrder.begin();
@@ -42,7 +42,7 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   return entries;
 }
 
-/// Adds the keys that every estimator has to `keys`.
+/// Appends to `keys` the keys that all types of estimator have.
 std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
                        std::vector<std::string> choices = {}) {
@@ -50,8 +50,9 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   };
   add("sensors", "list", "all", "names of the sensors used, in the order of their updates");
   add("use", "choice or map", "all",
-      "or {accepted_by: NAME}: the measurements that that filter accepted");
-  add("on_divergence", "choice", "report", "fail: end the run", {"report", "fail"});
+      "or {accepted_by: NAME}: only the measurements that the filter NAME accepts");
+  add("on_divergence", "choice", "report", "report: continue the run; fail: end the run",
+      {"report", "fail"});
   add("on_plugin_failure", "choice", "skip",
       "if a call of a sensor fails: skip the measurement, disable the sensor, or end the run",
       {"skip", "disable", "abort"});
@@ -66,7 +67,7 @@ std::vector<ParamInfo> KeysOf(const PluginEntry& entry) {
   return entry.is_model() ? ModelSchema(entry) : std::vector<ParamInfo>();
 }
 
-/// Finds the entries with a name. The result may be empty only for a built-in estimator.
+/// Finds the entries with the given name. The result is empty only for a built-in estimator.
 std::vector<const PluginEntry*> EntriesNamed(const PluginHost& host, const std::string& name) {
   std::vector<const PluginEntry*> entries = Sorted(host);
   std::vector<std::string> names;
@@ -87,7 +88,7 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
   std::vector<TextRow> rows = {
       {"parameter", "unit", "type", "range", "default", "only if", "meaning"}};
   for (const ParamInfo& info : schema) {
-    // Keys that a source lists itself have no type.
+    // A key from a source's own list has no type.
     const std::string fallback =
         !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
     const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");

@@ -7,17 +7,18 @@
 
 namespace alidade {
 
-/// Lists the available models, sources and estimators: name, kind, doc and, with `files`, the file.
+/// Lists the name, the kind and the doc of each available model, source and estimator. If `files`,
+/// the list also contains the file.
 std::string PluginList(const PluginHost& host, bool files = false);
-/// Returns the list as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`,
+/// Returns the same list as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`,
 /// `file`.
 std::string PluginListJson(const PluginHost& host);
 
-/// Describes the plugin entries and the built-in estimator (`ekf`, `rts`, ...) with a name: doc,
-/// citation, measured or moved quantities, and every parameter. Error: kPlugin if there is no such
-/// name.
+/// Describes the plugin entries and the built-in estimator (`ekf`, `rts`, ...) with the given name:
+/// doc, citation, measured or moved quantities, and all parameters. Error: kPlugin if the name is
+/// unknown.
 std::string PluginInfo(const PluginHost& host, const std::string& name);
-/// Returns the description as a JSON array: the keys of PluginListJson, `describes` (lines) and
+/// Returns the same description as a JSON array: the keys of PluginListJson, `describes` (lines) and
 /// `parameters` (objects with `key`, `unit`, `type`, `range`, `default` if any, `choices`, `when`,
 /// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);

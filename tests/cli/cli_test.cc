@@ -138,7 +138,7 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
   Write("config.yaml", testing::kDepthConfig);
   const Outcome include = Call({"run", "config.yaml", "--set", "include=x.yaml"});
   EXPECT_EQ(include.code, 78);
-  EXPECT_TRUE(include.err.starts_with("error: --set include: files are included before"));
+  EXPECT_TRUE(include.err.starts_with("error: --set include: cannot be set, because files"));
   const Outcome nameless = Call({"run", "config.yaml", "--set", "plugins=['']"});
   EXPECT_EQ(nameless.code, 78);
   EXPECT_TRUE(nameless.err.starts_with("error: --set plugins[0]: empty path")) << nameless.err;

@@ -52,7 +52,7 @@ std::string Rows(const std::string& keys) {
 
 const Fault kTextFaults[] = {
     MakeFault("01_duplicate_key", "depth", {After("focal_px: 400", "    focal_px: 401")}, 20,
-              "focal_px: duplicate key; first at line 19"),
+              "focal_px: duplicate key; the first one is at line 19"),
     MakeFault("04_trailing_text", "depth", {{"400", "3.8x"}}, 19, "'3.8x'"),
     MakeFault("05_not_a_number", "depth", {{"400", ".nan"}}, 19, "finite"),
     MakeFault("06_underflow", "depth", {{"sigma_px: 1.0", "sigma_px: 1e-400"}}, 21, "1e-400"),

@@ -6,8 +6,9 @@
 
 namespace alidade {
 
-/// Owning pointer that copies its T when it is copied, by T::Clone if T has it. A moved-from
-/// pointer may only be assigned to or destroyed. T may be incomplete, except for the constructor.
+/// Owning pointer whose copy owns a copy of the T, made by T::Clone() if T has this function. A
+/// moved-from pointer may only be assigned to or destroyed. T may be incomplete, except when the
+/// constructor is called.
 template <class T>
 class ClonePtr {
  public:
@@ -31,7 +32,8 @@ class ClonePtr {
   const T* operator->() const { return value_.get(); }
 
  private:
-  std::shared_ptr<T> value_;  // never shared; its deleter also works for an incomplete T
+  // Has one owner; the deleter of a shared_ptr also works for an incomplete T.
+  std::shared_ptr<T> value_;
   std::shared_ptr<T> (*copy_)(const T&);
 };
 

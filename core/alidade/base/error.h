@@ -11,16 +11,16 @@ namespace alidade {
 enum class ExitCode : int {
   kOk = 0,
   kFound = 1,          ///< the command succeeded and found a defect (check, compare)
-  kUsage = 2,          ///< the command line
-  kBadData = 65,       ///< a measurement file
-  kInputMissing = 66,  ///< a file that cannot be opened
+  kUsage = 2,          ///< the command line is wrong
+  kBadData = 65,       ///< an input file contains an error
+  kInputMissing = 66,  ///< an input file cannot be opened
   kPlugin = 69,        ///< a plugin is missing or was refused
   kInternal = 70,      ///< a defect of this program
-  kCannotCreate = 73,  ///< an output that cannot be created
-  kIo = 74,            ///< a read or write that failed before its end
+  kCannotCreate = 73,  ///< an output cannot be created
+  kIo = 74,            ///< a read or write failed
   kStopped = 75,       ///< stopped by a signal; the output is complete up to that time
-  kNotTrusted = 77,    ///< a file or folder that someone else could have written
-  kBadConfig = 78,     ///< the config
+  kNotTrusted = 77,    ///< someone else could have written a file or folder
+  kBadConfig = 78,     ///< the config contains an error
   kDiverged = 79,      ///< the filter diverged under `on_divergence: fail`
 };
 
@@ -45,7 +45,7 @@ class Error : public std::runtime_error {
   ExitCode code_;
 };
 
-/// Reason for which the program ends: its exit code and message.
+/// Reason why the program ends: its exit code and its message.
 struct Failure {
   ExitCode code = ExitCode::kInternal;
   std::string reason;
@@ -55,24 +55,24 @@ struct Failure {
 /// kInternal for any other exception. Call it only in a catch block.
 Failure CaughtFailure();
 
-/// Composes an error message in the form that all messages have. Empty parts are omitted.
+/// Composes an error message in the form that Error describes. Empty parts are omitted.
 std::string ErrorLine(const Place& place, std::string_view key, std::string_view problem,
                       std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Returns the candidate with the smallest edit distance to `word`, or "" if it is too large for a
-/// suggestion.
+/// Returns the candidate with the smallest edit distance to `word`, or "" if even this distance is
+/// too large for a suggestion.
 template <class Range>
 std::string Nearest(std::string_view word, const Range& candidates);
 
-/// Returns the Damerau-Levenshtein distance (an adjacent transposition counts one).
+/// Returns the Damerau-Levenshtein distance. Swapping two adjacent letters counts as one edit.
 int EditDistance(std::string_view a, std::string_view b);
 
-/// Programmer's misuse of the API, thrown by ALIDADE_EXPECTS.
+/// Exception for a misuse of the API by the programmer; ALIDADE_EXPECTS throws it.
 class ContractViolation : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
-/// Throws ContractViolation; called by ALIDADE_EXPECTS.
+/// Throws a ContractViolation that names the condition; ALIDADE_EXPECTS calls it.
 [[noreturn]] void FailContract(const char* expression, const char* file, int line);
 
 template <class Range>
@@ -91,6 +91,6 @@ std::string Nearest(std::string_view word, const Range& candidates) {
 
 }  // namespace alidade
 
-/// Checks a precondition of a public function; throws ContractViolation.
+/// Checks a precondition of a public function. Throws ContractViolation if `condition` is false.
 #define ALIDADE_EXPECTS(condition) \
   ((condition) ? static_cast<void>(0) : ::alidade::FailContract(#condition, __FILE__, __LINE__))

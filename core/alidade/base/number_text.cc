@@ -8,7 +8,7 @@ namespace alidade::internal {
 
 void AppendNumber(std::string& text, double value) {
   if (std::isnan(value)) {
-    text += "nan";  // to_chars would also write the meaningless sign bit
+    text += "nan";  // to_chars would also write the sign of NaN, which has no meaning
     return;
   }
   char buffer[32];
@@ -46,7 +46,7 @@ std::string SecondsText(Timestamp timestamp) { return FixedText(Seconds(timestam
 
 void AppendSeconds(std::string& text, Timestamp timestamp) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
-  // Unsigned, because the magnitude of the smallest timestamp exceeds the type Timestamp.
+  // The magnitude is unsigned, because that of the smallest timestamp does not fit into Timestamp.
   const std::uint64_t bits = static_cast<std::uint64_t>(timestamp);
   const std::uint64_t magnitude = timestamp < 0 ? 0 - bits : bits;
   if (timestamp < 0) text += '-';

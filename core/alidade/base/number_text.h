@@ -7,24 +7,24 @@
 
 namespace alidade::internal {
 
-/// Appends the shortest decimal that reads back as `value`, in any locale: `0.1`, `1e-05`, `nan`,
-/// `-inf`.
+/// Appends the shortest decimal number that is read back as exactly `value`, in any locale: `0.1`,
+/// `1e-05`, `nan`, `-inf`.
 void AppendNumber(std::string& text, double value);
 std::string NumberText(double value);
 
-/// Returns `value` with `decimals` digits after the point.
+/// Returns `value` with `decimals` digits after the decimal point.
 std::string FixedText(double value, int decimals);
 
 /// Returns `value` with at most `digits` significant digits, for display: `0.02346`, `1.5e+09`.
 std::string RoundedText(double value, int digits = 6);
 
-/// Returns `value` with `digits` digits after the point and an exponent.
+/// Returns `value` with `digits` digits after the decimal point and an exponent.
 std::string ScientificText(double value, int digits);
 
 /// Returns the time for display: `1.500000 s`.
 std::string SecondsText(Timestamp timestamp);
 
-/// Appends the time in seconds with nine decimals, exact: `-0.033000000`.
+/// Appends the exact time in seconds with nine decimals: `-0.033000000`.
 void AppendSeconds(std::string& text, Timestamp timestamp);
 
 }  // namespace alidade::internal

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// Random number generator with the same numbers for every compiler and standard library:
+/// Random number generator that produces the same numbers with every compiler and standard library:
 /// xoshiro256++. splitmix64 fills its 256-bit state from a seed and the index of a stream.
 ///
 /// Streams of one seed are independent. A source uses a separate stream for each noise, so that
@@ -19,7 +19,7 @@ class Random {
 
   /// Returns the next 64 bits, uniformly distributed.
   std::uint64_t NextBits();
-  /// Returns a sample that is uniform in [0, 1), a multiple of 2^-53.
+  /// Returns a sample that is uniform in [0, 1) and a multiple of 2^-53.
   double Uniform() { return 0x1p-53 * static_cast<double>(NextBits() >> 11); }
   /// Returns a sample of N(0, 1).
   double Normal();

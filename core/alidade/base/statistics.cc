@@ -16,8 +16,8 @@ namespace {
 double GammaKernel(double a, double y) {
   constexpr double kSmall = 10.0;
   if (a <= kSmall) return std::pow(y, a) * std::exp(-y) / std::tgamma(a);
-  // Stirling's series of ln Gamma(a); its next term is below 1e-15. The two large terms of the
-  // exponent are combined: a (ln(y / a) - mu).
+  // Stirling's series of ln Gamma(a); the first omitted term is below 1e-15. The two large terms of
+  // the exponent are combined: a (ln(y / a) - mu).
   const double mu = (y - a) / a, square = 1.0 / (a * a);
   const double log_ratio = mu < -0.5 ? std::log(y / a) : std::log1p(mu);
   constexpr double kSeries[] = {1.0 / 12.0,    -1.0 / 360.0, 1.0 / 1260.0,
@@ -30,7 +30,7 @@ double GammaKernel(double a, double y) {
   return std::sqrt(a / (2.0 * std::numbers::pi)) * std::exp(a * (log_ratio - mu) - stirling);
 }
 
-/// Probabilities of values of chi-square below and above x.
+/// Probabilities that a chi-square variable is below x and above x.
 struct Tails {
   double below, above;
 };
@@ -66,7 +66,7 @@ double ChiSquareQuantile(double q, double dof) {
   ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0.0);
   if (q == 0.0) return 0.0;
   if (q == 1.0) return std::numeric_limits<double>::infinity();
-  // Bisection with the tail that is not rounded to 1.
+  // Bisection on the tail probability that does not round to 1.
   const auto is_below = [q, dof](double x) {
     const Tails tails = ChiSquareTails(x, dof);
     return q <= 0.5 ? tails.below < q : tails.above > 1.0 - q;

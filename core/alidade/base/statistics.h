@@ -20,13 +20,13 @@ struct Interval {
 ///
 ///   [low, high] = m chi2(p, nu) / nu,   p = 0.025, 0.975,   nu = 2 n m^2 / v
 ///
-/// m and v are the mean and variance of a value. Without a gate m = 1, v = 2 / dof and nu = n dof.
-/// A gate accepts only values of r' S^-1 r (not divided by dof) up to `cut`.
+/// m and v are the mean and variance of one such value. Without a gate m = 1, v = 2 / dof and nu =
+/// n dof. A gate accepts only values of r' S^-1 r (not divided by dof) up to `cut`.
 Interval ConsistencyBounds(double dof, double n,
                            double cut = std::numeric_limits<double>::infinity());
 
-/// Returns the quantile q, in [0, 1], of ascending values x[0..n-1], n > 0. It is linear between
-/// order statistics (type 7 of Hyndman and Fan):
+/// Returns the quantile q, in [0, 1], of ascending values x[0..n-1], n > 0. Interpolates linearly
+/// between the values (type 7 of Hyndman and Fan):
 ///
 ///   x[k] + (h - k) (x[k + 1] - x[k]),   h = (n - 1) q,   k = floor h
 double Quantile(const std::vector<double>& ascending, double q);
@@ -35,7 +35,7 @@ double Quantile(const std::vector<double>& ascending, double q);
 struct Spread {
   double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
 };
-/// Returns the spread of the values that are not NaN; NaN if all are.
+/// Returns the spread of the values that are not NaN. Every member is NaN if all values are NaN.
 Spread SpreadOf(std::vector<double> values);
 
 }  // namespace alidade

@@ -11,7 +11,7 @@ std::string Join(const std::vector<std::string>& parts, const char* separator) {
 }
 
 std::string WithArticle(const std::string& noun) {
-  // `unit_quaternion` is pronounced with a consonant.
+  // `unit_quaternion` begins with a consonant sound, /j/.
   const bool has_vowel = noun.find_first_of("aeiou") == 0 && !noun.starts_with("uni");
   return (has_vowel ? "an " : "a ") + noun;
 }

@@ -6,10 +6,10 @@
 
 namespace alidade::internal {
 
-/// Joins texts: `a, b, c`.
+/// Joins texts with a separator: `a, b, c`.
 std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
 
-/// Returns the noun with its article: `a source`, `an estimator`.
+/// Returns the noun with its indefinite article: `a source`, `an estimator`.
 std::string WithArticle(const std::string& noun);
 
 /// Returns the member `name` of each element.

@@ -65,7 +65,7 @@ void Merge(ConfigTree* base, ConfigTree* overrides) {
   }
 }
 
-/// Returns the content of the file, cut off one byte beyond the maximum size of a config.
+/// Returns the first bytes of the file: at most one byte more than a config may have.
 std::string ReadConfig(const fs::path& file, const Place& place, std::string_view key) {
   constexpr std::size_t kLimit = (1 << 20) + 1;
   const auto fail = [&](ExitCode code, int error) {
@@ -90,9 +90,9 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
-/// Returns the values of `source` that are paths to read, without lists and `-`. Except for `path`,
-/// a plugin may use the same keys for other things. Such a value counts as a path if it has a slash
-/// or names a file in `folder`.
+/// Returns the values of `source` that are paths of input files, without lists and `-`. A plugin
+/// may use the keys other than `path` for other things. Their values therefore count as paths only
+/// if they contain a slash or name a file in `folder`.
 std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& folder) {
   std::vector<ConfigTree*> paths;
   const ConfigTree* const source = Child(root, "source");
@@ -115,7 +115,7 @@ std::vector<ConfigTree*> SourcePaths(const ConfigTree& root, const fs::path& fol
 }
 
 /// Makes the relative paths of `source` and the items of `plugins` absolute. Removes each `.`, but
-/// keeps each `..`, as it may follow a symlink.
+/// retains each `..`, because `..` may follow a symlink.
 void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   const auto anchor = [&](ConfigTree* node) {
     if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
@@ -132,7 +132,7 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   for (const auto& plugin : plugins->children) anchor(plugin.get());
 }
 
-/// Removes `include:` from the map and returns it, or null.
+/// Removes the key `include` from the map. Returns its value, or null if the key does not exist.
 std::unique_ptr<ConfigTree> ExtractInclude(ConfigTree* root) {
   auto& children = root->children;
   const auto found = std::find_if(children.begin(), children.end(),
@@ -177,7 +177,7 @@ class Loader {
     merged->kind = Node::Kind::kMap;
     for (const Node& name : node.ItemsOrOne()) {
       if (name.kind() != Node::Kind::kScalar)
-        name.Fail("not a file name", "a file or a list of files");
+        name.Fail("not a file name", "a file name or a list of file names");
       const fs::path file =
           ResolveInside(folder, name.Text(), allow_outside_, name.place(), name.path());
       const auto part = Load(file, name.place(), name.path());
@@ -224,7 +224,7 @@ std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
   }
 }
 
-/// Returns the child of `node` at `step`; adds it to a map that does not have it.
+/// Returns the child of `node` at `step`. Adds the child to a map that does not contain it.
 std::unique_ptr<ConfigTree>* Descend(ConfigTree* node, const Step& step, const Place& place,
                                      std::string_view dotted) {
   const bool is_map_key = !step.name.empty();
@@ -272,7 +272,7 @@ Config Config::FromText(std::string_view text, std::string_view name) {
   config.folder_ = ".";
   auto root = ParseRoot(text, config.name_, &budget);
   if (const ConfigTree* include = Child(*root, "include")) {
-    FailAt(KeyPlace(*include), "include", "a config that is not a file cannot include another");
+    FailAt(KeyPlace(*include), "include", "only a config file can include another config");
   }
   config.tree_ = std::move(root);
   return config;
@@ -288,12 +288,13 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
     if (!defect.empty()) FailAt(place, {}, defect);
   }
   if (steps[0].name == "include") {
-    FailAt(place, dotted_key, "files are included before keys are set", "`include:` in the file");
+    FailAt(place, dotted_key, "cannot be set, because files are included before keys are set",
+           "`include:` in the file");
   }
   const int depth = internal::kMaxDepth - static_cast<int>(steps.size());
   if (depth < 0) FailAt(place, dotted_key, "nested too deep", "at most 64 levels");
   Budget budget;
-  if (value == "-") value = "'-'";  // unquoted, YAML reads it as a list with an empty item
+  if (value == "-") value = "'-'";  // YAML reads an unquoted `-` as a list with an empty item
   auto next = internal::ParseYaml(value, Origin{place.file, std::string(dotted_key), false, depth},
                                   &budget);
   if (next == nullptr) FailAt(place, dotted_key, "no value", "a value, or \"\" for an empty text");

@@ -22,7 +22,7 @@ struct ConfigTree;  // node of the parsed tree, defined in core/alidade/config/t
 /// A node is a cheap handle to a Config, which must outlive it. Every failure is an Error with code
 /// kBadConfig that names the place, the key path, the value found and the values accepted. A map
 /// records the keys that are read, and RejectUnread() rejects the other keys. Because of this
-/// record, two threads must not read a config at once.
+/// record, two threads must not read a config at the same time.
 class Node {
  public:
   enum class Kind { kNull, kScalar, kList, kMap };
@@ -39,39 +39,42 @@ class Node {
   /// Returns the root of the config.
   Node Root() const;
 
-  /// Map: returns the value of `key`, if it exists. Fails if this node is not a map.
+  /// Returns the value of `key` of this map, or nullopt if the map does not contain `key`. Fails if
+  /// this node is not a map.
   std::optional<Node> Find(std::string_view key) const;
-  /// Map: returns the value of `key`. If it is missing, the error names `needed_by` as its user.
+  /// Returns the value of `key` of this map. If the key is missing, the error reports that
+  /// `needed_by` needs it.
   Node At(std::string_view key, std::string_view needed_by = {}) const;
-  /// Map: returns all entries in the order of the file; each counts as read.
+  /// Returns all entries of this map in the order of the file, and records each key as read.
   std::vector<std::pair<std::string, Node>> Entries() const;
-  /// List: returns all items.
+  /// Returns all items of this list.
   std::vector<Node> Items() const;
   /// Returns all items of a list; any other node counts as a list of one item.
   std::vector<Node> ItemsOrOne() const;
 
   /// Returns a finite number. Rejects a unit, trailing text, leading zeros, underflow and overflow.
   double Number() const;
-  /// Returns a number within [low, high]; an open end excludes its value.
+  /// Returns a number within [low, high]. `low_open` and `high_open` exclude the respective bound.
   double Number(double low, double high, bool low_open = false, bool high_open = false) const;
-  /// Returns an integer within [low, high], read as strictly as a Number. A limit of the type means
-  /// that there is no bound.
+  /// Returns an integer within [low, high], read as strictly as a Number. The smallest or largest
+  /// value of the type means that there is no bound.
   std::int64_t Integer(std::int64_t low, std::int64_t high) const;
   bool Flag() const;  ///< accepts `true` and `false` only
-  /// Returns the scalar as written, without quotes; a number or a flag is also a text.
+  /// Returns any scalar as it is written, without quotes. Numbers and flags are accepted as texts.
   std::string Text() const;
-  /// Returns the index of the scalar in `choices`.
+  /// Returns the index of the scalar in `choices`. Fails if `choices` does not contain it.
   int Choice(const std::vector<std::string>& choices) const;
   /// Returns a list of numbers; a single number counts as a list of one. If `size` < 0, any length
   /// above zero is accepted.
   std::vector<double> Numbers(int size = -1) const;
 
-  /// Map: fails if it has a key that was never read, and suggests the most similar known key. Also
-  /// checks each map below from which a key was read.
+  /// Fails if this map has a key that was never read, and suggests the most similar known key. Also
+  /// checks each map below this one from which a key was read.
   void RejectUnread() const;
-  /// Map: returns whether it has a `key` that has not been read; does not declare the key.
+  /// Returns whether this map has a `key` that has not been read. The call does not count as a
+  /// read.
   bool HasUnread(std::string_view key) const;
-  /// Map: declares `key` without reading it, so that RejectUnread accepts it.
+  /// Declares `key` of this map as known without reading it, so RejectUnread() accepts it.
   void Declare(std::string_view key) const;
 
   /// Returns this value as YAML that Config::Set can read.
@@ -86,13 +89,14 @@ class Node {
   const ConfigTree* tree_;
 };
 
-/// Config file, read strictly: docs/config.md lists the rejected constructs. Copies share the tree.
+/// Parsed config. The reader is strict: docs/config.md lists the constructs that it rejects. Copies
+/// share one tree.
 class Config {
  public:
-  /// Reads a file and the files that its `include:` names; the file takes precedence over them. An
-  /// included file must lie inside the folder of the file unless `allow_outside`. Relative paths
-  /// (`source.path`, the items of `plugins`) are resolved against the folder of their file.
-  /// Errors: kInputMissing, kBadConfig, kNotTrusted.
+  /// Reads a file and the files that its `include:` names; values of the file replace those of the
+  /// included files. An included file must lie inside the folder of the file that includes it,
+  /// unless `allow_outside` is true. Relative paths (`source.path`, the items of `plugins`) are
+  /// resolved against the folder of their file. Errors: kInputMissing, kBadConfig, kNotTrusted.
   static Config FromFile(const std::filesystem::path& file, bool allow_outside = false);
   /// Reads YAML text, in which `include:` is an error. Messages use `name` as the name of the file.
   static Config FromText(std::string_view text, std::string_view name);
@@ -105,12 +109,14 @@ class Config {
   std::vector<std::string> inputs() const;
 
   /// Sets `dotted.key` to `value`, read as YAML; missing maps on its path are created. Messages use
-  /// `origin` (such as `--set`) as the name of the file. A single `-` is a text. A relative path is
-  /// resolved against the current folder. Nodes of the replaced value become invalid.
+  /// `origin` (such as `--set`) as the name of the file. The value `-` is read as a text. A
+  /// relative path is resolved against the current folder. Nodes of the replaced value become
+  /// invalid.
   void Set(std::string_view dotted_key, std::string_view value, std::string_view origin);
   /// Returns a copy with `overrides` (a map) merged in. Maps are merged key by key; any other value
-  /// replaces the old one. A map with another `model:` or `type:` replaces the whole old map. The
-  /// merged values keep their place and key path. The record of keys read is not copied.
+  /// replaces the old one. A map whose `model:` or `type:` differs replaces the whole old map.
+  /// Messages report a merged value at its original place and key path. The record of the keys that
+  /// were read is not copied.
   Config Merged(const Node& overrides) const;
   /// Returns a deep copy in which no key counts as read.
   Config Copy() const;
@@ -127,7 +133,7 @@ class Config {
 };
 
 /// Returns `path` resolved against `base`. Throws an Error kNotTrusted if `allow_outside` is false
-/// and the path leaves `base` by `..`, an absolute path or a symlink (also a dangling one).
+/// and the path leaves `base` by `..`, an absolute path or a symlink (even a dangling one).
 std::filesystem::path ResolveInside(const std::filesystem::path& base, const std::string& path,
                                     bool allow_outside, const Place& place, std::string_view key);
 

@@ -9,7 +9,7 @@ namespace {
 
 bool IsLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-/// Returns whether `text` needs no quotes because of its characters, also inside brackets.
+/// Returns whether all characters of `text` are allowed without quotes, even inside brackets.
 bool IsSafeUnquoted(std::string_view text) {
   constexpr std::string_view kInner = "./+-$@ ";
   if (text.empty() || text.back() == ' ') return false;

@@ -66,7 +66,8 @@ class TextCheck {
     if (c != ' ') in_indent_ = false;
     if (c == '[' || c == '{') ++unclosed_;
     if (c == ']' || c == '}') unclosed_ = std::max(0, unclosed_ - 1);
-    // The scanner of yaml-cpp would queue a token for each bracket before the depth is known.
+    // Without this limit, the scanner of yaml-cpp would queue a token for each open bracket before
+    // the depth is checked.
     if (unclosed_ > kMaxUnclosed) {
       Fail("nested too deep", "at most " + std::to_string(kMaxDepth) + " levels");
     }
@@ -124,10 +125,10 @@ std::string RewordMessage(const std::string& message) {
       {"end of sequence not found", "wrong indentation in a list"},
       {"end of map flow not found", "'{' is not closed, or a comma is missing"},
       {"end of sequence flow not found", "'[' is not closed, or a comma is missing"},
-      {"illegal flow end", "']' or '}' closes nothing"},
+      {"illegal flow end", "']' or '}' has no opening bracket"},
       {"illegal EOF in scalar", "quote is not closed"},
-      {"illegal map value", "':' not expected here"},
-      {"illegal block entry", "'-' not expected here"},
+      {"illegal map value", "':' is not allowed here"},
+      {"illegal block entry", "'-' is not allowed here"},
       {"unknown token", "text that starts like this must be quoted"},
   };
   for (const Phrase& phrase : kPhrases) {
@@ -162,7 +163,7 @@ class TreeBuilder : public YAML::EventHandler {
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     RejectAsKey(mark, "an alias is used as a key");
     const auto target = anchors_.find(anchor);
-    if (target == anchors_.end()) Fail(mark, "alias of a key is not supported");
+    if (target == anchors_.end()) Fail(mark, "an alias cannot refer to a key");
     for (const Frame& frame : stack_) {
       if (frame.node == target->second) Fail(mark, "alias refers to itself");
     }
@@ -177,7 +178,7 @@ class TreeBuilder : public YAML::EventHandler {
     RejectTag(mark, tag);
     if (value.find('\0') != std::string::npos) Fail(mark, "NUL character in a text");
     // The escapes \N and \_ of yaml-cpp 0.7 yield single bytes, which are not UTF-8.
-    if (!IsUtf8(value)) Fail(mark, "escape that is not a character");
+    if (!IsUtf8(value)) Fail(mark, "escape sequence that is not a valid character");
     if (ExpectsKey()) return SetKey(mark, tag, value);
     ConfigTree* node = Add(mark, anchor, Node::Kind::kScalar, value.size());
     node->quoted = tag != "?";
@@ -265,7 +266,8 @@ class TreeBuilder : public YAML::EventHandler {
     const auto [first, is_new] = frame.key_lines.emplace(key, mark.line + 1);
     if (!is_new) {
       std::string message = "duplicate key";
-      if (origin_.has_lines) message += "; first at line " + std::to_string(first->second);
+      if (origin_.has_lines)
+        message += "; the first one is at line " + std::to_string(first->second);
       Fail(mark, message, {}, key);
     }
     AddToBudget(mark, 0, key.size());
@@ -278,7 +280,7 @@ class TreeBuilder : public YAML::EventHandler {
     budget_->nodes += nodes;
     budget_->bytes += bytes;
     if (budget_->is_within_limits()) return;
-    Fail(mark, "too large with its aliases expanded",
+    Fail(mark, "too large after its aliases are expanded",
          budget_->nodes > Budget::kMaxNodes ? "at most 100000 values" : "at most 8 MiB of text");
   }
 

@@ -43,11 +43,11 @@ void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
   }
   if (is_positive) return;
   double smallest = EigenvaluesOf(covariance)[0];
-  // Rounding of a much larger eigenvalue may hide a negative one.
+  // The rounding error of a much larger eigenvalue may hide a negative eigenvalue.
   const bool is_hidden = smallest >= 0;
   if (is_hidden) smallest = EigenvaluesOf(Correlation(covariance))[0];
   node.Fail(std::string("not positive semi-definite: ") +
-                (is_hidden ? "its correlation's" : "its") + " smallest eigenvalue is " +
+                (is_hidden ? "the correlation matrix's" : "its") + " smallest eigenvalue is " +
                 RoundedText(smallest, 6),
             "a covariance");
 }

@@ -7,9 +7,10 @@
 
 namespace alidade::internal {
 
-/// Returns a symmetric, positive semi-definite `size` x `size` matrix, row-major, from a list of
-/// rows. Fails with the smallest eigenvalue if the matrix is not positive semi-definite. Asymmetry
-/// up to 1e-9 of the standard deviations counts as rounding: both entries become their mean.
+/// Reads a list of rows as a symmetric, positive semi-definite `size` x `size` matrix. Returns it
+/// row-major. If the matrix is not positive semi-definite, the error contains its smallest
+/// eigenvalue. A difference between (i, j) and (j, i) of at most 1e-9 times their standard
+/// deviations counts as rounding; the mean replaces both entries.
 std::vector<double> ReadCovariance(const Node& node, int size);
 
 }  // namespace alidade::internal

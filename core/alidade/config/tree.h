@@ -16,22 +16,22 @@ struct ConfigTree {
   Node::Kind kind = Node::Kind::kNull;
   bool quoted = false;  ///< whether a scalar is written as 'text', "text" or a block
   Place place;
-  std::string text;  ///< of a scalar, as written
+  std::string text;  ///< text of a scalar as it is written
   std::vector<std::unique_ptr<ConfigTree>> children;
 
   const ConfigTree* parent = nullptr;
-  std::string key;  ///< of an entry of a map
-  int index = -1;   ///< of an item of a list
+  std::string key;  ///< key, if this node is an entry of a map
+  int index = -1;   ///< index, if this node is an item of a list
   int key_line = 0;
   int key_column = 0;
 
-  mutable std::string path;                               ///< computed at its first use
-  mutable std::set<std::string, std::less<>> known_keys;  ///< of a map, read or declared
+  mutable std::string path;  ///< key path, computed when it is first used
+  mutable std::set<std::string, std::less<>> known_keys;  ///< keys that were read or declared
 };
 
 namespace internal {
 
-/// Size of the files of one config, with aliases expanded, and its limits.
+/// Total size of the files of one config after aliases are expanded, and the limits of this size.
 struct Budget {
   static constexpr int kMaxNodes = 100'000;
   static constexpr int kMaxBytes = 8 << 20;
@@ -46,7 +46,7 @@ constexpr int kMaxDepth = 64;
 /// Source of a YAML text, for the messages about it.
 struct Origin {
   std::string file;
-  std::string key_prefix = {};  ///< key path of the root of the text, for `--set`
+  std::string key_prefix = {};  ///< key path of the text's root, such as the key of `--set`
   bool has_lines = true;
   int max_depth = kMaxDepth;
 };
@@ -61,9 +61,9 @@ std::string KeyDefect(const std::string& key);
 const std::string& PathOf(const ConfigTree& tree);
 /// Returns the key path of `key` in the map at `path`.
 std::string PathBelow(const std::string& path, std::string_view key);
-/// Returns the place of the key of `tree`, or of its value if it has no key.
+/// Returns the place of the key of `tree`, or the place of `tree` itself if it has no key.
 Place KeyPlace(const ConfigTree& tree);
-/// Returns the value of `key`, or null.
+/// Returns the value of `key`, or null if `map` does not contain `key`.
 ConfigTree* Child(const ConfigTree& map, std::string_view key);
 /// Returns a deep copy in which no key counts as read.
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
@@ -76,12 +76,13 @@ std::string LowerCase(std::string_view text);
 /// Returns `text` in single quotes, shortened, with control characters escaped.
 std::string Quoted(std::string_view text);
 
-/// Throws an Error kBadConfig with ErrorLine of these arguments.
+/// Throws an Error kBadConfig whose message is ErrorLine() of these arguments.
 [[noreturn]] void FailAt(const Place& place, std::string_view key, std::string_view message,
                          std::string_view expected = {}, std::string_view suggestion = {});
 
-/// Rejects a name that is not a single word. Names are parts of columns (`target.depth`), metric
-/// keys (`rmse:target.depth@near`) and tables. `owner` is the named thing, such as `a sensor`.
+/// Rejects a name that is not a single word. Names become parts of column names (`target.depth`),
+/// metric keys (`rmse:target.depth@near`) and tables. `owner` describes the object that has the
+/// name, such as `a sensor`.
 void ExpectName(const std::string& name, const Node& node, const std::string& owner);
 
 }  // namespace internal

@@ -13,7 +13,7 @@ struct Unit {
   int dimension;
 };
 
-// "min" is omitted: in a key it is a minimum more often than a minute.
+// "min" is omitted, because in a key it means "minimum" more often than "minute".
 constexpr Unit kUnits[] = {
     {"m", 0},    {"mm", 0},    {"cm", 0},     {"km", 0},   {"um", 0},  {"nm", 0},  {"in", 0},
     {"inch", 0}, {"ft", 0},    {"s", 1},      {"sec", 1},  {"ms", 1},  {"us", 1},  {"ns", 1},
@@ -49,7 +49,8 @@ KeyParts SplitUnit(std::string_view key) {
 }
 
 /// Returns the unit of `written` if only its unit differs from that of `known`, as in `baseline_mm`
-/// for `baseline_m`; else "". With `same_dimension`, one unit must also convert to the other.
+/// for `baseline_m`; otherwise returns "". With `same_dimension`, both units must also have the
+/// same dimension.
 std::string WrongUnit(std::string_view written, std::string_view known, bool same_dimension) {
   const KeyParts a = SplitUnit(written);
   const KeyParts b = SplitUnit(known);

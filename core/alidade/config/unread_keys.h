@@ -11,7 +11,8 @@
 /// another unit, or with almost the same letters.
 namespace alidade::internal {
 
-/// Throws the error of the missing `key`. `needed_by` names its user, or is empty.
+/// Throws the error of the missing `key`. The message reports that `needed_by` needs the key,
+/// unless `needed_by` is empty.
 [[noreturn]] void FailMissing(const ConfigTree& map, std::string_view key,
                               std::string_view needed_by);
 

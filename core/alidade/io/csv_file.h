@@ -11,18 +11,18 @@
 
 namespace alidade::internal {
 
-/// CSV file that is written cell by cell. It has commas, `\n`, numbers in the shortest form that
-/// reads back, and texts quoted if RFC 4180 requires quotes.
+/// CSV file that is written cell by cell, with commas and line feeds. A number has the shortest
+/// form that is read back exactly. A text is quoted if RFC 4180 requires quotes.
 class CsvFile {
  public:
   /// Creates the file with its header. Errors: kCannotCreate, kIo.
   CsvFile(const OutputFolder& folder, const std::string& name,
           const std::vector<std::string>& header);
 
-  CsvFile& Time(Timestamp timestamp);  ///< empty for kNoTimestamp
+  CsvFile& Time(Timestamp timestamp);  ///< appends an empty cell for kNoTimestamp
   CsvFile& Number(double value);
   CsvFile& Integer(std::int64_t value);
-  /// Appends an empty cell for a negative id, which means no landmark.
+  /// Appends the id of a landmark. A negative id means no landmark; the cell is then empty.
   CsvFile& Landmark(std::int64_t id);
   CsvFile& Text(std::string_view value);
   CsvFile& Empty(std::size_t cells = 1);

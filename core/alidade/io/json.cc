@@ -9,9 +9,9 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns the reason of a parser error, as in `syntax error while parsing value - invalid
-/// literal`. It omits the leading number and position of the message, and the trailing bytes of the
-/// file and tokens.
+/// Returns the reason in the message of a parser error, such as `syntax error while parsing value -
+/// invalid literal`. Omits the error number and position before it, and the quoted bytes and tokens
+/// after it.
 std::string ReasonOf(const Json::exception& error) {
   const std::string message = error.what();
   const std::size_t position = message.find(": ");
@@ -41,7 +41,8 @@ Json ParseJson(std::string_view text, const std::string& file) {
     const std::size_t column = offset - (preceding.rfind('\n') + 1) + 1;
     const Place place{file, static_cast<int>(line), static_cast<int>(column)};
     throw Error(ExitCode::kBadData, ErrorLine(place, {}, ReasonOf(error), "JSON"));
-  } catch (const Json::exception& error) {  // a number out of the range of a double; no position
+  } catch (const Json::exception& error) {
+    // A number exceeds the range of a double. Its position is unknown.
     throw Error(ExitCode::kBadData, ErrorLine(Place{file}, {}, ReasonOf(error), "JSON"));
   }
 }

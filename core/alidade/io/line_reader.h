@@ -21,11 +21,12 @@ namespace alidade {
 /// A byte order mark and carriage returns before line feeds are dropped. Errors:
 ///
 ///   kBadData   a line is longer than kMaxLine
-///   kIo        a read failed, or a regular file changed meanwhile
+///   kIo        a read failed, or a regular file changed while it was read
 ///   kStopped   a signal interrupted the wait for data
 class LineReader {
  public:
-  static constexpr std::size_t kMaxLine = 4096;  ///< bytes, without the line end
+  /// Maximum length of a line in bytes, without its line end.
+  static constexpr std::size_t kMaxLine = 4096;
 
   /// Opens `path`, or standard input if it is `-`. Blocks on a pipe until it has a writer.
   /// Errors: kInputMissing at `place` and `key`.
@@ -53,7 +54,7 @@ class LineReader {
   const std::string& name() const { return name_; }
   /// Returns the number of the line that Next() read last.
   int number() const { return number_; }
-  /// Returns true if the line that Next() read last lacks its line feed.
+  /// Returns true if the line that Next() read last does not end in a line feed.
   bool is_unterminated() const { return is_unterminated_; }
   /// Returns true for a regular file, which can be read twice, unlike a pipe.
   bool is_regular() const { return S_ISREG(initial_status_.st_mode); }
@@ -84,7 +85,7 @@ class LineReader {
   static constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   static constexpr std::size_t kMaxBytes = kMaxLine + kByteOrderMark.size() + 1;  // 1: '\r'
 
-  /// Removes a line of `length` bytes from the buffer. Returns true.
+  /// Moves a line of `length` bytes from the buffer to `line`. Returns true.
   bool ExtractLine(std::size_t length, bool is_unterminated, std::string_view& line) {
     line = std::string_view(buffer_.data() + begin_, length);
     begin_ += length + (is_unterminated ? 0 : 1);
@@ -95,7 +96,7 @@ class LineReader {
     if (line.size() <= kMaxLine) return true;
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{name_, number_, 1}, {}, "line too long",
-                          "at most " + std::to_string(kMaxLine) + " bytes a line"));
+                          "at most " + std::to_string(kMaxLine) + " bytes per line"));
   }
 
   /// Reads more bytes after the unread part of the buffer. Returns false at the end of the file.
@@ -134,7 +135,7 @@ class LineReader {
   bool is_standard_input_;
   std::string name_;
   int descriptor_ = -1;
-  struct stat initial_status_ {};  ///< of the file when it was opened
+  struct stat initial_status_ {};  ///< status of the file when it was opened
   off_t start_ = 0;
   std::vector<char> buffer_ = std::vector<char>(1 << 16);
   std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer

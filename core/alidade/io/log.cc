@@ -34,7 +34,8 @@ thread_local bool in_log_sink = false;
 /// Innermost scope of this thread.
 thread_local const LogScope* log_scope = nullptr;
 
-/// Lowest level that a sink receives. A message below this level costs only one load.
+/// Lowest level that any sink receives. For a message below this level, Log() only loads this
+/// variable.
 std::atomic<int> lowest_log_level{static_cast<int>(LogLevel::kOff)};
 
 /// Logger of the library.
@@ -65,7 +66,7 @@ class Logger {
  private:
   Logger() : sinks_(std::make_shared<spdlog::sinks::dist_sink_mt>()), logger_("alidade", sinks_) {
     logger_.set_level(spdlog::level::trace);               // the sinks filter by level
-    logger_.set_error_handler([](const std::string&) {});  // the default handler prints
+    logger_.set_error_handler([](const std::string&) {});  // the default handler would print errors
   }
   void Update() {
     int lowest = static_cast<int>(LogLevel::kOff);
@@ -89,7 +90,7 @@ std::optional<LogLevel> LogLevelOf(std::string_view name) {
   return static_cast<LogLevel>(position - kLogLevelNames.begin());
 }
 
-/// Sink of spdlog that calls a function. The sink that contains it locks.
+/// spdlog sink that calls a function. It needs no lock, because the sink that contains it locks.
 class LogSubscription::Sink : public spdlog::sinks::sink {
  public:
   explicit Sink(LogSink function) : function_(std::move(function)) {}
@@ -138,7 +139,7 @@ void Log(LogLevel level, std::string_view text) noexcept {
     } else {
       Logger::Get().Write(level, text);
     }
-  } catch (...) {  // losing a message must not end the program
+  } catch (...) {  // a message that cannot be logged must not end the program
   }
   in_log_sink = false;
 }

@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
-/// Log: messages of the library to a person. Results are returned and errors are thrown, whether or
-/// not they are logged. Without a sink the library is silent. All functions of this header are
-/// thread-safe.
+/// Log: messages from the library to a person. The library also returns every result and throws
+/// every error; neither depends on the log. Without a sink nothing is printed. All functions of
+/// this header are thread-safe.
 namespace alidade {
 
 enum class LogLevel { kTrace, kDebug, kInfo, kWarning, kError, kOff };
@@ -23,7 +23,7 @@ std::optional<LogLevel> LogLevelOf(std::string_view name);
 /// sink must not create or destroy a LogSubscription: that would deadlock.
 using LogSink = std::function<void(LogLevel level, std::string_view text)>;
 
-/// Subscription of a sink, until the end of its scope.
+/// Subscription of a sink. It ends when the object is destroyed.
 class LogSubscription {
  public:
   /// Subscribes `sink` to the messages of level `lowest` and above.
@@ -37,8 +37,9 @@ class LogSubscription {
   std::shared_ptr<Sink> sink_;
 };
 
-/// Logging scope of one run among many. Until its end, messages of this thread begin with `prefix`,
-/// and levels above `highest` are reduced to `highest`. An outer scope then has no effect.
+/// Logging scope of one run among many. While the object exists, messages of this thread begin with
+/// `prefix`, and levels above `highest` are reduced to `highest`. The innermost scope replaces the
+/// outer ones.
 class LogScope {
  public:
   LogScope(std::string prefix, LogLevel highest);
@@ -55,7 +56,8 @@ class LogScope {
   const LogScope* outer_;
 };
 
-/// Returns true if a sink receives messages of that level. Callers need not compose other messages.
+/// Returns true if a sink receives messages of that level. If it returns false, the caller need not
+/// compose the message.
 bool IsLogged(LogLevel level);
 
 /// Passes the message to each sink that receives its level.

@@ -16,17 +16,17 @@
 
 namespace alidade {
 
-/// Reader of a file of numbers, row by row, in constant memory. It skips blank lines, lines that
-/// begin with `#`, and a last row without a line end in `NAME.partial`, the folder of an unfinished
-/// run.
+/// Reader of a file of numbers. It reads row by row in constant memory, and skips blank lines and
+/// lines that begin with `#`. In `NAME.partial`, the folder of an unfinished run, it also skips a
+/// last row without a line end.
 ///
 /// Errors       kBadData with file, line and column; those of LineReader.
 class NumberRows {
  public:
   static constexpr char kCommaOrBlanks = '\0';
 
-  /// `separator` ' ' means any blanks. kCommaOrBlanks means commas in a row that contains a comma,
-  /// else blanks.
+  /// The separator ' ' means any number of blanks. kCommaOrBlanks means commas in a row that
+  /// contains a comma, and blanks in any other row.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
       : reader_(path, place, key), separator_(separator) {
@@ -52,7 +52,7 @@ class NumberRows {
     }
     return false;
   }
-  /// Fails unless the row has `count` columns, named in `columns`.
+  /// Fails unless the row has `count` columns. The message lists their names, `columns`.
   void ExpectColumns(std::size_t count, const std::string& columns) const {
     if (cells_.size() == count) return;
     const bool is_short = cells_.size() < count;
@@ -62,14 +62,14 @@ class NumberRows {
              std::to_string(cells_.size()) + (cells_.size() == 1 ? " column" : " columns"),
          std::to_string(count) + ", " + columns);
   }
-  /// Returns the finite number in column i, called `name`.
+  /// Returns the finite number in column i. Messages call the column `name`.
   double Number(std::size_t i, const char* name) const {
     double value = 0.0;
     const char* const problem = cell::ParseNumber(text(i), value);
     if (problem != nullptr) FailCell(i, name, problem, "a finite number");
     return value;
   }
-  /// Returns the whole number in column i, 0 or more.
+  /// Returns the whole number in column i, which must not be negative.
   std::int64_t Index(std::size_t i, const char* name) const {
     const std::string_view digits = text(i);
     std::int64_t value = 0;
@@ -90,12 +90,13 @@ class NumberRows {
     return cell::ParseTimestamp(text(i), t_s, 9);
   }
 
-  /// Reports an error of column i, called `name`.
+  /// Throws an error about column i, which the message calls `name`.
   [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& problem,
                              std::string_view expected) const {
     Fail(Column(i), name, '\'' + cell::PrintableStart(text(i)) + "' " + problem, expected);
   }
-  /// Reports an error of the whole line, or of the whole file before the first line.
+  /// Throws an error about the whole line. Before the first line, the error is about the whole
+  /// file.
   [[noreturn]] void FailLine(const std::string& problem, std::string_view expected) const {
     Fail(0, {}, problem, expected);
   }
@@ -138,7 +139,8 @@ class NumberRows {
 /// Columns 1 to 7 of a trajectory in TUM format. Column 0 is the time in s.
 inline constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
 
-/// Returns columns 1 to 7, called `names`: x y z and a quaternion, whose length must be 1 to 1e-3.
+/// Returns columns 1 to 7: x y z and a quaternion, whose length must not differ from 1 by more than
+/// 1e-3. Messages call the columns `names`.
 inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
                                          const std::array<const char*, 7>& names) {
   std::array<double, 7> values{};
@@ -148,7 +150,8 @@ inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
     if (i >= 3) length2 += values[i] * values[i];
   }
   if (std::abs(std::sqrt(length2) - 1.0) <= 1e-3) return values;
-  rows.FailLine("quaternion of length " + std::to_string(std::sqrt(length2)), "length 1 to 1e-3");
+  rows.FailLine("quaternion of length " + std::to_string(std::sqrt(length2)),
+                "a length within 1e-3 of 1");
 }
 
 }  // namespace alidade

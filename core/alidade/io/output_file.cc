@@ -41,7 +41,7 @@ OutputFile::OutputFile(std::filesystem::path file, Mode mode) : path_(std::move(
 OutputFile::~OutputFile() {
   try {
     if (fd_ >= 0) Close();
-  } catch (const std::exception&) {  // errors are reported by Close()
+  } catch (const std::exception&) {  // only an explicit Close() reports errors
   }
 }
 
@@ -52,7 +52,8 @@ void OutputFile::Write(std::string_view text) {
 }
 
 void OutputFile::Flush() {
-  if (fd_ < 0) FailIo(path_.string(), "write", error_);  // rows after a gap would be misleading
+  // Further rows after a gap would be misleading.
+  if (fd_ < 0) FailIo(path_.string(), "write", error_);
   for (std::string_view remaining = buffer_; !remaining.empty();) {
     const ssize_t written = ::write(fd_, remaining.data(), remaining.size());
     if (written < 0 && errno == EINTR) continue;

@@ -10,8 +10,8 @@
 
 namespace alidade::internal {
 
-/// File that is written sequentially and reports every write error. Text is buffered for at most a
-/// second, as long as more text follows.
+/// File that is written sequentially and reports every write error. A text is buffered. A later
+/// Write() flushes the buffer if it is a second old.
 class OutputFile {
  public:
   enum class Mode { kReplace, kAppend };
@@ -23,8 +23,8 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Appends a text. Error: kIo; the file then accepts no further text, and may end in the middle
-  /// of one.
+  /// Appends a text. Error: kIo. After an error the file accepts no further text, and may end in
+  /// the middle of a text.
   void Write(std::string_view text);
   /// Writes the buffer to the operating system now. Error: kIo.
   void Flush();
@@ -36,12 +36,13 @@ class OutputFile {
   std::string buffer_;
   std::chrono::steady_clock::time_point flushed_ = std::chrono::steady_clock::now();
   int fd_ = -1;
-  int error_ = 0;  ///< of the write that failed
+  int error_ = 0;  ///< errno of the write that failed
 };
 
-/// Reports that `path` cannot be created: kIo for a failure of the disk, else kCannotCreate.
+/// Throws an Error because `path` cannot be created: kIo if the disk is full or failed, else
+/// kCannotCreate.
 [[noreturn]] void FailCreate(const std::string& path, int error_number);
-/// Reports an error kIo: `PATH: cannot VERB: REASON`.
+/// Throws an Error kIo with the text `PATH: cannot VERB: REASON`.
 [[noreturn]] void FailIo(const std::string& path, const char* verb, int error_number);
 
 }  // namespace alidade::internal

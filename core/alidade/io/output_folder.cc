@@ -55,10 +55,11 @@ std::set<std::string> Contents(const fs::path& folder) {
   return names;
 }
 
-/// Returns the names in `folder` that its list does not contain. A folder represents its contents.
+/// Returns the names in `folder` that its list does not contain. Omits the contents of a folder
+/// whose name is returned.
 std::vector<std::string> UnlistedNames(const fs::path& folder) {
   std::set<std::string> listed = {kList};
-  std::vector<std::string> listed_folders;  // with all their contents
+  std::vector<std::string> listed_folders;  // folders that are listed with all their contents
   std::ifstream stream(folder / kList);
   for (std::string line; std::getline(stream, line);) {
     if (line.ends_with('/')) listed_folders.push_back(line);
@@ -73,7 +74,7 @@ std::vector<std::string> UnlistedNames(const fs::path& folder) {
   return unlisted;
 }
 
-/// Returns the first names, for a message.
+/// Returns the first few names in quotes, for a message.
 std::string FirstNames(const std::vector<std::string>& names) {
   constexpr std::size_t kShown = 3;
   std::string text;
@@ -159,7 +160,7 @@ fs::path OutputFolder::Add(const std::string& name) const {
     list.Write(parent.string() + '\n');
   }
   list.Write(name + '\n');
-  list.Close();  // before the file is created, so that a killed process leaves no unlisted file
+  list.Close();  // before the file is created, so a killed process leaves no unlisted file
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) FailCreate(path.parent_path().string(), error.value());
@@ -200,7 +201,7 @@ void OutputFolder::Commit() {
   names.insert(kList);
   std::string list;
   for (const std::string& name : names) list += name + '\n';
-  constexpr const char* kNewList = "files.txt.new";  // the old list survives a full disk
+  constexpr const char* kNewList = "files.txt.new";  // the old list remains if the disk is full
   Write(kNewList, list);
   std::error_code error;
   fs::rename(partial_ / kNewList, partial_ / kList, error);

@@ -17,17 +17,18 @@ class OutputFolder {
  public:
   /// Creates `NAME.partial`, and its parent folders. If `target` is a link to a folder, NAME is
   /// that folder. With `force`, an existing `NAME.partial` is replaced now and NAME in Commit().
-  /// With `resume`, an existing `NAME.partial` is continued. Errors: kCannotCreate if one of them
-  /// exists otherwise, or contains a file that its `files.txt` does not list; kIo.
+  /// With `resume`, an existing `NAME.partial` is continued. Errors: kIo; kCannotCreate if one of
+  /// the two folders exists without the option that permits it, or contains a file that its
+  /// `files.txt` does not list.
   OutputFolder(const std::filesystem::path& target, bool force, bool resume = false);
   /// Removes `NAME.partial` unless it was committed or Retain() was called.
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Adds a file that other code writes to the list. A name that ends in `/` is a folder with all
-  /// its future contents. Creates the parent folders and returns the path. Errors: kCannotCreate,
-  /// kIo.
+  /// Adds `name` to the list, for a file that other code will write. A name that ends in `/` is a
+  /// folder with all its future contents. Creates the parent folders. Returns the path of the file.
+  /// Errors: kCannotCreate, kIo.
   std::filesystem::path Add(const std::string& name) const;
   /// Creates or replaces a file. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
@@ -48,12 +49,13 @@ class OutputFolder {
  private:
   /// Fails if NAME exists and must not be replaced.
   void CheckTarget() const;
-  /// Opens a descriptor of `NAME.partial`. It detects that another command removes the folder.
+  /// Opens a descriptor of `NAME.partial`, by which exists() detects that another command has
+  /// removed the folder.
   void Open();
   bool exists() const;
 
   std::filesystem::path target_, partial_;
-  int descriptor_ = -1;  ///< of `NAME.partial`
+  int descriptor_ = -1;  ///< descriptor of `NAME.partial`
   bool force_, is_retained_ = false;
 };
 

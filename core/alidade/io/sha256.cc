@@ -11,8 +11,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Throws std::bad_alloc unless a call of EVP succeeded. It fails only if memory runs out, because
-/// SHA-256 is in every build of OpenSSL.
+/// Throws std::bad_alloc if `result`, the result of a call of OpenSSL's EVP interface, is not 1.
+/// Such a call fails only if memory runs out, because every build of OpenSSL has SHA-256.
 void Check(int result) {
   if (result != 1) throw std::bad_alloc();
 }

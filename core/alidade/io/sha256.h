@@ -6,11 +6,12 @@
 #include <string>
 #include <string_view>
 
-struct evp_md_ctx_st;  // of OpenSSL
+struct evp_md_ctx_st;  // a type of OpenSSL
 
 namespace alidade::internal {
 
-/// SHA-256 of bytes that are added in several parts, in constant memory. (FIPS 180-4, by OpenSSL)
+/// SHA-256 hash (FIPS 180-4) of bytes that are added in several parts. It needs constant memory.
+/// OpenSSL computes it.
 class Sha256Stream {
  public:
   Sha256Stream();
@@ -25,7 +26,7 @@ class Sha256Stream {
   std::unique_ptr<evp_md_ctx_st, Deleter> context_;
 };
 
-/// Returns the SHA-256 as 64 hexadecimal digits.
+/// Returns the SHA-256 of `bytes` as 64 hexadecimal digits.
 std::string Sha256(std::string_view bytes);
 /// Returns the SHA-256 of a file's bytes; "" if the file cannot be read.
 std::string Sha256OfFile(const std::filesystem::path& file);

@@ -23,8 +23,8 @@ inline std::string_view Trim(std::string_view text) {
   return is_quoted ? text.substr(1, text.size() - 2) : text;
 }
 
-/// Converts the whole of `text` to a finite number. Returns nullptr, or the problem, as in `is not
-/// a number`.
+/// Converts all of `text` to a finite number. Returns nullptr on success, else the problem, such as
+/// `is not a number`.
 inline const char* ParseNumber(std::string_view text, double& value) {
   const bool has_plus = text.starts_with('+');
   if (has_plus) text.remove_prefix(1);
@@ -37,11 +37,12 @@ inline const char* ParseNumber(std::string_view text, double& value) {
   return std::isfinite(value) ? nullptr : "is not finite";
 }
 
-/// Bound on the magnitude of a time, s (292 years), so that it is a timestamp.
+/// Bound in s on the magnitude of a time (292 years). Every time below this bound fits into a
+/// Timestamp.
 inline constexpr double kTimeLimit = 9.2e9;
 
-/// Returns the timestamp nearest to a decimal number without exponent, in a unit of 10^digits ns.
-/// The time is below kTimeLimit.
+/// Returns the timestamp nearest to `text`, a decimal number without an exponent, in units of
+/// 10^digits ns. The magnitude of the time must be below kTimeLimit.
 inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
   const bool is_negative = text.starts_with('-');
   if (is_negative || text.starts_with('+')) text.remove_prefix(1);
@@ -57,7 +58,7 @@ inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
 }
 
 /// Returns the timestamp of `text`, in a unit of 10^digits ns. `value` is the number in `text`. The
-/// result is exact for a number without exponent. The time is below kTimeLimit.
+/// result is exact if `text` has no exponent. The magnitude of the time must be below kTimeLimit.
 inline Timestamp ParseTimestamp(std::string_view text, double value, std::size_t digits) {
   if (text.find_first_of("eE") == std::string_view::npos) return ExactTimestamp(text, digits);
   return TimestampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));

@@ -22,16 +22,17 @@ struct TableRow {
 struct Table {
   TextRow header;
   std::vector<TextRow> rows;
-  std::size_t text_columns = 1;  ///< number of first columns that are aligned to the left
+  std::size_t text_columns = 1;  ///< number of leading columns that are left-aligned
 };
-/// Returns the table of these rows below the names of the columns, with `corner` above the labels.
+/// Returns the table of `rows`. Its header consists of `corner`, above the labels, and the column
+/// `names`.
 Table MakeTable(const std::vector<std::string>& names, const std::vector<TableRow>& rows,
                 const std::string& corner = "");
 
 enum class TableFormat {
   kText,      ///< columns that do not fit into 100 characters continue in a table below
   kMarkdown,  ///< special characters are escaped
-  kLatex,     ///< a tabular, which needs no package; special characters are escaped
+  kLatex,     ///< a `tabular` environment, which needs no package; special characters are escaped
 };
 std::string FormatTable(const Table& table, TableFormat format);
 

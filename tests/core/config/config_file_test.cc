@@ -62,7 +62,7 @@ class ConfigFolder : public ::testing::Test {
 
 TEST(ConfigFile, RefusesWhatIsNotStrict) {
   EXPECT_EQ(TextError("sensors:\n  stereo: {model: a}\n  scale: {model: b}\n  stereo: {}\n"),
-            "78 f:4:3 sensors.stereo: duplicate key; first at line 2");
+            "78 f:4:3 sensors.stereo: duplicate key; the first one is at line 2");
   EXPECT_EQ(TextError("alidade: 1\na: &x [*x]\n"), "78 f:2:8 a: alias refers to itself");
   EXPECT_EQ(TextError("sensors:\n\tstereo: {}\n"),
             "78 f:2:1: tab in the indentation; expected spaces");
@@ -102,10 +102,11 @@ TEST(ConfigFile, AliasBombStaysSmall) {
     bomb += std::string(1, key) + ": &" + key + " [" + Repeated(alias + ", ", 9 * 4) + "]\n";
   }
   EXPECT_EQ(TextError(bomb),
-            "78 f:6:8 f: too large with its aliases expanded; expected at most 100000 values");
+            "78 f:6:8 f: too large after its aliases are expanded; expected at most 100000 values");
   const std::string lines = "a: &a \"" + std::string(500'000, 'x') + "\"\nb: [";
-  EXPECT_EQ(TextError(lines + Repeated("*a, ", 40'000) + "]"),
-            "78 f:2:65 b: too large with its aliases expanded; expected at most 8 MiB of text");
+  EXPECT_EQ(
+      TextError(lines + Repeated("*a, ", 40'000) + "]"),
+      "78 f:2:65 b: too large after its aliases are expanded; expected at most 8 MiB of text");
 }
 
 TEST(ConfigFile, AliasIsACopy) {
@@ -167,7 +168,7 @@ TEST(ConfigFile, RefusesOddEncodings) {
   EXPECT_EQ(TextError("# first\n%YAML 1.2\n---\na: 1"), "no error");
   EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07");
   EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: NUL character in a text");
-  EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: escape that is not a character");
+  EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: escape sequence that is not a valid character");
   EXPECT_EQ(TextError("a: \xF0\x9F\xA7\xAD \xC3\xA9 \xE2\x82\xAC"), "no error");
 }
 
@@ -264,8 +265,9 @@ TEST_F(ConfigFolder, IncludeErrorsNameTheInclude) {
   EXPECT_EQ(Fault("f.yaml"),
             "66 D/f.yaml:2:10 include: 'D/no.yaml' cannot be read: No such file or directory");
   Write("f.yaml", "include: [{a: 1}]");
-  EXPECT_EQ(Fault("f.yaml"),
-            "78 D/f.yaml:1:11 include[0]: not a file name; expected a file or a list of files");
+  EXPECT_EQ(
+      Fault("f.yaml"),
+      "78 D/f.yaml:1:11 include[0]: not a file name; expected a file name or a list of file names");
 }
 
 TEST_F(ConfigFolder, IncludeOutsideIsNotTrusted) {

@@ -168,7 +168,7 @@ TEST(ConfigToYaml, GivesPlainTextOneForm) {
 
 TEST(ConfigText, IncludeNeedsAFile) {
   EXPECT_EQ(Message([] { Read("a: 1\ninclude: b.yaml"); }),
-            "f.yaml:2:1 include: a config that is not a file cannot include another");
+            "f.yaml:2:1 include: only a config file can include another config");
 }
 
 }  // namespace

@@ -87,10 +87,10 @@ TEST_F(Csv, LineTooLong) {
   for (const std::string end : {"", "\n", "\r\n"}) {
     EXPECT_EQ(Frames(kHeader + row(4096) + end, kDepthConfig).size(), 1u);
     ExpectBadData(kHeader + row(4097) + end,
-                  "FILE:2:1: line too long; expected at most 4096 bytes a line");
+                  "FILE:2:1: line too long; expected at most 4096 bytes per line");
   }
   ExpectBadData(kHeader + row(200000),
-                "FILE:2:1: line too long; expected at most 4096 bytes a line");
+                "FILE:2:1: line too long; expected at most 4096 bytes per line");
 }
 
 TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {

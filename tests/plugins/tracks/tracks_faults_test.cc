@@ -70,7 +70,7 @@ TEST_F(TracksTest, Fault32UnknownDim) {
 
 TEST_F(TracksTest, Fault33LineTooLong) {
   ExpectBadData(kGood + "1,3,0,1." + std::string(4089, '0') + "\n",
-                "DIR/tracks.csv:3:1: line too long; expected at most 4096 bytes a line");
+                "DIR/tracks.csv:3:1: line too long; expected at most 4096 bytes per line");
 }
 
 TEST_F(TracksTest, Fault34TruncatedLastLine) {
@@ -145,7 +145,7 @@ TEST_F(TracksTest, Fault49QuaternionNotUnit) {
   Write("groundtruth.tum", "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0.05 1\n");
   ExpectBadData(kGood + "20,3,0,1\n20,3,1,2\n",
                 "DIR/groundtruth.tum:2: quaternion of length "
-                "1.001249; expected length 1 to 1e-3");
+                "1.001249; expected a length within 1e-3 of 1");
 }
 
 TEST_F(TracksTest, AFrameWithoutATime) {

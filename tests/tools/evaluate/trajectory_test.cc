@@ -149,7 +149,7 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
             "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
-            "poses.txt:2: quaternion of length 1.010000; expected length 1 to 1e-3");
+            "poses.txt:2: quaternion of length 1.010000; expected a length within 1e-3 of 1");
   EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
             "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number of 0 or more");
   const std::string no_rotation =

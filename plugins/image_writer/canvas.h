@@ -17,7 +17,7 @@ namespace alidade::draw {
 inline const cv::Scalar kPaper(30, 27, 24), kInk(235, 235, 235), kFaint(160, 155, 150);
 inline const cv::Scalar kRule(72, 66, 60), kTruth(190, 190, 120);
 
-/// Blue, green, red.
+/// Returns the colour of a mark, as blue, green, red.
 inline cv::Scalar ColourOf(Mark mark) {
   switch (mark) {
     case Mark::kAccepted:
@@ -39,8 +39,8 @@ inline const char* NameOf(Mark mark) {
   return kNames[static_cast<std::size_t>(mark)];
 }
 
-/// Formats a number with `digits` digits. A number below 1 has the decimals of one below 10:
-/// `0.0123`, `-40.72`.
+/// Formats a number with `digits` digits, of which at least one is before the point. With 5 digits:
+/// `0.0123`, `-40.720`.
 inline std::string Digits(double value, int digits) {
   if (!std::isfinite(value)) return "-";
   const double size = std::abs(value);
@@ -69,18 +69,19 @@ inline std::string TwoDigits(double value) {
   return text;
 }
 
-/// Image to draw on, with positions in fractions of a pixel.
+/// Image to draw on. Positions can be fractions of a pixel.
 class Canvas {
  public:
   explicit Canvas(cv::Mat& image) : image_(image) {}
 
-  /// Returns a part of the image that shares its pixels.
+  /// Returns a part of the image. The part shares its pixels with the image.
   cv::Mat Part(const cv::Rect2d& box) {
     return image_(cv::Rect(box) & cv::Rect({0, 0}, image_.size()));
   }
 
   enum class Align { kLeft, kRight, kMiddle };
-  /// `position` is on the base line. Characters that OpenCV cannot draw are shown as '?'.
+  /// Draws a text whose base line starts, or is aligned, at `position`. Characters that OpenCV
+  /// cannot draw are shown as '?'.
   void Text(cv::Point2d position, const std::string& text, const cv::Scalar& colour,
             double size = 0.45, Align align = Align::kLeft, int thickness = 1) {
     std::string ascii;

@@ -14,7 +14,7 @@
 
 namespace alidade::draw {
 
-/// Panel with the text and the plot next to the image of a frame.
+/// Panel next to the image of a frame, with text and a plot.
 class Panel {
  public:
   static constexpr int kWidth = 400;  ///< px
@@ -58,7 +58,7 @@ class Panel {
   }
   /// Returns the font size at which the title fits the width.
   static double TitleSize(const std::string& title) {
-    constexpr double kDefault = 0.6, kLetter = 18.5;  // width of a letter at size 1, px
+    constexpr double kDefault = 0.6, kLetter = 18.5;  // kLetter: width of a letter at size 1, px
     const double width = kLetter * static_cast<double>(std::max<std::size_t>(1, title.size()));
     return std::clamp((kRight - kLeft) / width, 0.35, kDefault);
   }
@@ -80,7 +80,8 @@ class Panel {
     y_ += 10.0;
     Rule();
   }
-  /// Draws the value of each measurement, and its innovation between -4 and 4 sigma.
+  /// Draws the value and the innovation of each measurement. The innovation is drawn on a scale
+  /// from -4 to 4 sigma.
   void Innovations(const std::vector<ViewInnovation>& innovations) {
     constexpr double kMiddle = 0.5 * (250.0 + kRight), kPerSigma = (kRight - 250.0) / 8.0;
     canvas_.Text({kLeft, y_}, "measured", kFaint);
@@ -114,7 +115,7 @@ class Panel {
   void Elements(const std::vector<ViewElement>& elements) {
     const bool has_truth = std::ranges::any_of(
         elements, [](const ViewElement& element) { return std::isfinite(element.truth); });
-    const double max_letters = has_truth ? 19.0 : 26.0;  // letters that fit
+    const double max_letters = has_truth ? 19.0 : 26.0;  // letters that fit into the column
     const double value = has_truth ? 234.0 : 290.0, sigma = has_truth ? 308.0 : kRight;
     canvas_.Text({kLeft, y_}, "estimate", kFaint);
     canvas_.Text({sigma, y_}, "sigma", kFaint, 0.45, Canvas::Align::kRight);
@@ -155,7 +156,8 @@ class Panel {
     };
     Inset inset(canvas_, box);
     for (const PlaneGaussian& landmark : map.landmarks) {
-      // A longer ellipse is paler, so that uncertain landmarks do not hide the others.
+      // Long ellipses are drawn in a paler colour, so that uncertain landmarks do not hide the
+      // others.
       constexpr double kShort = 25.0;  // px
       const double length = 3.0 * scale * std::sqrt(std::max(landmark.xx, landmark.yy));
       const double strength = std::clamp(kShort / length, 0.12, 1.0);
@@ -187,7 +189,7 @@ class Panel {
     Frame(box, map.right + ", " + map.up + " [m]");
     ScaleBar(box, scale);
   }
-  /// Draws a bar of a round length between a fifth and a half of the width.
+  /// Draws a scale bar with a round length of between a fifth and a half of the width.
   void ScaleBar(const cv::Rect2d& box, double px_per_m) {
     double length_m = std::pow(10.0, std::floor(std::log10(0.5 * box.width / px_per_m)));
     for (const double factor : {5.0, 2.0}) {
@@ -203,7 +205,7 @@ class Panel {
     canvas_.Text({x, y - 7.0}, text, kFaint, 0.4);
   }
 
-  /// Draws one element over time with its 3-sigma band, and its truth.
+  /// Draws one element over time, with its 3-sigma band and its true value.
   void Series(const ViewSeries& series, const cv::Rect2d& box) {
     double low = INFINITY, high = -INFINITY;
     for (std::size_t i = 0; i < series.value.size(); ++i) {

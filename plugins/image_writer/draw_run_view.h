@@ -13,14 +13,14 @@
 
 namespace alidade::draw {
 
-/// Placement of a frame's image on the canvas. The image is enlarged to a height of kHeight or a
-/// width of kMaxWidth, and centred in its column.
+/// Placement of a frame's image on the canvas. The image is scaled to the height kHeight or to the
+/// width kMaxWidth, by at most kMaxScale, and is centred vertically.
 struct Placement {
   static constexpr int kHeight = 720, kMaxWidth = 1280;  // px
   static constexpr double kMaxScale = 4.0;
 
   double scale;
-  cv::Size size;  ///< of the enlarged image
+  cv::Size size;  ///< of the scaled image, px
   int top;
 
   explicit Placement(const GreyImage& image) {
@@ -30,7 +30,7 @@ struct Placement {
     size = {2 * cvRound(0.5 * scale * width), 2 * cvRound(0.5 * scale * height)};
     top = (kHeight - size.height) / 2;
   }
-  /// Returns the position of the centre of pixel (u, v).
+  /// Returns the position on the canvas of the centre of pixel (u, v).
   cv::Point2d At(const std::array<double, 2>& pixel) const {
     return {(pixel[0] + 0.5) * scale - 0.5, top + (pixel[1] + 0.5) * scale - 0.5};
   }
@@ -42,7 +42,7 @@ inline cv::Scalar Fade(const cv::Scalar& colour, double age) {
 }
 
 inline void DrawFeature(Canvas& canvas, const ViewFeature& feature, const Placement& placement) {
-  const double radius = feature.predicted ? 2.4 : 3.2;  // px; larger without an ellipse around it
+  const double radius = feature.predicted ? 2.4 : 3.2;  // px
   const cv::Scalar colour = ColourOf(feature.mark);
   cv::Point2d end = placement.At(feature.pixel);
   for (auto position = feature.trail.rbegin(); position != feature.trail.rend(); ++position) {
@@ -63,7 +63,8 @@ inline void DrawFeature(Canvas& canvas, const ViewFeature& feature, const Placem
   canvas.Disc(centre, radius, colour);
 }
 
-/// Draws the image of a frame with its features, and to its right a panel with the estimate.
+/// Draws the image of a frame with its features. Draws a panel with the estimate to the right of
+/// the image.
 inline cv::Mat DrawRunView(const RunView& view) {
   const Placement placement(view.image.grey);
   cv::Mat canvas_image(Placement::kHeight, placement.size.width + Panel::kWidth, CV_8UC3, kPaper);

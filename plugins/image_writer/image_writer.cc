@@ -45,9 +45,9 @@ class ImageSequenceWriter : public MatWriter {
   ImageArguments destination_;
 };
 
-/// Writer of a video, MJPG in AVI. Its frame rate is that of the first two frames, rounded to a
-/// whole number of at least 1 Hz, or 30 Hz for a single frame. Without an image it writes no video.
-/// Errors: kCannotCreate, kIo.
+/// Writer of a video, MJPG in AVI. The frame rate follows from the times of the first two frames,
+/// and is rounded to a whole number of at least 1 Hz. A video of a single frame has 30 Hz. Without
+/// an image no video is written. Errors: kCannotCreate, kIo.
 class VideoWriter : public MatWriter {
  public:
   explicit VideoWriter(const ImageArguments& arguments)
@@ -62,7 +62,7 @@ class VideoWriter : public MatWriter {
   }
 
  private:
-  static constexpr double kSingleFrameRate = 30.0;  ///< Hz, of a single frame
+  static constexpr double kSingleFrameRate = 30.0;  ///< Hz, for a single frame
 
   /// All images have the size of the first image.
   void Write(std::int64_t /*number*/, Timestamp timestamp, const cv::Mat& image) override {
@@ -85,7 +85,7 @@ class VideoWriter : public MatWriter {
       throw Error(ExitCode::kCannotCreate, ErrorLine({destination_.shown}, {}, "cannot be created",
                                                      "OpenCV with its Motion JPEG writer"));
     }
-    constexpr double kQuality = 90.0;  // corresponds to quality 95 of a JPEG by imencode
+    constexpr double kQuality = 90.0;  // equals quality 95 of cv::imencode
     video_.set(cv::VIDEOWRITER_PROP_QUALITY, kQuality);
     Encode(first_);
   }

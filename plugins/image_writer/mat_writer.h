@@ -12,11 +12,12 @@ namespace alidade {
 
 /// Image writer that draws each frame. A derived class writes or shows the image.
 ///
-/// Pixels (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px. The number
-/// of the frame is at the lower left, in dark grey. The centre of the upper left pixel is (0, 0).
+/// Points (u, v) are drawn on black as white discs of radius 4 px, placed to 1/256 px. The number
+/// of the frame is drawn at the lower left, in dark grey. The centre of the upper left pixel is (0,
+/// 0).
 class MatWriter : public ImageWriter {
  public:
-  /// Size of the images that are drawn from points, px.
+  /// `width` and `height` are the size, px, of the images that are drawn from points.
   MatWriter(int width, int height) : width_(width), height_(height) {}
 
   void Add(std::int64_t number, Timestamp timestamp,

@@ -23,11 +23,11 @@
 
 namespace alidade {
 
-/// Window in a process of its own. The library that draws windows ends a process without a display,
-/// and needs one thread for itself. Images are sent to the process by a socket.
+/// Window in a separate process. The library that draws windows ends a process that has no display,
+/// and needs a thread of its own. Images are sent to the separate process through a socket.
 class WindowProcess {
  public:
-  /// Opens the window. Error: kCannotCreate, with `shown`.
+  /// Opens the window. Error: kCannotCreate, with `shown` in the message.
   WindowProcess(const std::string& title, const std::string& shown) {
     std::array<int, 2> sockets{};
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets.data()) == 0) {
@@ -45,7 +45,7 @@ class WindowProcess {
     if (child_ > 0 && ::recv(socket_, &opened, 1, 0) == 1) return;
     End();
     throw Error(ExitCode::kCannotCreate, ErrorLine({}, shown, "no window can be opened",
-                                                   "the display in DISPLAY; or --save-video "
+                                                   "a display named by DISPLAY, or --save-video "
                                                    "FILE.avi, which needs no display"));
   }
   ~WindowProcess() { End(); }
@@ -76,14 +76,14 @@ class WindowProcess {
     if (socket_ >= 0) ::close(socket_);
     socket_ = -1;
     if (child_ > 0) {
-      ::kill(child_, SIGKILL);  // the child may wait for its display
+      ::kill(child_, SIGKILL);  // the child may be waiting for the display
       ::waitpid(child_, nullptr, 0);
     }
     child_ = -1;
   }
 
-  /// Runs the child process. It ends with its parent, after the last image, or when its window is
-  /// closed.
+  /// Runs the child process. The child ends after the last image, when its window is closed, or
+  /// when its parent ends.
   [[noreturn]] static void RunChild(int socket, const std::string& title) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (const int signal_number :
@@ -101,7 +101,7 @@ class WindowProcess {
       cv::namedWindow(title, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO | cv::WINDOW_GUI_NORMAL);
       const char opened = 1;
       if (::send(socket, &opened, 1, MSG_NOSIGNAL) == 1) ShowAll(socket, title);
-    } catch (const std::exception&) {  // the parent detects the end
+    } catch (const std::exception&) {  // the parent detects that the child has ended
     }
     ::_exit(0);
   }

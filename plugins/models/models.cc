@@ -74,23 +74,23 @@ class Models : public Source {
   struct Motion {
     const MotionBinding* binding;
     Random noise;
-    int stream = -1;                       ///< of its control input
-    const Motion* input_source = nullptr;  ///< motion that draws the stream, if it is another one
+    int stream = -1;                       ///< stream of its control input
+    const Motion* input_source = nullptr;  ///< motion that draws the input, if not this one
     std::vector<double> input, mean, amplitude;
     double frequency_hz = 0.0;
     std::vector<double> w;       ///< current noise
-    bool is_noise_held = false;  ///< w is reused, because nothing has been measured since
+    bool is_noise_held = false;  ///< true if w is reused: no measurement since its draw
   };
   struct Sensor {
     const SensorBinding* binding;
-    SharedSensor model;  ///< with landmarks as xyz
+    SharedSensor model;  ///< model with landmarks in the representation xyz
     int stream;
     models::Schedule schedule;
     Random noise;
-    int max_per_frame;  ///< landmarks per frame
+    int max_per_frame;  ///< maximum number of landmarks per frame
   };
 
-  /// Builds the problem of the config, merged with `overrides`.
+  /// Builds the problem of the truth from the config, merged with `overrides`.
   void BuildTruth(const SourceArguments& arguments) {
     const auto overrides = arguments.entry.Find("overrides");
     const Config truth =
@@ -138,7 +138,7 @@ class Models : public Source {
       }
       if (!prior.sensor.empty()) {
         entry.Fail(
-            "block '" + block.name + "' starts from a measurement: its true value is unknown",
+            "block '" + block.name + "' starts from a measurement, so its true value is unknown",
             "source.initial: {" + block.owner + ": {" + name + ": value}}");
       }
       x = prior.mean;
@@ -237,7 +237,7 @@ class Models : public Source {
         }
         if (sensor_settings) {
           sensor_settings->Fail(
-              "an earlier sensor has the stream '" + binding.stream + "', and draws it",
+              "an earlier sensor has and simulates the stream '" + binding.stream + "'",
               "the entry of that sensor");
         }
         continue;
@@ -254,7 +254,7 @@ class Models : public Source {
     if (settings) settings->RejectUnread();
   }
 
-  /// Returns the model with landmarks as points or poses.
+  /// Returns the model of the sensor, with landmarks in a representation as points or poses.
   static SharedSensor ModelOf(const Node& entry, const SensorBinding& binding) {
     if (!binding.model->has_landmark()) return binding.model;
     entry.At("landmarks", "sensor '" + binding.name + "'");
@@ -263,7 +263,7 @@ class Models : public Source {
     const auto representation = RepresentationOf(binding.model->roles());
     if (!representation || !IsXyz(*representation)) {
       entry.Fail("model '" + binding.model->name() + "' of sensor '" + binding.name +
-                     "' has no representation xyz, in which the points are drawn",
+                     "' has no representation xyz, which this source needs for its points",
                  "a source with its own landmarks");
     }
     return binding.model;
@@ -347,7 +347,7 @@ class Models : public Source {
         problem_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
       }
     }
-    // A constant block keeps its value, whatever its model computes.
+    // A constant block keeps its value, even if its model computes another one.
     for (std::size_t id = 0; id < x_.size(); ++id) {
       if (problem_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
         x_[id] = next[id];
@@ -380,8 +380,8 @@ class Models : public Source {
     }
   }
 
-  /// Emits one measurement. Returns false if h is not defined or the value is not valid. A
-  /// measurement that is missing counts as emitted.
+  /// Emits one measurement. Returns false if h is not defined or the value is not valid. Returns
+  /// true if the measurement is emitted, or is simulated as missing.
   bool EmitMeasurement(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
                        Frame& frame) {
     const Geometry& geometry = sensor.model->measurement().geometry;
@@ -399,7 +399,8 @@ class Models : public Source {
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
-    // Drawn before the domain of h is checked, so that the true state does not shift the noise.
+    // The noise is drawn before the domain of h is checked. Its sequence is therefore the same for
+    // every true state.
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
     const auto outcome = sensor.schedule.Draw();
@@ -438,7 +439,7 @@ class Models : public Source {
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
   std::vector<std::array<double, 3>> points_;
-  std::vector<std::array<double, 4>> orientations_;  ///< of landmarks that have a pose
+  std::vector<std::array<double, 4>> orientations_;  ///< orientations of landmarks that have a pose
   double dt_s_, start_s_ = 0.0;
   std::int64_t count_, index_ = 0;
 };

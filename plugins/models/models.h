@@ -24,18 +24,20 @@ inline constexpr const char* kModelsKeys =
 ///   sensor     z = h(x_k) (+) s L n,   R = L L',   s = 1, or sigma_scale for an outlier
 ///   input      u_i(t) = mean_i + amplitude_i sin(2 pi frequency_hz t)
 ///
-/// with n ~ N(0, I), so that a filter with the same config is consistent. Discrete noise w is held
-/// until something is measured, as the filters assume (docs/noise_models.md).
+/// with n ~ N(0, I). A filter with the same config is therefore consistent. Discrete noise w stays
+/// constant until the next measurement, as the filters assume (docs/noise_models.md).
 ///
-/// A sensor measures at each time step, or at its own rate_hz, if h is defined and the value valid.
-/// Each measurement is omitted with the probability `missing`. If several sensors use one stream,
-/// the first one draws it. Points are drawn uniformly in `box`, those of `landmarks.known` about
-/// their positions. A frame contains the points that the sensor sees; if they are more than
-/// max_per_frame, those with the smallest ids. The first time step is at `initial_time_s`, or 0.
-/// The streams are those of the sensors and inputs, the truths are the blocks.
+/// A sensor measures at each time step, or at its own rate_hz, provided that h is defined and the
+/// value is valid. Each measurement is omitted with the probability `missing`. If several sensors
+/// use one stream, the first of these sensors simulates it. Points are drawn uniformly in `box`;
+/// points of `landmarks.known` are drawn about their given positions. A frame contains the points
+/// that the sensor sees, at most max_per_frame. If it sees more, the points with the smallest ids
+/// are used. The first time step is at `initial_time_s`, or 0. The streams are those of the sensors
+/// and inputs. Each block is a true value.
 ///
-/// Each noise has its own stream of the seed: 0 start, 1 points, 2 orientations of landmarks,
-/// 100 + i motion models, 1000 + 2 i sensors, 1001 + 2 i their missing measurements and outliers.
+/// Each noise has its own random stream of the seed: 0 start, 1 points, 2 orientations of
+/// landmarks, 100 + i motion models, 1000 + 2 i sensors, 1001 + 2 i their missing measurements and
+/// outliers.
 ///
 /// Keys         kModelsKeys.
 /// Errors       kBadConfig; kBadData if the truth leaves the domain of a motion model.

@@ -15,7 +15,7 @@ namespace alidade::models {
 struct Schedule {
   struct Outcome {
     bool missing;
-    double sigma_scale;  ///< factor of the noise; 1 unless it is an outlier
+    double sigma_scale;  ///< factor of the noise; 1 if it is not an outlier
   };
 
   /// Returns true if the sensor measures at time step `index`.
@@ -32,15 +32,17 @@ struct Schedule {
   }
 
   double per_step = 1.0;  ///< measurements per time step, at most 1
-  /// Known numbers of each measurement of one time step. Most sensors have an empty list.
+  /// Known numbers of each measurement of one time step. A sensor without known numbers has one
+  /// empty list.
   std::vector<std::vector<double>> known;
   double missing = 0.0, outliers = 0.0, sigma_scale = 1.0;
   Random random;
 };
 
-/// Reads the entry of a sensor: `rate_hz`, `missing` and `outliers: {share, sigma_scale}`. A sensor
-/// with `known_size` known numbers also has `known`, a list of lists. Without an entry the sensor
-/// measures at each of the `rate_hz` steps per second. Errors: kBadConfig.
+/// Reads the entry of a sensor: `rate_hz`, `missing` and `outliers: {share, sigma_scale}`. If
+/// `known_size` is not 0, also reads `known`, a list with `known_size` numbers for each
+/// measurement. Without an entry the sensor measures at each time step, `rate_hz` times per second.
+/// Errors: kBadConfig.
 inline Schedule ReadSchedule(const std::optional<Node>& entry, double rate_hz, int known_size,
                              std::uint64_t seed, std::uint64_t stream) {
   Schedule schedule{1.0, {}, 0.0, 0.0, 1.0, Random(seed, stream)};

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-/// Smooth curves through values at given times, which increase.
+/// Smooth curves through values at given, increasing times.
 namespace alidade {
 
 using Quaternion = std::array<double, 4>;  ///< w x y z
@@ -18,8 +18,8 @@ using Quaternion = std::array<double, 4>;  ///< w x y z
 ///   h_i-1 M_i-1 + 2 (h_i-1 + h_i) M_i + h_i M_i+1
 ///          = 6 ((y_i+1 - y_i) / h_i - (y_i - y_i-1) / h_i-1),   M_0 = M_n = 0
 ///
-/// A single point is constant; two points form a straight line. The outer cubics continue beyond
-/// the ends.
+/// For a single point the curve is constant. For two points it is a straight line. The first and
+/// the last cubic continue beyond the ends.
 /// Source       [Press2007] sec. 3.3.
 class CubicSpline {
  public:
@@ -29,11 +29,11 @@ class CubicSpline {
   Eigen::Vector3d At(double t_s) const;
 
  private:
-  /// Solves the tridiagonal system of M by elimination and substitution.
+  /// Solves the tridiagonal system for M by elimination and substitution.
   void SolveSecondDerivatives();
 
   std::vector<double> times_;
-  std::vector<Eigen::Vector3d> points_, second_derivatives_;  ///< y_i, M_i
+  std::vector<Eigen::Vector3d> points_, second_derivatives_;  ///< y_i and M_i
 };
 
 /// Cubic Bezier curve on the unit quaternions through q_i at times t_i: C1 for any times.
@@ -43,10 +43,11 @@ class CubicSpline {
 ///          w1 = omega_i h / 3,  w3 = omega_i+1 h / 3,
 ///          w2 = Log(Exp(-w1) q_i^-1 q_i+1 Exp(-w3))
 ///
-/// so that the angular velocity at q_i is omega_i. omega_i is the mean of the rates of the
-/// rotations Log(q_i^-1 q_i+1) before and after q_i, each weighted with the duration of the other.
-/// At the ends it is the rate of the only rotation. Two key frames form a slerp, and so do several
-/// with the same rate about the same axis.
+/// With this choice the angular velocity at q_i is omega_i. omega_i is a weighted mean of the rates
+/// of the rotations Log(q_i^-1 q_i+1) before and after q_i. The weight of each rate is the duration
+/// of the other rotation. At each end, omega_i is the rate of the only adjacent rotation. Between
+/// two key frames the curve is a slerp. This also holds for more key frames if all rotations have
+/// one axis and rate.
 /// Source       [Kim1995] sec. 4.
 class RotationCurve {
  public:
@@ -57,7 +58,7 @@ class RotationCurve {
 
  private:
   static Quaternion Plus(const Quaternion& q, const Eigen::Vector3d& d);
-  /// Returns the angular velocity from i to i + 1, rad/s.
+  /// Returns the mean angular velocity from q_i to q_i+1, rad/s.
   Eigen::Vector3d Rate(std::size_t i) const;
 
   std::vector<double> times_;

@@ -12,32 +12,34 @@
 
 namespace alidade::scene {
 
-/// Relative poses between frames of a trajectory. One of `every_frames` frames is a keyframe k:
+/// Simulates relative poses between keyframes of a trajectory. Every `every_frames`-th frame is a
+/// keyframe. Keyframe k has the measurements
 ///
 ///   z = (R_k' (r_j - r_k) + n_r, (q_k^-1 q_j) (+) n_q)   for the previous keyframe, j = k - 1,
-///                                                        unless to_previous is false; and for the
-///                                                        nearest keyframe that is old enough and
-///                                                        near enough, which closes a loop
-///   z = (0, 1), without noise                            for k itself, which defines its pose
+///                                                        unless to_previous is false; and for a
+///                                                        closure: j is the nearest of the
+///                                                        keyframes old and near enough
+///   z = (0, 1), without noise                            for j = k, which defines the pose of k
 ///
-/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement is `first` + j,
-/// or `first` + k.
+/// with n_r ~ N(0, sigma_r^2), n_q ~ N(0, sigma_q^2). The landmark of a measurement has the id
+/// `first` + j.
 class Keyframes {
  public:
   Keyframes(Params& p, std::uint64_t seed);
 
   bool is_enabled() const { return interval_ > 0; }
-  /// Number of keyframes so far.
+  /// Returns the number of keyframes so far.
   std::size_t size() const { return keyframes_.size(); }
   const std::array<double, 3>& position(std::size_t k) const { return keyframes_[k].position; }
 
-  /// Appends the measurements of frame `index` to stream `stream` of `frame`. To be called for each
-  /// frame in order. Ids of landmarks start at `first`.
+  /// Appends the measurements of frame `index` to stream `stream` of `frame`. The caller must call
+  /// it for each frame, in order. Ids of landmarks start at `first`.
   void Emit(std::size_t index, const CameraState& state, int stream, std::size_t first,
             Frame& frame);
 
  private:
-  /// Returns the nearest keyframe within the radius that is old enough, or size().
+  /// Returns the index of the nearest keyframe that is within the radius and old enough. Returns
+  /// size() if no keyframe is.
   std::size_t Nearest(const CameraState& state) const;
 
   void EmitRelative(const CameraState& state, std::size_t j, int stream, std::size_t first,

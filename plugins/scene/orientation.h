@@ -7,7 +7,7 @@
 #include "alidade/config/config.h"
 #include "curves.h"
 
-/// Orientation of a camera, in the forms that the config accepts.
+/// Readers of the orientation of a camera, in each form that the config accepts.
 namespace alidade::scene {
 
 using Vector = std::array<double, 3>;
@@ -15,7 +15,7 @@ using Vector = std::array<double, 3>;
 Vector ToArray(const Eigen::Vector3d& v);
 Quaternion ToArray(const Eigen::Quaterniond& q);
 
-/// Reads `{w: , x: , y: , z: }`, of unit length to 1e-3.
+/// Reads a quaternion `{w: , x: , y: , z: }`, which must have unit length to 1e-3.
 Quaternion ReadQuaternion(const Node& node);
 
 /// Reads the orientation of a key frame, in one of four forms:
@@ -26,14 +26,14 @@ Quaternion ReadQuaternion(const Node& node);
 ///   quaternion: {w, x, y, z}      Hamilton, unit
 Quaternion ReadOrientation(const Node& node);
 
-/// Computes world_from_cam of a camera at `position` that looks at `target`: z forward, y as far
-/// down as z permits.
+/// Computes the orientation world_from_cam of a camera at `position` that looks at `target`. z
+/// points forward; y points down, as far as z permits.
 ///
 ///   z = (target - position) / |target - position|
 ///   x = z x up_direction / |z x up_direction|
 ///   y = z x x
 ///
-/// Returns false if this x does not exist.
+/// Returns false if z is parallel to up_direction, or not defined: x then does not exist.
 bool LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target,
             const Eigen::Vector3d& up_direction, Quaternion& orientation);
 
@@ -41,8 +41,8 @@ bool LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target,
 ///
 ///   V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
 ///
-/// y is the displacement, in the initial axes, of a body that meanwhile rotates by phi,
-/// |phi| < 2 pi. x is its displacement at constant velocity in the axes of the body.
+/// y is the displacement of a body, in its initial axes, while the body rotates by phi, |phi| < 2
+/// pi. x is velocity times duration, with the velocity constant in the axes of the body.
 Eigen::Vector3d BodyFrameDisplacement(const Eigen::Vector3d& phi, const Eigen::Vector3d& y);
 
 }  // namespace alidade::scene

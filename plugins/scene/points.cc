@@ -16,7 +16,8 @@ Eigen::Vector3d RandomDirection(Random& random) {
   return point.normalized();
 }
 
-/// Returns points on spheres about `centre`, in turn on each of `radii`.
+/// Returns points on spheres about the key `centre`. The points cycle through the spheres of
+/// `radii`.
 std::vector<Eigen::Vector3d> OnShells(const Node& node, std::size_t count, Random& random) {
   const Node radii_node = node.At("radii", "shells");
   const std::vector<double> radii = radii_node.Numbers();
@@ -56,7 +57,7 @@ Eigen::Vector3d Box::PointOnFaces(Random& random) const {
   const Eigen::Vector3d size = max - min;
   const double areas[3] = {size.y() * size.z(), size.z() * size.x(), size.x() * size.y()};
   double offset = (areas[0] + areas[1] + areas[2]) * random.Uniform();
-  int axis = 0;  // normal to the face
+  int axis = 0;  // axis normal to the face
   while (axis < 2 && offset >= areas[axis]) offset -= areas[axis++];
   const bool is_upper_face = random.Uniform() < 0.5;
   Eigen::Vector3d point = PointInside(random);

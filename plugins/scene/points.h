@@ -9,8 +9,8 @@
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
 
-/// Points of a scene, from the config's `source.points`. The index of a point in the list is its
-/// id.
+/// Points of a scene, read from the config's `source.points`. The id of a point is its index in the
+/// list.
 namespace alidade::scene {
 
 Eigen::Vector3d ReadVector(const Node& node);
@@ -20,17 +20,18 @@ struct Box {
   Eigen::Vector3d min, max;
 
   explicit Box(const Node& node);
-  /// Returns a random point, uniform in the volume.
+  /// Returns a random point, uniformly distributed in the volume.
   Eigen::Vector3d PointInside(Random& random) const;
-  /// Returns a random point, uniform on the six faces.
+  /// Returns a random point, uniformly distributed on the six faces.
   Eigen::Vector3d PointOnFaces(Random& random) const;
 };
 
-/// Returns the key of `names` that `node` has, and its value. Fails unless it has exactly one.
+/// Returns the key of `names` that `node` contains, and the value of this key. Fails if `node` does
+/// not contain exactly one of them.
 std::pair<std::string, Node> OneOf(const Node& node, const std::vector<std::string>& names);
 
-/// Reads the map `points` of the config, see kSceneKeys. Points that are not listed are drawn from
-/// `random`. Errors: kBadConfig.
+/// Reads the map `points` of the config, see kSceneKeys. Draws points from `random` unless the map
+/// lists them. Errors: kBadConfig.
 std::vector<Eigen::Vector3d> ReadPoints(const Node& node, Random& random);
 
 }  // namespace alidade::scene

@@ -81,12 +81,12 @@ class Scene : public Source {
 
  private:
   enum Measures { kPixel, kStereo, kDepth };
-  /// Point that is seen, with its noise of unit variance.
+  /// Observation of a visible point.
   struct Observation {
     std::size_t point;
-    double pixel[2];  ///< exact
-    double depth;     ///< hz, m
-    std::array<double, 4> noise;
+    double pixel[2];              ///< exact
+    double depth;                 ///< hz, m
+    std::array<double, 4> noise;  ///< of unit variance
   };
 
   void ReadNumbers(Params& p) {
@@ -145,7 +145,7 @@ class Scene : public Source {
                {state + ".angular_velocity", 3}};
   }
 
-  /// Returns the points that are seen from `state`, in the order of their ids.
+  /// Returns the observations of the points visible from `state`, in the order of the ids.
   std::vector<Observation> Observe(const scene::CameraState& state) {
     std::vector<Observation> observations;
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -203,7 +203,8 @@ class Scene : public Source {
     frame.measurements.push_back(std::move(measurement));
   }
 
-  /// Emits v = V(phi)^-1 R_WC' (r' - r) / dt with phi = omega dt, as odometry_pose integrates it.
+  /// Emits v = V(phi)^-1 R_WC' (r' - r) / dt and omega, with phi = omega dt: the velocities with
+  /// which odometry_pose moves to the next pose.
   void EmitOdometry(Frame& frame) {
     const scene::CameraState& current = trajectory_[index_];
     const scene::CameraState& next = trajectory_[index_ + 1];

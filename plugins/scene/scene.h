@@ -24,31 +24,32 @@ inline constexpr const char* kSceneKeys =
 /// Simulates points in space, seen by a moving camera.
 ///
 ///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, sigma_px^2 I)
-///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair of pinholes, B camera.baseline_m
+///   stereo     (u, v, u - fx B / hz, v) + n_px,   B camera.baseline_m: rectified pinhole pair
 ///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, sigma_depth_m^2)
 ///   known      (u, v, hz (1 + n)),   n ~ N(0, known_points.sigma_depth_relative^2)
-///   odometry   v, omega in cam, constant, with which odometry_pose moves from this frame to the
-///              next, + N(0, sigma^2)
+///   odometry   (v, omega) + n,   n ~ N(0, sigma^2): constant velocities in cam, with which
+///              odometry_pose moves from this frame to the next
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     a point is seen; its id is the landmark
 ///   known      3        u, v, depth       instead of the first observation of each of the first
-///                                         known_points.count points that are seen; with its
-///                                         covariance, unless sigma_px is 0
-///   odometry   6        vx vy vz wx wy wz every frame but the last, for the motion to the next
+///                                         known_points.count points that are seen; has a
+///                                         covariance unless sigma_px is 0
+///   odometry   6        vx vy vz wx wy wz every frame but the last
 ///   relative_  7        see Keyframes     keyframes, if enabled
 ///   poses
 ///
 /// The camera looks along z, with x to the right and y down. A point is seen if it is in front of
-/// the camera and both its exact and its noisy pixel are in the image. Nothing hides a point;
-/// surfaces only appear in images. If more than max_features_per_frame points are seen, those of
-/// the previous frame have priority, then those with smaller ids. Truth is `cam.position`,
-/// `cam.orientation` (world_from_cam), `cam.velocity` (world) and `cam.angular_velocity` (cam),
-/// with velocities as in quaternion_pose, and the position of each point.
+/// the camera and both its exact and its noisy pixel are in the image. Nothing hides a point:
+/// surfaces only appear in images. If more than max_features_per_frame points are seen, points of
+/// the previous frame have priority, then points with smaller ids. The true values are
+/// `cam.position`, `cam.orientation` (world_from_cam), `cam.velocity` (world) and
+/// `cam.angular_velocity` (cam), with the velocities defined as in quaternion_pose, and the
+/// position of each point.
 ///
-/// Streams 0 to 5 of the seed provide points, trajectory, pixels, odometry, image noise and
-/// relative poses. The pixels use four numbers for each point and frame, whether or not the point
-/// is seen.
+/// Random streams 0 to 5 of the seed provide points, trajectory, pixels, odometry, image noise and
+/// relative poses. Four numbers are drawn for the pixels of each point and frame, whether or not
+/// the point is seen.
 ///
 /// Keys         kSceneKeys; keys of the camera in alidade/model/camera.h.
 /// Errors       kBadConfig.

@@ -6,7 +6,7 @@
 #include "alidade/config/config.h"
 #include "plugins/common/surfaces.h"
 
-/// Textured surfaces of a scene, from the config's `source.surfaces`.
+/// Textured surfaces of a scene, read from the config's `source.surfaces`.
 namespace alidade::scene {
 
 /// Reads the list `surfaces` of the config, see kSceneKeys. Errors: kBadConfig.

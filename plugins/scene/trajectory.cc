@@ -13,16 +13,17 @@
 namespace alidade::scene {
 namespace {
 
-/// Function that returns the pose at a time. The velocities of a frame move the camera there from
-/// the frame before:
+/// Function that returns the pose at a time. The velocities of a frame are those that move the
+/// camera from the previous frame to this frame:
 ///
 ///   v = (r(t) - r(t - dt)) / dt,   omega = Log(q(t - dt)^-1 q(t)) / dt
 ///
-/// so that quaternion_pose reproduces exactly these poses.
+/// With these velocities quaternion_pose reproduces the poses exactly.
 using PoseAt = std::function<std::pair<Eigen::Vector3d, Quaternion>(double t_s)>;
 
-/// Returns the times of the items of a list. Either all items have `t_s` or none has; without `t_s`
-/// they are spread evenly over [0, last_s]. Times start at 0, increase, and reach last_s.
+/// Returns the times of the items of a list. Either all items have `t_s`, or none of them has.
+/// Times `t_s` must start at 0, increase, and reach last_s. Without `t_s` the times are spread
+/// evenly over [0, last_s].
 std::vector<double> ReadTimes(const Node& list, const std::vector<Node>& items, double last_s) {
   if (items.empty()) list.Fail("no items", "at least one item");
   std::vector<double> times;
@@ -38,14 +39,14 @@ std::vector<double> ReadTimes(const Node& list, const std::vector<Node>& items, 
       continue;
     }
     times.push_back(time->Number());
-    if (first && times.back() != 0.0) time->Fail("not the start", "0 in the first item");
+    if (first && times.back() != 0.0) time->Fail("the first time is not 0", "0 in the first item");
     if (!first && !(times.back() > times[times.size() - 2])) {
-      time->Fail("not later than in the item before", "increasing times");
+      time->Fail("not later than the time of the previous item", "increasing times");
     }
   }
   const auto last_time = items.back().Find("t_s");
   if (last_time && items.size() > 1 && times.back() < last_s * (1.0 - 1e-9)) {
-    last_time->Fail("before the last frame",
+    last_time->Fail("the trajectory ends before the last frame",
                     "at least " + std::to_string(last_s) + " s, or fewer frames");
   }
   return times;
@@ -69,7 +70,7 @@ std::vector<CameraState> Sample(const PoseAt& pose, std::size_t count, double dt
   return states;
 }
 
-/// Reads `[{position, target, t_s}, ...]`, both interpolated by CubicSpline.
+/// Reads `[{position, target, t_s}, ...]`. Interpolates positions and targets by CubicSpline.
 std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up_direction,
                                     std::size_t count, double dt_s) {
   const std::vector<Node> items = list.Items();
@@ -93,7 +94,8 @@ std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector3d& up_
   return Sample(pose, count, dt_s);
 }
 
-/// Reads `[{position, ORIENTATION, t_s}, ...]`, interpolated by CubicSpline and RotationCurve.
+/// Reads `[{position, ORIENTATION, t_s}, ...]`. Interpolates positions by CubicSpline, and
+/// orientations by RotationCurve.
 std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, double dt_s) {
   const std::vector<Node> items = list.Items();
   const std::vector<double> times = ReadTimes(list, items, static_cast<double>(count - 1) * dt_s);
@@ -110,7 +112,7 @@ std::vector<CameraState> ReadKeyframes(const Node& list, std::size_t count, doub
                 dt_s);
 }
 
-/// Reads one number for all axes, or one for each axis; not negative.
+/// Reads one number for all axes, or three numbers, one for each axis. They must not be negative.
 Vector ReadSigmas(const Node& node) {
   const std::vector<double> values = node.Numbers();
   if (values.size() != 1 && values.size() != 3) node.Fail("wrong length", "one number, or three");
@@ -120,7 +122,7 @@ Vector ReadSigmas(const Node& node) {
   return {values.front(), values[values.size() / 2], values.back()};
 }
 
-/// Draws a trajectory with quaternion_pose, including its discretisation.
+/// Draws a random trajectory with the discrete steps of quaternion_pose.
 std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, double dt_s,
                                         Random& random) {
   const QuaternionPose model(

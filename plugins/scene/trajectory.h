@@ -9,10 +9,10 @@
 #include "curves.h"
 #include "orientation.h"
 
-/// Trajectory of a camera, from the config's `source.trajectory`.
+/// Trajectory of a camera, read from the config's `source.trajectory`.
 namespace alidade::scene {
 
-/// State of a camera at one frame, with the blocks of quaternion_pose.
+/// State of a camera at one frame: the blocks of quaternion_pose.
 struct CameraState {
   Vector position{};
   Quaternion orientation{1.0, 0.0, 0.0, 0.0};  ///< world_from_cam

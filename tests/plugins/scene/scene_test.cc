@@ -287,12 +287,12 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints +
               ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
-          "keyframes[1].t_s: not later than in the item before");
+          "keyframes[1].t_s: not later than the time of the previous item");
   refused(kPoints +
               ", max_frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
               "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}]}",
-          "keyframes[1].t_s: before the last frame; expected at least 1.0");
+          "keyframes[1].t_s: the trajectory ends before the last frame; expected at least 1.0");
   refused(kPoints + ", trajectory: {random: {linear_acceleration: -1, angular_acceleration: 1}}",
           "trajectory.random.linear_acceleration: negative");
   refused(kPoints + ", " + kStill + ", sigma_px: -1", "source.sigma_px: '-1'");

@@ -22,21 +22,21 @@ class CalibrationCli : public testing::ProgramTest {
     if (!setting.empty()) arguments.insert(arguments.end(), {"--set", setting});
     return Call(arguments);
   }
-  /// Returns the estimates of a config, whose run must succeed.
+  /// Returns the estimates of a run of `config`, which must succeed.
   std::string Estimates(const std::string& config, const std::string& setting = "") const {
     const Outcome outcome = Run(config, setting);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.code == 0 ? Read("out/ekf/estimates.csv") : "";
   }
 
-  /// Writes disparities of a target at 0.3 m, seen by a stereo pair with f B = 26 px m, below
-  /// `comment`.
+  /// Writes a table with `comment` in its first line. The rows are disparities of a target at
+  /// 0.3 m; the stereo pair has f B = 26 px m.
   void WriteTable(const std::string& comment) const {
     std::string text = comment + "t_s,d\n";
     for (int k = 0; k < 20; ++k) text += std::to_string(0.1 * k) + ",86.5\n";
     Write("table.csv", text);
   }
-  /// Writes a config that reads the table, with `keys` of its stereo sensor.
+  /// Writes a config that reads the table. `keys` are added to the entry of its stereo sensor.
   void WriteConfig(const std::string& keys) const {
     Write("depth.yaml", testing::kTargetConfig +
                             "sensors:\n  stereo: {model: stereo_disparity, stream: disparity, "
@@ -46,7 +46,7 @@ class CalibrationCli : public testing::ProgramTest {
                             "estimators: {ekf: {type: ekf}}\n");
   }
 
-  /// Writes tracks of four points at rest, seen by a camera at rest, in three frames.
+  /// Writes the tracks of four points in three frames. Points and camera are at rest.
   void WriteTracks(const std::string& calibration) const {
     std::string tracks, times = "frame,t_s\n";
     for (int frame = 0; frame < 3; ++frame) {
@@ -65,7 +65,7 @@ class CalibrationCli : public testing::ProgramTest {
     fs::remove(folder_ / "drive/calibration.yaml");
     if (!calibration.empty()) Write("drive/calibration.yaml", calibration);
   }
-  /// Writes a config that reads the tracks, with `root` at its root and `keys` of its sensor.
+  /// Writes a config that reads the tracks. `root` is added at its root, and `keys` to its sensor.
   void WriteSlam(const std::string& root, const std::string& keys) const {
     Write("slam.yaml", R"(alidade: 1
 state:
@@ -102,7 +102,7 @@ TEST_F(CalibrationCli, TheHeaderOfATableTellsTheCamera) {
   WriteConfig("");
   EXPECT_EQ(Estimates("depth.yaml"), written);
   WriteTable("# focal_px=200, baseline_m=0.13\n");
-  EXPECT_EQ(Estimates("depth.yaml"), written);  // the same f B
+  EXPECT_EQ(Estimates("depth.yaml"), written);  // f B is the same as before
   WriteTable("");
   EXPECT_TRUE(Contains(Run("depth.yaml").err, "stereo.focal_px: missing"));
 }
@@ -117,7 +117,8 @@ TEST_F(CalibrationCli, ATableOfAnotherCameraIsRefused) {
                        "the data, 400 in "))
       << other.err;
   EXPECT_TRUE(Contains(other.err, "table.csv:1:15" + kRemedy)) << other.err;
-  // A relative difference of 1e-6 is the same camera; 2e-6 is not.
+  // Two focal lengths count as equal up to a relative difference of 1e-6. A difference of 2e-6 is
+  // refused.
   EXPECT_EQ(Run("depth.yaml", "sensors.stereo.focal_px=400.0003").code, 0);
   EXPECT_EQ(Run("depth.yaml", "sensors.stereo.focal_px=400.0008").code, 78);
   const std::string ignoring = Estimates("depth.yaml", "source.calibration=ignore");

@@ -89,12 +89,12 @@ source:
 
 class BundleTracksCli : public BundleCli {
  protected:
-  /// Writes the folder `data/` of kScene with `simulate`.
+  /// Writes the folder `data/`: runs `simulate` with kScene.
   void SetUp() override {
     BundleCli::SetUp();
     Simulate("");
   }
-  /// Simulates kScene; `stereo`: lines of the source.
+  /// Simulates kScene; `stereo` contains lines that are added to its source.
   void Simulate(const std::string& stereo, const Arguments& more = {}) const {
     std::string scene = kScene;
     Write("scene.yaml", scene.replace(scene.find("  STEREO\n"), 9, stereo));
@@ -109,7 +109,8 @@ class BundleTracksCli : public BundleCli {
     all.insert(all.end(), more.begin(), more.end());
     return Call(all);
   }
-  /// Returns the first `count` poses of `data/truth.tum` with shifted times and x.
+  /// Returns the first `count` poses of `data/truth.tum`. Times are shifted by `dt_s`, and x by
+  /// `dx_m`.
   std::string Start(int count, double dt_s, double dx_m) const {
     std::istringstream truth(Read("data/truth.tum"));
     std::string text, line;
@@ -125,8 +126,8 @@ class BundleTracksCli : public BundleCli {
   }
 };
 
-/// Noise of 1 px in u and v leaves residuals of sqrt(2 (1 - unknowns / residuals)) px. Their
-/// standard deviation is 2 % of that, because there are 1000 residuals more than unknowns.
+/// Noise of 1 px in u and v leaves residuals of sqrt(2 (1 - unknowns / residuals)) px. There are
+/// 1000 more residuals than unknowns, so the standard deviation of this value is 2 %.
 TEST_F(BundleTracksCli, AdjustsTracks) {
   Write("start.tum", Start(15, 0.0, 0.05));
   const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
@@ -142,8 +143,8 @@ TEST_F(BundleTracksCli, AdjustsTracks) {
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 15);
 }
 
-/// A pair with a baseline of 0.2 m sees points 30 to 45 m away: a disparity of 2 to 4 px with a
-/// noise of 1.4 px. Rays over 5 m of path determine their depth to about 1.5 %.
+/// A stereo pair with a baseline of 0.2 m sees points 30 to 45 m away. Their disparity is 2 to 4 px
+/// with a noise of 1.4 px, but rays over 5 m of path determine their depth to about 1.5 %.
 TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
   Simulate("  measures: stereo\n",
            {"--set", "camera.baseline_m=0.2", "--set",
@@ -173,8 +174,8 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
             Json("start/bundle.json").root().At("rms_after_px").Number());
 }
 
-/// The corner is beyond the radius up to which this lens distorts a ray. Two rays still place the
-/// point.
+/// The lens distorts rays only up to some radius, and the pixel in the corner lies beyond it. The
+/// other two rays still determine the point.
 TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
   Write("data/calibration.yaml",
         "camera: {model: radtan, width: 640, height: 480, fx: 300, fy: 300, cx: 320, cy: 240, "
@@ -209,8 +210,8 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   EXPECT_TRUE(Contains(none.err, "start.tum: no pose has the timestamp of a frame")) << none.err;
 }
 
-/// Without timestamps the k-th pose belongs to frame k, whatever its time. The same holds for
-/// standard input, whatever files the working folder has.
+/// Without timestamps the k-th pose belongs to frame k, whatever the times of the poses are. Tracks
+/// from standard input have no timestamps, even if the working folder contains timestamps.csv.
 TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoTimestamps) {
   Write("start.tum", Start(5, 100.0, 0.0));
   Write("tracks.csv", Read("data/tracks.csv"));
@@ -261,8 +262,8 @@ TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
 }
 
-/// Three problems: a point in the plane of its only camera; a point so far away that its pixels are
-/// not finite; an empty problem.
+/// Three problems without a usable observation: a point in the plane of its only camera, a point so
+/// far away that its pixels are not finite, and an empty problem.
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :
@@ -277,7 +278,8 @@ TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   }
 }
 
-/// One observation in four is of a point behind its camera. The formula of BAL defines their cost.
+/// One observation in four is of a point behind its camera. The formula of BAL also defines the
+/// cost of these observations.
 TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   BundleFile file = testing::BundleOnBothSides();
   testing::Disturb(file.problem);
@@ -296,7 +298,8 @@ TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
   EXPECT_LT(number("rms_after_px"), std::sqrt(0.5)) << "the noise";
 }
 
-/// A second point lies in the plane of the camera: it has no pixel and is counted.
+/// The second point lies in the plane of the camera. It has no pixel, so its observation is counted
+/// as left out.
 TEST_F(BundleCli, CountsWhatIsLeftOut) {
   Write("p.txt", "1 2 2\n0 0 1 1\n0 1 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n0.1\n0.1\n-3\n1\n1\n0\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
@@ -336,7 +339,8 @@ TEST_F(BundleCli, HoldsTheScale) {
   EXPECT_NEAR(Json("out/bundle.json").root().At("extent_after").Number() / before, 1.0, 1e-12);
 }
 
-/// The derivative of this pixel with respect to k2 overflows. Ceres reports it in half a page.
+/// The derivative of this pixel with respect to k2 overflows. The message of Ceres is half a page
+/// long; the program prints one line.
 TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   Write("p.txt", "1 1 1\n0 0 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n1e80\n0.1\n-1\n");
   const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
@@ -345,7 +349,8 @@ TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   EXPECT_FALSE(Exists("out"));
 }
 
-/// Along the way more than five consecutive steps cannot be computed; a smaller trust region helps.
+/// During the iterations more than five consecutive steps cannot be computed. A smaller trust
+/// region makes further steps possible.
 TEST_F(BundleCli, GoesOnAfterStepsThatCannotBeComputed) {
   for (const int points : {28, 36}) {
     BundleFile file = testing::BundleOnBothSides(3, points);

@@ -77,7 +77,8 @@ TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
                   "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})
                 .code,
             0);
-  // Values stay unchanged, and so does the command line in the record.
+  // Underscores in the values of options do not change. The record contains the command line as it
+  // was entered.
   EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
                   "--set=source.sigma_disparity_px=0"})
                 .code,
@@ -101,7 +102,7 @@ TEST_F(Cli, RunPrintsTheComparisonAndWhereItWrote) {
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_TRUE(Contains(run.out, "rmse target.depth [mm]")) << run.out;
   EXPECT_TRUE(Contains(run.out, "wrote runs/config\n")) << run.out;
-  // Without a terminal the program prints neither progress nor colour.
+  // If standard error is not a terminal, the program prints neither progress nor colour.
   EXPECT_EQ(run.err, "");
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet", "--no-figures"}).out, "");
@@ -120,7 +121,7 @@ TEST_F(Cli, SetAndSeedReplaceKeysOfTheConfig) {
   EXPECT_EQ(rmse({"--seed", "1"}), base);
   EXPECT_NE(rmse({"--seed", "2"}), base);
   EXPECT_EQ(rmse({"--set", "source.seed=2"}), rmse({"--seed", "2"}));
-  // Without noise the depth is more accurate.
+  // Without noise in the data the error of the depth is smaller.
   EXPECT_LT(rmse({"--set", "source.sigma_disparity_px=0", "--set=source.sigma_edge_px=0"}), base);
   EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "sigma_disparity_px: 0"));
 }
@@ -196,7 +197,7 @@ TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "failed");
 }
 
-// FAULTS 89
+// Fault 89 of tests/faults/README.md.
 TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   const Outcome full = Call({"run", "config.yaml", "--no-figures"}, "/dev/full");
   EXPECT_EQ(full.code, 74);
@@ -206,7 +207,7 @@ TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   EXPECT_EQ(Call({"--version"}, "/dev/full").code, 74);
 }
 
-/// A run that reads a pipe, and the test at the other end of the pipe.
+/// Starts a run that reads a pipe. The test writes to the other end of the pipe.
 class PipedRun : public testing::ProgramTest {
  protected:
   void SetUp() override {
@@ -228,10 +229,10 @@ class PipedRun : public testing::ProgramTest {
   pid_t run_ = -1;
 };
 
-// FAULTS 90
+// Fault 90 of tests/faults/README.md.
 TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   ::kill(run_, SIGINT);
-  Feed("0.3,83\n");  // a signal just before the run waits for data is handled at the next row
+  Feed("0.3,83\n");  // a signal that arrives just before the run waits is handled at the next row
   const Outcome run = Wait(run_);
   EXPECT_EQ(run.code, 75) << run.err;
   const Config record = Json("out/run.json");
@@ -242,7 +243,7 @@ TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   EXPECT_FALSE(Exists("out.partial"));
 }
 
-// FAULTS 90
+// Fault 90 of tests/faults/README.md.
 TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
   ::kill(run_, SIGSTOP);
   ::kill(run_, SIGTERM);
@@ -257,7 +258,7 @@ TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
 TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
   const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
-  // The run handles SIGINT (bit 1 of the mask) and sleeps in opening the pipe.
+  // The run has a handler for SIGINT (bit 1 of the mask) and waits in the call that opens the pipe.
   const auto waits = [&] {
     const std::string status = testing::ReadText("/proc/" + std::to_string(run) + "/status");
     const std::size_t caught = status.find("SigCgt:\t");
@@ -303,7 +304,7 @@ TEST_F(Cli, TimingHasTheWholeCommand) {
 }
 
 TEST_F(Cli, StopsBetweenFramesAtASignal) {
-  // 300000 frames take seconds.
+  // A run over 300000 frames takes seconds.
   const pid_t run = Start(
       {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
   ASSERT_TRUE(Eventually([&] { return Exists("out.partial/ekf/estimates.csv"); }));
@@ -314,7 +315,8 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
-// The same as under nohup. A second signal would end the run at once.
+// SIGHUP is ignored, as under nohup. If it were counted, SIGTERM would be the second signal and
+// would end the run at once.
 TEST_F(Cli, AHangUpThatIsIgnoredStopsNothing) {
   before_ = "trap '' HUP";
   const pid_t run = Start(
@@ -378,7 +380,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
 }
 
 TEST_F(Cli, PluginsPrintsJson) {
-  // JSON is also YAML.
+  // JSON is valid YAML.
   const auto parse = [](const std::string& json) {
     return Config::FromText("list:\n  " + json, "json");
   };

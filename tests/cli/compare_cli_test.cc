@@ -15,7 +15,7 @@ using testing::Contains;
 using testing::Outcome;
 namespace fs = std::filesystem;
 
-/// Comparisons need the batch, which is missing in a build without the Ceres solver.
+/// For tests that do not need the batch. The batch is missing in a build without the Ceres solver.
 class CompareFolderCli : public testing::ProgramTest {};
 
 TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
@@ -23,7 +23,7 @@ TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
   EXPECT_FALSE(Contains(Call({"compare", "out"}).out, "not finite"));
   std::istringstream rows(Read("out/ekf/estimates.csv"));
   std::string text;
-  int count = -1;  // after the header
+  int count = -1;  // does not count the header
   for (std::string row; std::getline(rows, row); ++count) {
     const std::size_t first = row.find(','), second = row.find(',', first + 1);
     if (count == 3 || count == 7) row.replace(first + 1, second - first - 1, "nan");
@@ -43,12 +43,12 @@ class CompareCli : public testing::ProgramTest {
     ProgramTest::SetUp();
     if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) GTEST_SKIP() << "no batch";
   }
-  /// Returns a comparison as JSON, without its times.
+  /// Returns the JSON text of a comparison without the entries that contain times.
   static std::string WithoutClock(const std::string& json) {
     const std::regex clock(R"=(\n *"(time_us|cpu_us|cpu_us.start)": (\{[^}]*\},?|[^\n]*))=");
     return std::regex_replace(json, clock, "");
   }
-  /// Writes disparities of a target at 0.3 m, from 0.1 s to 2 s in steps of 0.1 s.
+  /// Writes disparities of a target at 0.3 m, every 0.1 s from 0.1 s to 2 s.
   void WriteTable(const std::string& name, const std::string& fifth = "86.5") const {
     std::string text = "t_s,d\n";
     for (int k = 1; k <= 20; ++k) {
@@ -88,7 +88,8 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
 }
 
-// The run has neither errors from the truth nor an end: it is kept and reports why.
+// The first run fails, and the second has no errors relative to truth. Neither can be compared.
+// Both are kept, and the program reports the reason.
 TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   const auto compare = [&](const std::string& rows, const std::string& folder) {
     Write("bad.csv", "t_s,d,z\n" + rows);
@@ -105,7 +106,8 @@ TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
   EXPECT_TRUE(Contains(Read("blind/run.json"), "\"ok\""));
 }
 
-// A run and its folder show the same comparison, covariances included.
+// `compare` prints the same values when it makes a run and when it reads the folder of this run.
+// The values include covariances.
 TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "out", "--quiet"}).code, 0);
   const Outcome compared = Call({"compare", "out", "--json"});
@@ -136,7 +138,7 @@ TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
   EXPECT_TRUE(Contains(Call({"compare", ".", "../b"}).out, "  a/ekf"));
 }
 
-// FAULTS 86
+// Fault 86 of tests/faults/README.md.
 TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   WriteTable("one.csv");
   WriteTable("other.csv", "86.25");
@@ -158,7 +160,7 @@ TEST_F(CompareCli, RefusesRunsOverDifferentData) {
   EXPECT_TRUE(Contains(damaged.err, "b: has other measurements than 'a'")) << damaged.err;
 }
 
-// FAULTS 86: the same numbers in a different notation are the same data.
+// Fault 86 of tests/faults/README.md: the same numbers in a different notation are the same data.
 TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   WriteTable("one.csv");
   WriteTable("other.csv", "+865e-1");
@@ -167,7 +169,7 @@ TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
   EXPECT_EQ(Call({"compare", "a", "b", "--reference", "a/ekf"}).code, 0);
 }
 
-// FAULTS 86: a run that processed fewer data.
+// Fault 86 of tests/faults/README.md: the second run processed fewer data.
 TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
   WriteTable("one.csv");
   Write("other.csv", Read("one.csv").substr(0, Read("one.csv").find("1.500000")));
@@ -197,7 +199,7 @@ TEST_F(CompareCli, WarnsOfSettingsAndTruthsThatDiffer) {
 
 TEST_F(CompareCli, CovariancesOfARunAreWrittenWhereAskedFor) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures", "--covariances"}).code, 0);
-  // 152 frames with the lower triangle of a 3 x 3 matrix.
+  // The file has 152 frames, each with the lower triangle of a 3 x 3 matrix.
   EXPECT_EQ(Read("a/ekf/covariance.bin").size(), 152u * 6u * 8u);
   const Outcome compared = Call({"compare", "a", "--reference", "ekf"});
   EXPECT_EQ(compared.code, 0) << compared.err;
@@ -211,7 +213,7 @@ TEST_F(CompareCli, RefusesASourceThatCanBeReadOnceForSeveralSeeds) {
   EXPECT_TRUE(Contains(compared.err, "can be read only once")) << compared.err;
 }
 
-// FAULTS 85
+// Fault 85 of tests/faults/README.md.
 TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   const std::string failing = "estimators.batch={type: ceres_batch, max_iterations: 1}";
   const Outcome compared = Call({"compare", "config.yaml", "-o", "out", "--reference", "batch",
@@ -222,22 +224,24 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   EXPECT_TRUE(Contains(compared.err, "error: " + words)) << compared.err;
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
-  // Errors from the truth need no batch, but the comparison with the batch is withheld.
+  // Errors relative to truth need no batch, so they are shown. The comparison with the batch is
+  // withheld.
   const Outcome truth =
       Call({"compare", "config.yaml", "-o", "two", "--no-decomposition", "--set", failing});
   EXPECT_EQ(truth.code, 1);
   EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
-  // Without a gate the batch of the accepted measurements uses all measurements, so it replaces the
-  // failed one.
+  // There is no gate, so the batch of the accepted measurements uses all measurements. It replaces
+  // the batch that failed.
   const Outcome added = Call({"compare", "config.yaml", "-o", "three", "--set", failing});
   EXPECT_EQ(added.code, 79) << "that of the run";
   EXPECT_FALSE(Contains(added.out, words)) << added.out;
   EXPECT_TRUE(Contains(added.out, "to batch_accepted")) << added.out;
-  // A finished folder gives the same exit code.
+  // `compare` on the finished folder exits with the same code.
   EXPECT_EQ(Call({"compare", "out", "--reference", "batch"}).code, 1);
 }
 
-// FAULTS 85: with several folders one batch is enough, in whichever folder.
+// Fault 85 of tests/faults/README.md: if several folders are compared, one of them must have a
+// batch. It may be any of them.
 TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   const auto run = [this](const std::string& folder, const std::string& batch) {
     return Call({"run", "config.yaml", "-o", folder, "--no-figures", "--quiet", "--covariances",
@@ -253,7 +257,8 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
   }
 }
 
-// A fixed-lag smoother relinearises, and its data end with its window.
+// A fixed-lag smoother relinearises. Each of its estimates uses the data up to the end of its
+// window.
 TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
   const std::string window = "estimators.window={type: fixed_lag, lag_s: 0.5";
   const Outcome smoothed =
@@ -284,7 +289,7 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   EXPECT_FALSE(Exists("two"));
 }
 
-// If the data end a run, the comparison uses the frames up to that time.
+// If an error in the data ends a run, the comparison uses the frames before the error.
 TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
   WriteTable("table.csv", "no_number");
   const Outcome compared = Call({"compare", "table.yaml", "-o", "out"});
@@ -295,7 +300,7 @@ TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
   EXPECT_EQ(Call({"compare", "out"}).code, 1) << "no batch came to its end";
 }
 
-// Both the run and its folder report the rejection recovery.
+// `compare` reports the rejection recovery when it makes the run and when it reads its folder.
 TEST_F(CompareCli, TellsOfRejectionRecovery) {
   WriteTable("table.csv");
   std::string text = Read("table.csv");
@@ -340,14 +345,14 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
   const Node anees = estimators.At("ekf").At("anees").At("target");
   EXPECT_EQ(anees.At("timestamps").Number(), 61);
   EXPECT_EQ(std::ssize(anees.At("mean").Items()), 61);
-  // Chi-square with six degrees of freedom: tabulated 1.237 and 14.449.
+  // Tabulated bounds of chi-square with six degrees of freedom: 1.237 and 14.449.
   EXPECT_NEAR(anees.At("low").Items()[0].Number(), 1.237 / 6.0, 1e-3);
   EXPECT_NEAR(anees.At("high").Items()[0].Number(), 14.449 / 6.0, 1e-3);
   ASSERT_EQ(Call(compare("2", "two")).code, 0);
   EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
 }
 
-/// Returns the numbers of a column of a csv file without quotes, without the empty cells.
+/// Returns the numbers in a column of a csv file without quotes. Empty cells are omitted.
 std::vector<double> ColumnOf(const std::string& csv, const std::string& name) {
   std::istringstream rows(csv);
   std::vector<double> numbers;
@@ -367,7 +372,7 @@ std::vector<double> ColumnOf(const std::string& csv, const std::string& name) {
   return numbers;
 }
 
-// The values drawn for each timestamp, averaged over time, equal the metrics of whole runs.
+// The values of over_time.csv, averaged over time, equal the metrics of whole runs.
 TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
   const Outcome compared = Call({"compare", "config.yaml", "--runs", "3", "--set",
                                  "source.duration_s=2", "--jobs", "1", "-o", "out"});
@@ -375,7 +380,8 @@ TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
   const std::string csv = Read("out/over_time.csv");
   const Config json = Json("out/compare.json");
   const Node ekf = json.root().At("estimators").At("ekf"), values = ekf.At("values");
-  // The quantiles of three values a <= b <= c are a + 0.1 (b - a), b and b + 0.9 (c - b).
+  // The 5 %, 50 % and 95 % quantiles of three values a <= b <= c are
+  // a + 0.1 (b - a), b and b + 0.9 (c - b).
   const auto of = [&](const char* what) {
     return values.At("rmse:target.depth").At(what).Number();
   };
@@ -407,7 +413,8 @@ TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
     EXPECT_TRUE(Contains(html, std::string("gnuplot figures/") + name + ".gp")) << name;
     EXPECT_TRUE(Contains(files, std::string("figures/") + name + ".svg")) << files;
   }
-  // CPU time of a batch alone, and with the filter that it starts from.
+  // cpu_us is the CPU time of a batch alone. cpu_us.all includes the filter from which the batch
+  // starts.
   const std::string csv = Read("out/cost.csv");
   const auto own = ColumnOf(csv, "cpu_us"), all = ColumnOf(csv, "cpu_us.all");
   ASSERT_EQ(own.size(), all.size());
@@ -415,7 +422,7 @@ TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
   EXPECT_FALSE(Contains(Read("out/compare.tex"), "rule"));
 }
 
-// The first run is made, whatever the budget is.
+// The first run is always made, even if it exceeds the budget.
 TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
   const Outcome compared =
       Call({"compare", "config.yaml", "--runs", "5", "--first-seed", "11", "--jobs", "1",

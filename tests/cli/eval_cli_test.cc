@@ -16,7 +16,7 @@ using testing::Contains;
 using testing::Outcome;
 using Cli = testing::ProgramTest;
 
-/// Returns poses on a half circle of radius `radius`, every 0.1 s from `t0`.
+/// Returns poses on a half circle of radius `radius`, one every 0.1 s from `t0` on.
 std::string HalfCircle(double radius, double t0 = 0.0) {
   std::string text = "# t x y z qx qy qz qw\n";
   for (int i = 0; i <= 30; ++i) {
@@ -58,7 +58,7 @@ TEST_F(EvalCli, FlagsOfEvoMeanWhatTheyMeanInEvo) {
   EXPECT_EQ(align({"-s"}), "scale");
   EXPECT_EQ(align({"-as"}), "sim3");
   EXPECT_EQ(align({"--align"}), "se3");
-  EXPECT_EQ(align({"--align"}, true), "se3");  // the option has no value
+  EXPECT_EQ(align({"--align"}, true), "se3");  // the option is given without a value
   EXPECT_EQ(align({"--align", "--correct_scale"}, true), "sim3");
   EXPECT_EQ(align({"--align_origin"}), "origin");
   EXPECT_EQ(align({"--align-origin"}), "origin");
@@ -123,8 +123,8 @@ TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
   EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
 }
 
-/// Calculated by hand. The reference has t = 0, 1, 2, 3 at x = 0, 1, 2, 3; the estimate has t = 0,
-/// 1, 1, 2 at x = 0, 1, 1.5, 2. The pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
+/// Calculated by hand. The reference has the times 0, 1, 2, 3 at x = 0, 1, 2, 3. The estimate has
+/// the times 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The pairs of x are (0, 0), (1, 1), (1, 1.5), (2, 2).
 ///
 ///   ATE errors 0, 0, 0.5, 0                                   rmse 0.25
 ///   RPE of steps 1, 0, 1 against 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)
@@ -198,14 +198,14 @@ TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
   EXPECT_EQ(bad.code, 65);
   EXPECT_EQ(bad.err, "error: bad.tum:2:13 qz: 'nan' is not finite; expected a finite number\n");
   EXPECT_EQ(Call({"eval", "truth.tum", "missing.tum"}).code, 66);
-  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // uses the folder's truth.tum
+  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // uses the truth.tum of the folder
   const Outcome none = Call({"eval", "truth.tum", "."});
   EXPECT_EQ(none.code, 66);
   EXPECT_TRUE(none.err.starts_with("error: .: no trajectory in this folder; expected NAME/"))
       << none.err;
 }
 
-// FAULTS 91
+// Fault 91 of tests/faults/README.md.
 TEST_F(EvalCli, ATornLastRowOfAnUnfinishedRunIsIgnored) {
   const std::string whole = HalfCircle(2.0);
   const std::string torn = whole.substr(0, whole.size() - 5);
@@ -261,7 +261,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
             "two.tum: 2 poses to align; expected 3 or more");
   EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
   EXPECT_FALSE(evaluations.Items()[1].Find("error"));
-  // A single estimate prints nothing.
+  // If the only estimate cannot be evaluated, the program prints no table.
   const Outcome alone = Call({"eval", "truth.tum", "two.tum", "-a"});
   EXPECT_EQ(alone.code, 65);
   EXPECT_EQ(alone.out, "");
@@ -310,10 +310,10 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
               metrics.At("rmse:cam.orientation").Number(), 1e-9);
   EXPECT_NEAR(one.At("nis").At("pixels").At("mean").Number(),
               metrics.At("nis.mean:pixels").Number(), 1e-12);
-  // The first pose is known exactly, so it has no NEES.
+  // The first pose is known exactly, so no NEES is computed for it.
   EXPECT_EQ(one.At("nees_position").At("poses").Integer(0, 1000), 149);
   EXPECT_TRUE(one.At("nees_orientation").Find("mean"));
-  // A run without another folder is compared with its own truth.
+  // If only one run is given, it is compared with its own truth.
   const auto text = [&](const Arguments& arguments) {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -328,7 +328,7 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
 }
 
-/// A robot in the plane, with position fixes that have a known error.
+/// A robot moves in the plane. Its position fixes have a known error.
 const std::string kPlanarConfig = R"(alidade: 1
 state:
   robot: {model: planar, input: {stream: odometry}, noise: {speed: 0.05, turn_rate: 0.05},
@@ -343,7 +343,7 @@ source:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// Returns a table of a drive on a circle of 5 m at 1 m/s, more than one turn.
+/// Returns a table of a drive on a circle of radius 5 m at 1 m/s, for more than one turn.
 std::string PlanarDrive() {
   std::string text = "t_s,v,o,gx,gy,tx,ty,th\n";
   for (int i = 0; i <= 400; ++i) {
@@ -377,7 +377,7 @@ TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
               metrics.At("rmse:robot.heading").Number(), 1e-9);
   EXPECT_TRUE(one.At("nis").Find("gps"));
 
-  // NEES of the files, calculated here.
+  // Calculates the NEES from the files and compares it with the output.
   const Trajectory truth = ReadTrajectory(folder_ / "planar/truth.tum");
   const Trajectory ekf = ReadTrajectory(folder_ / "planar/ekf/trajectory_covariance.tum");
   ASSERT_EQ(truth.size(), ekf.size());
@@ -398,7 +398,7 @@ TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
   EXPECT_NEAR(one.At("nees_orientation").At("mean").Number(), heading / ekf.size(), 1e-9);
   EXPECT_TRUE(Contains(Call({"eval", "planar"}).out, "NEES position (2 dof) "));
 
-  // Simulated data also contain the true poses.
+  // The output of `simulate` also contains the true poses.
   ASSERT_EQ(Call({"simulate", "planar.yaml", "-o", "data"}).code, 0);
   EXPECT_EQ(Read("data/truth.tum"), Read("planar/truth.tum"));
 }

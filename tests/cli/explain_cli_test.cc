@@ -33,7 +33,8 @@ TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
   const Outcome both = Call({"explain", "config.yaml"});
   EXPECT_TRUE(Contains(both.out, "estimated  depth_rate        0 +- 0.5\n")) << both.out;
   EXPECT_FALSE(Contains(both.out, "truth not used")) << both.out;
-  // Stereo alone omits the template: its truth exists but is not used.
+  // If only the stereo sensor is used, the block of the template is omitted. The truth of this
+  // block is then not used.
   const Outcome stereo =
       Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
   EXPECT_EQ(stereo.code, 0) << stereo.err;
@@ -85,7 +86,7 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome none = Call({"explain", "config.yaml"});
   EXPECT_FALSE(Contains(none.out, "constant: ")) << none.out;
   EXPECT_FALSE(Contains(none.out, "no effect for")) << none.out;
-  // The config has 3.3 +- 0.5.
+  // In the config the initial value is 3.3 +- 0.5.
   const Outcome one =
       Call({"explain", "config.yaml", "--set", "state.template.constant=[inverse_distance]"});
   for (const char* part :
@@ -99,7 +100,7 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome considered =
       Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
   EXPECT_TRUE(Contains(considered.out, "in a row; no effect for stereo\n")) << considered.out;
-  // Stereo depends only on a constant block.
+  // All blocks of the stereo sensor are constant.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.constant=[depth, depth_rate]"});
   EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; no effect for stereo\n"))

@@ -31,7 +31,7 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
     EXPECT_EQ(Contains(run.err, "info: source: streams disparity, disparity_all, "), info)
         << run.err;
     EXPECT_EQ(Contains(run.err, "debug: plugin loaded: "), debug) << run.err;
-    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // the run time
+    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // has the run time
     EXPECT_EQ(run.err.empty(), !info) << run.err;
     EXPECT_FALSE(Contains(run.err, "\033[")) << "colour goes to a terminal alone";
   };
@@ -78,8 +78,8 @@ TEST_F(LogCli, EveryCommandTakesALevel) {
   }
 }
 
-// The file in the folder has no level below info, no clock time and no path. It has the same bytes
-// for another folder and another terminal level.
+// log.txt contains no messages below the level info, no clock time and no path. So it is identical
+// for another output folder and another level of the terminal.
 TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   const auto into = [&](const std::string& folder, const Arguments& more) {
     Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
@@ -99,7 +99,8 @@ TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   EXPECT_TRUE(Contains(Read("one/files.txt"), "log.txt\n"));
 }
 
-// A divergence is a warning when it happens. If it ends the run, only the error is printed.
+// A divergence is printed as a warning when it happens. If it ends the run, only the error is
+// printed.
 TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   const Outcome reported = Call(Diverging(Run({})));
   EXPECT_EQ(reported.code, 0) << reported.err;
@@ -111,7 +112,7 @@ TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
   EXPECT_EQ(Call(Diverging(Run({"--quiet"}))).err, "");
 }
 
-// Each message names the run of the sweep, and none of the runs warns.
+// In a sweep a divergence is not a warning. It is a message of the level info and names the seed.
 TEST_F(LogCli, ASweepNamesTheRunOfAMessage) {
   const Outcome quiet = Call(Diverging({"sweep", "config.yaml", "--runs", "2", "-o", "a"}));
   EXPECT_FALSE(Contains(quiet.err, "warning: ")) << quiet.err;

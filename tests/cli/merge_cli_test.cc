@@ -8,7 +8,7 @@ namespace {
 
 class MergeCli : public ProgramTest {
  protected:
-  /// Runs a sweep of 7 seeds; an empty `shard` selects all of them.
+  /// Runs a sweep of 7 seeds. An empty `shard` selects all seeds.
   Outcome Sweep(const std::string& output, const std::string& shard,
                 const Arguments& more = {}) const {
     Arguments arguments = {"sweep", config_, "--runs", runs_, "--first-seed", "5", "-o", output};
@@ -16,7 +16,7 @@ class MergeCli : public ProgramTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return Call(arguments);
   }
-  /// Runs the shards s1, s2 and s3, each with a different number of jobs, and the whole sweep.
+  /// Runs the shards s1, s2 and s3, each with a different number of jobs, and then the whole sweep.
   void SweepAll(const Arguments& more = {}, int code = 0) const {
     EXPECT_EQ(Sweep("whole", "", more).code, code) << Read("stderr");
     for (const std::string i : {"1", "2", "3"}) {
@@ -65,7 +65,7 @@ TEST_F(MergeCli, ShardsOfAVariedSweepGiveItsBytesAndFigure) {
   ExpectSameFiles(folder_ / "merged", folder_ / "whole");
 }
 
-// One estimator starts with a diverged state. Its runs have no metrics but are counted.
+// One estimator starts from a diverged state. Its runs have no metrics but are counted.
 TEST_F(MergeCli, KeepsRunsThatDiverged) {
   SweepAll(Diverging({}));
   EXPECT_EQ(Merge({"s1", "s2", "s3"}).code, 0) << Read("stderr");
@@ -110,7 +110,7 @@ TEST_F(MergeCli, RefusesShardsOfAnotherSweep) {
   ExpectRefused({"s1", "seeds"},
                 "command: now 'sweep --runs 8 --first-seed 5', was 'sweep --runs 7 --first-seed "
                 "5'");
-  // A shard of another build: inputs.json contains the build id.
+  // A shard from another build is refused: inputs.json contains the build id.
   runs_ = "7";
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   std::string inputs = Read("s2/inputs.json");
@@ -146,7 +146,8 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   ExpectRefused({"run", "s1"}, "run/inputs.json: is not the inputs.json of a shard");
   ASSERT_EQ(Sweep("s2", "2/2").code, 0);
   const std::string runs = Read("s2/finished_runs.jsonl"), summary = Read("s2/sweep.json");
-  // A truncated last line, a missing line and a surplus line.
+  // finished_runs.jsonl of a shard has a truncated last line, then a missing line, then a surplus
+  // line.
   Write("s2/finished_runs.jsonl", runs.substr(0, runs.size() - 9));
   ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is not the run of seed 11");
   Write("s2/finished_runs.jsonl", runs.substr(runs.find('\n') + 1));
@@ -169,7 +170,7 @@ TEST_F(MergeCli, ReplacesItsFolderOnlyByForceAndNeverAShard) {
   EXPECT_EQ(Call({"merge", "s1", "-o", "s1", "--force"}).code, 73);
 }
 
-// A shard that is stopped and resumed equals an uninterrupted one.
+// A shard that was stopped and resumed gives the same files as an uninterrupted one.
 TEST_F(MergeCli, AShardThatWasResumedMergesAsAnyOther) {
   runs_ = "40";
   const Arguments longer = {"--set", "source.duration_s=100"};

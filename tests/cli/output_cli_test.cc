@@ -15,7 +15,7 @@ using testing::Contains;
 using testing::Outcome;
 using OutputCli = testing::ProgramTest;
 
-// All spellings of a config's path lead to the same output folder.
+// The output folder has the same name for all spellings of a config's path.
 TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
   fs::create_directory(folder_ / "05_depth");
   const fs::path folder = fs::absolute(folder_ / "05_depth");
@@ -117,7 +117,7 @@ TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
   EXPECT_TRUE(raw.err.starts_with("error: ??.yaml: ")) << raw.err;
 }
 
-/// Returns the number in `column` (from 0) of the row that starts with `start`.
+/// Returns the number in column `column` (counted from 0) of the row that begins with `start`.
 double Cell(const std::string& csv, const std::string& start, int column) {
   std::istringstream row(csv.substr(csv.find('\n' + start) + 1));
   std::string cell;
@@ -134,7 +134,7 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   const std::string expected = Read("out/expected.csv"), implied = Read("out/implied_states.csv");
   EXPECT_NEAR(Cell(expected, t + "inverse_scale", 2), lambda * depth, 1e-12);
   EXPECT_NEAR(Cell(expected, t + "disparity,", 2), 26.0 / depth, 1e-9);
-  // Z0 / scale
+  // A measured inverse scale s implies the depth s / lambda.
   const double s = Cell(Read("out/measurements.csv"), t + "inverse_scale,", 3);
   EXPECT_NE(s, lambda * depth);
   EXPECT_NEAR(Cell(implied, t + "scale,", 2), s / lambda, 1e-12);
@@ -145,7 +145,7 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   EXPECT_TRUE(Contains(figure, "'expected.csv'")) << figure;
 }
 
-// Without -o no run is lost and no run is refused.
+// Without -o a second run is not refused, and it does not replace the first run.
 TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
   const Arguments run = {"run", "config.yaml", "--no-figures"};
   const Outcome first = Call(run), second = Call(run);
@@ -165,7 +165,7 @@ TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
-  // The name of an incomplete run is taken, too.
+  // The folder of an incomplete run also occupies its name.
   fs::create_directory(folder_ / "runs/left.partial");
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=left"}).err,
             "runs/left.partial exists: the output is runs/left-2 (--force replaces "
@@ -188,14 +188,14 @@ TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
   }
 }
 
-// Of the first eight rows, the first round selects five and the second three: it ends before the
-// `accepted` of the second sensor.
+// The first eight rows are selected in two rounds. The first round selects five rows, and the
+// second three: it ends before `accepted` of the second sensor.
 TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
   const auto labels = [](const std::string& out) {
     std::vector<std::string> found;
     std::istringstream lines(out);
     std::string line;
-    std::getline(lines, line);  // the column names
+    std::getline(lines, line);  // skips the column names
     while (std::getline(lines, line) && !line.empty()) {
       found.push_back(line.substr(0, line.find("  ")));
     }

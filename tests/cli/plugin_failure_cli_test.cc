@@ -18,7 +18,7 @@ class PluginFailureCli : public ProgramTest {
   }
 };
 
-// FAULTS 58
+// Fault 58 of tests/faults/README.md.
 TEST_F(PluginFailureCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
   const std::string plugin = Plugin("raw_throws");
   Write("probe.yaml", R"(alidade: 1
@@ -46,7 +46,8 @@ estimators: {ekf: {type: ekf}}
        "--set", "sensors.bad.roles={x: s.position}", "--set", "sensors.bad.time_offset_s=0.01"});
   ASSERT_EQ(shifted.code, 0) << shifted.err;
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
-  // Two models throw in one frame. The program asks for their messages only after both have thrown.
+  // Two models throw in the same frame. The program reads their messages only after both have
+  // thrown.
   const std::string two = "{model: throws_in_valid, stream: z, roles: {x: s.value}}";
   ASSERT_EQ(run("sensors", "{bad: " + two + ", worse: " + two + '}').code, 0);
   for (const std::string sensor : {"bad", "worse"}) {
@@ -72,7 +73,7 @@ estimators: {ekf: {type: ekf}}
       << step.err;
 }
 
-// FAULTS 58
+// Fault 58 of tests/faults/README.md.
 TEST_F(PluginFailureCli, ASensorThatFailsIsLeftOutOnceOrAltogetherOrEndsTheRun) {
   const std::string plugin = Plugin("bad_models");
   Write("bad.yaml", R"(alidade: 1

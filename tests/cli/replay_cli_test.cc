@@ -66,7 +66,7 @@ TEST_F(ReplayCli, MakesASweepAgain) {
   ExpectEqual();
 }
 
-// The name of the config does not matter.
+// A replay does not depend on the file name of the config.
 TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   for (const char* name : {"again", "config", "made"}) {
     Write(name, Read("config.yaml"));
@@ -75,8 +75,8 @@ TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
   }
 }
 
-// A plugin that is refused in a folder of the environment is not an error, neither in the run nor
-// in the replay.
+// The folder of the environment also contains a plugin that is refused. This is not an error in the
+// run or in the replay.
 TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   fs::create_directory(folder_ / "own");
   fs::permissions(folder_ / "own", fs::perms::owner_all);
@@ -91,7 +91,7 @@ TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
   ExpectEqual();
 }
 
-// A run that fails on its data fails again in the replay.
+// If a run fails because of its data, the replay fails in the same way.
 TEST_F(ReplayCli, MakesAFailureAgain) {
   WriteTable("none");
   ASSERT_EQ(Call({"run", "table.yaml", "-o", "out", "--no-figures"}).code, 65);

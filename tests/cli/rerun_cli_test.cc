@@ -14,7 +14,7 @@ const fs::path kExample = fs::path(ALIDADE_SOURCE_DIR) / "examples/07_depth_pair
 
 class Rerun : public testing::ProgramTest {
  protected:
-  /// Copies the example and its table to a folder `made` below the current one.
+  /// Copies the example and its table to the folder `made` in the current folder.
   void SetUp() override {
     ProgramTest::SetUp();
     fs::create_directories(folder_ / "made");
@@ -27,7 +27,7 @@ class Rerun : public testing::ProgramTest {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
   }
-  /// Runs `config` in another folder and compares the estimates.
+  /// Runs `config` from another folder and expects the same estimates as in `first`.
   void ExpectSameFrom(const std::string& config, const std::string& first) {
     const fs::path before = folder_;
     fs::create_directory(folder_ / "elsewhere");

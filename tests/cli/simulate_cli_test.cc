@@ -42,11 +42,11 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   }
   EXPECT_EQ(Lines("data/timestamps.csv"), 21u);
   EXPECT_EQ(Lines("data/truth.tum"), 21u);
-  EXPECT_EQ(Lines("data/odometry.csv"), 20u);  // without a row after the last frame
+  EXPECT_EQ(Lines("data/odometry.csv"), 20u);  // has no row after the last frame
   EXPECT_TRUE(Read("data/tracks.csv").starts_with("frame,feature,dim,value\n0,")) << "header";
   EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("fx").Number(), 525.0);
 
-  // Reading and writing the data again reproduces the same bytes.
+  // Reading the data and writing them again gives the same bytes.
   Write("again.yaml", "alidade: 1\nsource: {type: tracks, path: data}\n");
   const Outcome again = Call({"simulate", "again.yaml", "-o", "again"});
   ASSERT_EQ(again.code, 0) << again.err;
@@ -62,7 +62,7 @@ TEST_F(SimulateCli, SaysInItsFolderWhetherItWasStopped) {
   ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "whole"}).code, 0);
   EXPECT_EQ(Json("whole/simulate.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Json("whole/simulate.json").root().At("frames").Number(), 20.0);
-  // 1e6 frames take more than a minute.
+  // A simulation of 1e6 frames takes more than a minute.
   const pid_t simulate =
       Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.max_frames=1000000"});
   ASSERT_TRUE(Eventually([&] { return Exists("data.partial/tracks.csv"); }));
@@ -140,7 +140,8 @@ TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
-  // A config that includes the calibration works and passes it on.
+  // A config can include the calibration, and the simulated data contain the same calibration
+  // again.
   const Outcome explained =
       Call({"explain", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--set",
             "camera.baseline_m=0.2"});

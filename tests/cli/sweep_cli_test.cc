@@ -16,7 +16,7 @@ using SweepCli = testing::ProgramTest;
 
 std::string Rows(const std::string& csv) { return csv.substr(csv.find('\n') + 1); }
 
-// FAULTS 97
+// Fault 97 of tests/faults/README.md.
 TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   for (const std::string jobs : {"1", "2", "3"}) {
     const Outcome sweep =
@@ -26,14 +26,14 @@ TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   }
 }
 
-// The times differ: one entry of compare.json and one row of its tables.
+// Only times differ: one entry of compare.json and one row of its tables.
 TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
   const auto files = [&](const std::string& jobs) {
     const Outcome comparison = Call({"compare", "config.yaml", "--runs", "4", "--no-decomposition",
                                      "--jobs", jobs, "-o", "jobs" + jobs});
     EXPECT_EQ(comparison.code, 0) << comparison.err;
     auto all = testing::RunFiles(folder_ / ("jobs" + jobs));
-    // Removes the times.
+    // Removes the times from the files.
     std::string& json = all["compare.json"];
     for (const char* key : {"\"cpu_us\"", "\"time_us\""}) {
       const std::size_t clock = json.find(key);
@@ -75,7 +75,7 @@ TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
 }
 
 TEST_F(SweepCli, SharesMakeTheWhole) {
-  // Without a gate all shards count the same outcomes, so they have the same columns.
+  // Without a gate all shards have the same outcomes, so their tables have the same columns.
   const auto rows = [&](const std::string& folder, const std::string& shard) {
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "5", "-o", folder, "--shard",
                                 shard, "--set", "estimators.ekf.gate=none"});
@@ -87,7 +87,7 @@ TEST_F(SweepCli, SharesMakeTheWhole) {
 }
 
 TEST_F(SweepCli, RefusesWhatIsNoShare) {
-  // 4294967297 becomes 1 in 32 bits.
+  // In 32 bits 4294967297 would become 1.
   for (const std::string shard :
        {"4294967297/4294967297", "1/99999999999999999999", "01/1", "1/01", "1/", "/2", "1", "",
         "0/2", "3/2", "1/2/3", "1/2x", " 1/2", "-1/2"}) {
@@ -117,7 +117,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
                                 std::string("source.path=") + once, "-o", "out"});
     EXPECT_EQ(sweep.code, 78) << sweep.err;
     EXPECT_TRUE(sweep.err.starts_with("error: --set source.path: '")) << sweep.err;
-    // With --vary, too, before the source is read.
+    // With --vary the path is refused as well, before the source is read.
     const Outcome varied =
         Call({"sweep", "table.yaml", "--runs", "2", "--vary", "sensors.stereo.sigma_px=1,2",
               "--set", std::string("source.path=") + once, "-o", "out"});
@@ -125,7 +125,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
     EXPECT_TRUE(Contains(varied.err, "can be read only once")) << varied.err;
   }
   EXPECT_FALSE(Exists("out"));
-  // A key that the source does not have stays an unknown key.
+  // If the source does not have the key, the message is still `unknown key`.
   const Outcome unknown = Call({"sweep", "config.yaml", "--runs", "2", "--set", "source.path=a"});
   EXPECT_EQ(unknown.code, 78);
   EXPECT_TRUE(Contains(unknown.err, "source.path: unknown key")) << unknown.err;
@@ -134,7 +134,7 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
 TEST_F(SweepCli, GoesOnWithTheThreadsThereAre) {
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_STACK, &before), 0);
-  // The stack size of a thread: half of the address space.
+  // The stack of each thread takes half of the address space, so not all threads can be started.
   const rlimit huge{std::min<rlim_t>(rlim_t{1} << 46, before.rlim_max), before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_STACK, &huge), 0);
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "6", "--jobs", "6", "-o", "out"});
@@ -154,7 +154,7 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
   EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
 }
 
-// The filter assumes a hundredth of the true noise.
+// The sigma of the filter is a hundredth of the true noise.
 TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   const Arguments too_sure = {"--set", "sensors.stereo.sigma_px=0.01",
                               "--set", "sensors.scale.sigma_px=0.01",
@@ -198,7 +198,7 @@ TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
 }
 
 TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
-  // Without a gate all values count the same outcomes, so they have the same columns.
+  // Without a gate all values have the same outcomes, so their tables have the same columns.
   const std::string no_gate = "estimators.ekf.gate=none";
   const Outcome varied =
       Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", "varied", "--vary",
@@ -280,7 +280,7 @@ TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) 
     int frame = 0;
     for (std::string line; std::getline(lines, line);) {
       if (!Contains(line, ",pixels,")) continue;
-      // In the first frame no landmark has been initialised yet.
+      // In the first frame no landmark has been initialised, so there is no innovation.
       if (frame == 0) rows += value + ",ekf,pixels,1,0,\n", frame = 1;
       rows += value + ",ekf,pixels," + std::to_string(++frame) + ",1," +
               line.substr(line.rfind(',') + 1) + '\n';
@@ -379,13 +379,13 @@ TEST_F(SweepCli, EveryValueHasTheSameEstimators) {
   EXPECT_EQ(rmse(0, "b"), rmse(1, "a"));
 }
 
-/// An estimator next to ekf that diverges in every run.
+/// Adds an estimator `bad` next to ekf. It diverges in every run.
 const Arguments kDiverging = {
     "--set",
     "estimators.bad={type: ekf, overrides: {state: {target: {initial: {depth: {mean: -0.2, sigma: "
     "0.1}, depth_rate: {mean: 0, sigma: 0.5}}}}}}"};
 
-// FAULTS 85
+// Fault 85 of tests/faults/README.md.
 TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
   Arguments arguments = {"sweep", "config.yaml", "--runs", "2",
                          "-o",    "out",         "--set",  "reference=bad"};
@@ -421,7 +421,7 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
         << text;
     EXPECT_TRUE(Contains(text, "; withheld in 1 of 1 runs")) << text;
   }
-  // An input that all values share is listed once.
+  // If all values have the same reference, it is named only once.
   arguments[7] = "sensors.stereo.sigma_px=1,2";
   arguments[5] = "one";
   arguments.insert(arguments.end(), {"--set", "reference=ekf"});
@@ -430,7 +430,7 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
   EXPECT_TRUE(Contains(one.out, "\nerrors are differences from estimator 'ekf'")) << one.out;
 }
 
-// The recorded inputs are those of all values, and those that only the source reads.
+// inputs.json lists the inputs of all values, including the files that only the source reads.
 TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
   for (const char* name : {"a.csv", "b.csv"}) Write(name, "t_s,d\n0,80\n0.1,79\n");
   const Outcome data = Call(

@@ -19,7 +19,7 @@ class SweepResumeCli : public ProgramTest {
   Outcome Sweep(const std::string& output, const Arguments& more = {}) const {
     return Call(Command(output, more));
   }
-  /// Starts a sweep into `out` and stops it after three runs.
+  /// Starts a sweep with the output `out` and stops it after three runs.
   void StopSweep(const Arguments& more = {}) const {
     const pid_t process = Start(Command("out", more));
     ASSERT_TRUE(Eventually([&] {
@@ -62,7 +62,7 @@ TEST_F(SweepResumeCli, GoesOnWithVariedValues) {
   ExpectSameFiles(folder_ / "out", folder_ / "whole");
 }
 
-// The last line is the one that a killed process had partly written.
+// The file ends with an incomplete line, as after a process was killed while writing it.
 TEST_F(SweepResumeCli, TakesFinishedRunsFromTheFile) {
   StopSweep({"--jobs", "1"});
   std::string text = Read("out.partial/finished_runs.jsonl");

@@ -39,7 +39,8 @@ void ExpectSame(const Node& a, const Node& b) {
 }
 
 void ExpectReadAgain(const Config& config) {
-  constexpr std::size_t kMost = 1 << 20;  // bytes of a file; aliases are expanded
+  // Largest file that is read, in bytes. ToYaml expands aliases, so its text may be larger.
+  constexpr std::size_t kMost = 1 << 20;
   const std::string yaml = config.ToYaml();
   if (yaml.size() > kMost) return;
   const Config again = Config::FromText(yaml, "again");

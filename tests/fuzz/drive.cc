@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string g_input;  // the current input, which Keep writes
+std::string g_input;  // the current input; Keep writes it to a file
 
 extern "C" void Keep(int signal) {
   char name[32];
@@ -51,7 +51,7 @@ std::string Read(const fs::path& file) {
   return text.str();
 }
 
-/// Returns the files of a folder in order of name.
+/// Returns the files of a folder, sorted by name.
 std::vector<fs::path> FilesIn(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;

@@ -19,15 +19,15 @@
 /// Helpers of all fuzz targets. Each target is one file with LLVMFuzzerTestOneInput; see README.md.
 namespace alidade::fuzz {
 
-/// Aborts the program if a property does not hold; the fuzzer then keeps the input.
+/// Aborts the program if a property does not hold. The fuzzer then keeps the input.
 inline void Require(bool holds, const char* what) {
   if (holds) return;
   std::fprintf(stderr, "fuzz: %s\n", what);
   std::abort();
 }
 
-/// Returns whether `work` ends without an Error. Another exception, or an Error that is marked
-/// internal, ends the program.
+/// Returns true if `work` ends without an Error, and false if it throws an Error. Another
+/// exception, or an Error that is marked as internal, ends the program.
 template <class Work>
 bool Accepts(const Work& work) {
   try {
@@ -43,7 +43,7 @@ inline std::string_view TextOf(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-/// Splits the input at its first `count` - 1 zero bytes; missing parts are empty.
+/// Splits the input at its first `count` - 1 zero bytes. Missing parts are empty.
 inline std::vector<std::string> Parts(std::string_view input, std::size_t count) {
   std::vector<std::string> parts(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -54,7 +54,7 @@ inline std::vector<std::string> Parts(std::string_view input, std::size_t count)
   return parts;
 }
 
-/// A file in memory with a path, for readers that need one.
+/// A file in memory that has a path, for readers that need a path.
 class MemoryFile {
  public:
   explicit MemoryFile(std::string_view bytes) : file_(::memfd_create("fuzz", MFD_CLOEXEC)) {
@@ -72,10 +72,10 @@ class MemoryFile {
   int file_;
 };
 
-/// A temporary folder with the lifetime of the process.
+/// A temporary folder that exists as long as the process.
 class Folder {
  public:
-  /// Creates the folder in memory if the machine has such a file system.
+  /// Creates the folder in a file system in memory, if the machine has one.
   Folder()
       : Folder(::access(kMemory, W_OK) == 0 ? kMemory : std::filesystem::temp_directory_path()) {}
   explicit Folder(const std::filesystem::path& where) {
@@ -91,7 +91,7 @@ class Folder {
   Folder& operator=(const Folder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Replaces a file; an empty text removes it.
+  /// Replaces a file. If `bytes` is empty, the file is removed.
   void Put(const std::string& name, std::string_view bytes) const {
     const std::filesystem::path file = path_ / name;
     std::filesystem::remove(file);

@@ -17,7 +17,8 @@ __extension__ typedef __int128 Wide;
 
 bool SameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-/// [+-] digits [. digits] [e [+-] digits], with a digit before the exponent.
+/// Returns true if the text has the form [+-] digits [. digits] [e [+-] digits], with at least one
+/// digit before the exponent.
 bool IsDecimal(std::string_view text) {
   const auto skip = [&](std::string_view set) {
     const std::size_t end = std::min(text.find_first_not_of(set), text.size());
@@ -38,11 +39,12 @@ bool IsDecimal(std::string_view text) {
   return skip(kDigits) > 0 && text.empty();
 }
 
-/// Rounds a decimal without exponent to the nearest integer, halves away from zero.
+/// Rounds the decimal `text`, which has no exponent, to `digits` decimals. Returns the result as an
+/// integer in units of the last decimal. Halves are rounded away from zero.
 Wide Exact(std::string_view text, std::size_t digits) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
-  Wide ten_times = 0;  // ten times the value
+  Wide ten_times = 0;  // ten times the result
   const std::size_t point = std::min(text.find('.'), text.size());
   for (std::size_t i = 0; i < point; ++i) ten_times = 10 * ten_times + (text[i] - '0');
   for (std::size_t i = 0; i <= digits; ++i) {

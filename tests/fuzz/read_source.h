@@ -12,7 +12,7 @@
 
 namespace alidade::fuzz {
 
-/// Creates a source from its config map and the data at `path`, and reads all its frames.
+/// Creates a source from the config map `yaml` and the data at `path`. Reads all its frames.
 inline void ReadSource(std::unique_ptr<Source> (*create)(const SourceArguments&),
                        const std::string& yaml, const std::filesystem::path& path) {
   Config config = Config::FromText(yaml, "source");

@@ -38,8 +38,9 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   bool PredictInCamera(const T* h, const T& rho, T* z) const {
     return pixel.PredictInCamera(h, rho, z);
   }
+  // Returns L of R = L L'. L is row-major and zero before the call.
   template <class T>
-  void SqrtNoiseInCamera(const T*, const T&, T* L) const {  // R = L L', L row-major, zero before
+  void SqrtNoiseInCamera(const T*, const T&, T* L) const {
     L[0] = T(sigma_u_px);
     L[2] = T(correlation * sigma_v_px);
     L[3] = T(std::sqrt(1.0 - correlation * correlation) * sigma_v_px);

@@ -3,15 +3,16 @@
 #
 # tests/install/add_plugin_test.sh CMAKE COMPILER
 #
-# Configures tests/install/echo with the function alidade_add_plugin of this tree. Its plugin must
-# be compiled with -O2 by default, and otherwise with the level of the build type or of the flags.
+# Configures tests/install/echo with the function alidade_add_plugin of this tree. By default the
+# plugin must be compiled with -O2. If the build type or the flags set another optimisation level,
+# that level must be used.
 set -euo pipefail
 cmake=$1 compiler=$2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Replaces the installed package.
+# Writes a package configuration that takes the place of the installed one.
 mkdir "$work/package"
 cat >"$work/package/alidadeConfig.cmake" <<END
 add_library(alidade::model INTERFACE IMPORTED)
@@ -19,7 +20,7 @@ include($PWD/cmake/AlidadeAddPlugin.cmake)
 END
 echo 'set(PACKAGE_VERSION_COMPATIBLE TRUE)' >"$work/package/alidadeConfigVersion.cmake"
 
-# levels OPTION...: prints the optimisation levels used to compile the plugin.
+# levels OPTION...: prints the optimisation levels with which the plugin is compiled.
 levels() {
   rm -rf "$work/build"
   "$cmake" -S tests/install/echo -B "$work/build" -G Ninja -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \

@@ -3,11 +3,11 @@
 #
 # tests/install/estimation_test.sh CMAKE BUILD COMPILER OPTIONS [CXXFLAG...] INCLUDE...
 #
-# Installs the component `estimation` of BUILD into an empty folder, which then has no header of
-# another room. Builds the C++ examples, and the program of late measurements, against only this
-# folder and Eigen (INCLUDE). They must print the expected estimates. Then installs the component
-# `testing` too, and builds the tests of tests/install/testing against both. Finally, configures
-# with ALIDADE_ESTIMATION_ONLY, without any other package.
+# Installs the component `estimation` of BUILD into an empty folder, so no header of another room is
+# there. Builds the C++ examples and the program of late measurements with only this folder and
+# Eigen (INCLUDE). These programs must print the expected estimates. Then also installs the
+# component `testing` and builds the tests of tests/install/testing with both components. Finally
+# configures the project with ALIDADE_ESTIMATION_ONLY, without any other package.
 set -euo pipefail
 cmake=$1 build=$2 compiler=$3
 IFS=',' read -ra options <<<"$4"
@@ -37,14 +37,14 @@ for argument in "$@"; do
   [[ $argument == -* ]] && only_flags+=("$argument") || flags+=(-isystem "$argument")
 done
 flags+=("${only_flags[@]}")
-# run FOLDER: prints the output of the program there.
+# run FOLDER: builds the program in FOLDER and prints its output.
 run() {
   "$compiler" "${flags[@]}" "${options[@]}" "$1/main.cc" -o "$work/program" \
     "$library" -Wl,-rpath,"$(dirname "$library")"
   "$work/program"
 }
 
-# The last depth is within 4 sigma of the truth.
+# The last depth must be within 4 sigma of the truth.
 run examples/31_depth_cpp | tee "$work/depth" | tail -1 |
   awk '{ d = $3 - $8; if (d * d > 16 * $5 * $5 || $5 > 0.01) exit 1 }' ||
   fail "examples/31_depth_cpp says: $(cat "$work/depth")"

@@ -3,10 +3,11 @@
 #
 # tests/install/flags_test.sh FLAG FOLDER OPTIONS COMPILER [CXXFLAG...] INCLUDE...
 #
-# Compiles tests/install/outsider/filter.cc with -FLAG and the OPTIONS (separated by commas) that
-# the target alidade::estimation adds. Runs it with the libraries in FOLDER, which were built
-# without the flag. If the processor lacks the instructions, it is only compiled. Without OPTIONS
-# the program must either work or be refused with a message that names the remedy.
+# Compiles tests/install/outsider/filter.cc with -FLAG and with OPTIONS, the options (separated by
+# commas) that the target alidade::estimation adds. Runs the program with the libraries in FOLDER,
+# which were built without the flag. If the processor lacks the instructions, the program is only
+# compiled. Without OPTIONS the program must either work or be refused with a message that names the
+# remedy.
 set -euo pipefail
 flag=-$1 folder=$2 compiler=$4
 IFS=',' read -ra options <<<"$3"
@@ -32,7 +33,7 @@ else
   echo "$flag: compiled and run"
 fi
 
-# The effect of the flags on Eigen.
+# Finds out how the flags change the alignment of Eigen.
 macros=$("$compiler" "${flags[@]}" -dM -E -x c++ - </dev/null)
 remedy=
 grep -q '__SANITIZE_ADDRESS__' <<<"$macros" && remedy=-DEIGEN_MALLOC_ALREADY_ALIGNED=1

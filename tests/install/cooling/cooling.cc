@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/model/plugin.h"
 
-/// A body that takes on the temperature of its surroundings, by Newton's law of cooling.
+/// A body whose temperature approaches that of its surroundings, by Newton's law of cooling.
 ///
 ///   model      T' = A + (T - A) exp(-dt / tau) + w
 ///   noise      w ~ N(0, q^2 tau / 2 (1 - exp(-2 dt / tau))), the exact sum of white noise that
@@ -32,7 +32,7 @@ struct Cooling : alidade::Motion<1, alidade::Vec<1>> {
   }
 };
 
-/// z = T + n, n ~ N(0, sigma^2), degC.
+/// Measures the temperature: z = T + n, n ~ N(0, sigma^2), degC.
 struct Thermometer : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
   static constexpr std::array kRoles{alidade::Quantity{"temperature", "degC", "of the body"}};
   static constexpr alidade::Quantity kMeasurement{"reading", "degC", "of the thermometer"};

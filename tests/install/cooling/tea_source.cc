@@ -7,7 +7,7 @@
 
 namespace {
 
-/// A cup of tea of 80 degC that cools in a room of 20 degC, read once a second.
+/// A cup of tea at 80 degC cools in a room at 20 degC. Its temperature is read once a second.
 class Tea : public alidade::Source {
  public:
   explicit Tea(const alidade::SourceArguments& arguments)

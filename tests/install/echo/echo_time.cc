@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/model/plugin.h"
 
-/// Time from a pulse to its echo; the emitter and the microphone are apart.
+/// Measures the time from a pulse to its echo. The emitter and the microphone are at two places.
 ///
 ///   model      t = 2 sqrt(Z^2 + (b/2)^2) / c + n,   n ~ N(0, sigma^2)
 ///   Jacobian   automatic differentiation               1x1, s/m

@@ -8,7 +8,7 @@
 
 namespace {
 
-/// x' = x + w, w ~ N(0, dt), in three dimensions.
+/// A random walk in three dimensions: x' = x + w, w ~ N(0, dt).
 struct Walk : alidade::Motion<3, alidade::Vec<3>> {
   static constexpr std::array kBlocks{alidade::Quantity{"position", "m", "", "x,y,z"}};
   template <class T>
@@ -20,7 +20,7 @@ struct Walk : alidade::Motion<3, alidade::Vec<3>> {
   }
 };
 
-/// z = x + n, n ~ N(0, 1), in three dimensions.
+/// Measures the position in three dimensions: z = x + n, n ~ N(0, 1).
 struct Seen : alidade::Sensor<alidade::Vec<3>, alidade::Vec<3>> {
   static constexpr std::array kRoles{alidade::Quantity{"position", "m", "", "x,y,z"}};
   static constexpr alidade::Quantity kMeasurement{"z", "m", "", "x,y,z"};
@@ -53,8 +53,8 @@ alidade::Problem WalkSystem() {
   return problem;
 }
 
-/// Returns whether the program can resize and free memory of the library, and the library memory of
-/// the program.
+/// Returns true if the program and the library share their heap: each can resize and free memory
+/// that the other has allocated.
 bool SharesTheHeap(const alidade::Ekf& ekf) {
   for (int rows = 1; rows <= 3; ++rows) {
     Eigen::MatrixXd block = ekf.state().covariance().Block(0, rows, 0, 3);
@@ -73,8 +73,8 @@ bool SharesTheHeap(const alidade::Ekf& ekf) {
 
 }  // namespace
 
-// Returns 0 if a filter of the library equals the scalar Kalman filter, for all flags of this
-// program: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
+// Returns 0 if a filter of the library equals the scalar Kalman filter with the compiler flags of
+// this program: P' = P + 1, K = P' / (P' + 1), x' = x + K (z - x), P = P' - K P'.
 int main() {
   alidade::Ekf ekf(WalkSystem(), {}, {{"seen", 3}});
   double x = 0.0, p = 1.0;

@@ -6,7 +6,8 @@
 #include "alidade/plugin/plugin_host.h"
 #include "alidade/sensors/stereo_disparity.h"
 
-// Returns 0 if a shipped model works as a plain struct and the installed library finds its plugins.
+// Returns 0 if a shipped model works as a plain struct and if the installed library finds its
+// plugins.
 int main() {
   const alidade::StereoDisparity stereo(400.0, 0.065, 1.0);
   const double depth_m = 0.5;

@@ -13,21 +13,21 @@ using namespace std::string_literals;  // NOLINT(google-build-using-namespace): 
 
 const fs::path kBases = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/configs";
 
-/// Replaces `from`, which occurs once in the base, by `to`.
+/// Replaces `from` by `to`. The text `from` must occur exactly once in the base config.
 struct Change {
   std::string from, to;
 };
 
-/// Inserts lines after the line that ends with `text`.
+/// Returns a change that inserts `lines` after the line that ends with `text`.
 Change After(const std::string& text, const std::string& lines) {
   return {text, text + '\n' + lines};
 }
 
 struct Fault {
-  std::string name;  ///< begins with the number in the table of README.md, if the fault has one
-  std::string base;  ///< empty: an empty config
+  std::string name;  ///< begins with the fault number of README.md, if the fault has one
+  std::string base;  ///< name of the base config; empty: an empty config
   std::vector<Change> changes;
-  int line = 0;  ///< 0: the message names the file only
+  int line = 0;  ///< line that the message names; 0: the message names only the file
   std::string words;
   int code = 78;
 };
@@ -39,13 +39,13 @@ Fault MakeFault(std::string name, std::string base, std::vector<Change> changes,
 
 void PrintTo(const Fault& fault, std::ostream* stream) { *stream << fault.name; }
 
-// Texts of the base configs that several faults change.
+// Texts in the base configs that several faults change.
 const std::string kEkf = "{type: ekf}", kDepthSource = "{type: depth_target, seed: 1}",
                   kStereoRoles = "{depth: target.depth}", kStereoSigma = "    sigma_px: 1.0",
                   kTemplateBlock = "template.inverse_distance",
                   kTemplateBlocks = "{value: inverse_distance}",
                   kPrior = "prior: {inverse_distance: 0.5, sigma: 0.25}";
-/// A table as the source, instead of the simulated target.
+/// Returns a source that reads a table, as a replacement for the simulated target.
 std::string Rows(const std::string& keys) {
   return "{type: csv, path: rows.csv, streams: {disparity: d, inverse_scale: s}, " + keys + "}";
 }
@@ -359,7 +359,7 @@ const Fault kLandmarkFaults[] = {
 
 class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<Fault> {
  protected:
-  /// Returns the base config with the changes.
+  /// Returns the text of the base config after the changes of `fault`.
   static std::string Text(const Fault& fault) {
     std::string text = fault.base.empty() ? "" : ReadText(kBases / (fault.base + ".yaml"));
     for (const auto& [from, to] : fault.changes) {
@@ -402,7 +402,7 @@ class ConfigText : public ProgramTest {
   }
 };
 
-// FAULTS 15
+// Fault 15 of tests/faults/README.md.
 TEST_F(ConfigText, LargerThanOneMebibyteIsRefused) {
   constexpr std::size_t kLimit = 1 << 20;
   const std::string padded = kDepthConfig + '#' + std::string(kLimit, 'x');
@@ -412,7 +412,7 @@ TEST_F(ConfigText, LargerThanOneMebibyteIsRefused) {
   EXPECT_EQ(large.err, "error: text.yaml: larger than 1 MiB; expected a config of at most 1 MiB\n");
 }
 
-// FAULTS 18
+// Fault 18 of tests/faults/README.md.
 TEST_F(ConfigText, ByteOrderMarkAndCarriageReturnsMakeNoDifference) {
   ASSERT_EQ(RunText(kDepthConfig).code, 0);
   const std::string estimates = Read("out/ekf/estimates.csv");
@@ -423,7 +423,7 @@ TEST_F(ConfigText, ByteOrderMarkAndCarriageReturnsMakeNoDifference) {
   EXPECT_EQ(Read("out/ekf/estimates.csv"), estimates);
 }
 
-// FAULTS 22
+// Fault 22 of tests/faults/README.md.
 TEST_F(ConfigText, AFolderAndAMissingFileAreInputMissing) {
   const auto expect = [&](const std::string& config, const std::string& reason) {
     const Outcome outcome = Call({"run", config, "-o", "out"});

@@ -12,7 +12,7 @@ namespace {
 using testing::Contains;
 using testing::Outcome;
 
-/// A camera at rest at the origin, or moving along x, and tracks of landmarks in front of it.
+/// The camera is at rest at the origin or moves along x. It sees landmarks in front of it.
 constexpr const char* kMapConfig = R"(alidade: 1
 camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 state:
@@ -38,7 +38,7 @@ class DataFault : public testing::ProgramTest {
     ProgramTest::SetUp();
     Write("map.yaml", kMapConfig);
   }
-  /// Runs a config into `out` and expects exit code `code`.
+  /// Runs `config` with the output `out`. Expects the exit code `code`.
   Outcome Run(const std::string& config, testing::Arguments more = {}, int code = 0) {
     testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -66,7 +66,8 @@ std::vector<std::string> Cells(const std::string& table) {
   return cells;
 }
 
-/// Expects equal cells in two tables: the same words, and numbers within `tolerance`.
+/// Expects that two tables have equal cells: the same words, and numbers that differ by at most
+/// `tolerance`.
 void ExpectNear(const std::string& table, const std::string& expected, double tolerance) {
   const std::vector<std::string> a = Cells(table), b = Cells(expected);
   ASSERT_EQ(a.size(), b.size());
@@ -81,7 +82,7 @@ std::string Row(int frame, int feature, int dim, double value) {
          std::to_string(value) + '\n';
 }
 
-/// Rows of features 0 to 5 on a plane 4 m ahead, as seen by a camera at x.
+/// Returns the rows of features 0 to 5, which lie on a plane 4 m ahead. The camera is at `x`.
 std::string Plane(int frame, double x) {
   std::string rows;
   for (int i = 0; i < 6; ++i) {
@@ -91,9 +92,9 @@ std::string Plane(int frame, double x) {
   return rows;
 }
 
-// FAULTS 39
+// Fault 39 of tests/faults/README.md.
 TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
-  // The track of feature 7 ends with frame 2; 30 frames later another point has its id.
+  // The track of feature 7 ends with frame 2. In frame 33 another point gets the same id.
   std::string rows;
   for (int frame = 0; frame < 40; ++frame) {
     rows += Plane(frame, 0.02 * frame);
@@ -108,9 +109,10 @@ TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
   EXPECT_EQ(Count("landmarks.deleted"), 1);
 }
 
-// FAULTS 40
+// Fault 40 of tests/faults/README.md.
 TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
-  // The same motion twice, the second time with landmarks as if at infinity.
+  // The camera moves in the same way in both runs. In the second run the landmarks do not move in
+  // the image, as if they were at infinity.
   for (const bool moves : {true, false}) {
     std::string rows;
     for (int frame = 0; frame < 60; ++frame) rows += Plane(frame, moves ? 0.03 * frame : 0.0);
@@ -124,7 +126,8 @@ TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
   }
 }
 
-// FAULTS 41: a landmark behind the camera, depths and disparities that are not positive.
+// Fault 41 of tests/faults/README.md: a landmark behind the camera, and depths and disparities that
+// are not positive.
 TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   Write("table.csv", "t_s,d\n0,80\n0.1,0\n0.2,-5\n0.3,82\n");
   Run("table.yaml");
@@ -138,7 +141,7 @@ TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   Write("tracks.csv", rows);
   Run("map.yaml", {"--set", "landmarks.known=[{id: 9, position: [0, 0, -2], sigma: 0}]"});
   EXPECT_EQ(Count("out_of_domain:pixels"), 4);
-  // A depth that is not positive (dim 2).
+  // The depth (dim 2) of the last frame is not positive.
   rows.clear();
   for (int frame = 0; frame < 4; ++frame) {
     rows += Row(frame, 9, 0, 320) + Row(frame, 9, 1, 240) + Row(frame, 9, 2, frame < 3 ? 2.0 : 0.0);
@@ -150,7 +153,7 @@ TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
   EXPECT_EQ(Count("invalid:pixels"), 1);
 }
 
-// FAULTS 42
+// Fault 42 of tests/faults/README.md.
 TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   Write("table.csv", "t_s,d\n0,80\n0.1,\n0.2,80\n");
   Run("table.yaml");
@@ -164,7 +167,7 @@ TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   EXPECT_EQ(Count("accepted:pixels"), 6);
 }
 
-// FAULTS 27, 43: the program's handling of a reader's error.
+// Faults 27 and 43 of tests/faults/README.md: how the program handles an error of a reader.
 TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
   for (const char* config : {"table.yaml", "map.yaml"}) {
     const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
@@ -180,9 +183,9 @@ TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
   }
 }
 
-// FAULTS 45
+// Fault 45 of tests/faults/README.md.
 TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
-  // The image reaches from -0.5 px to 639.5 px and 479.5 px.
+  // The image reaches from -0.5 px to 639.5 px in u and to 479.5 px in v.
   const std::vector<std::pair<double, double>> outside = {
       {-0.6, 100}, {639.6, 100}, {100, -0.6}, {100, 479.6}, {1e9, -1e9}};
   std::string rows;
@@ -205,9 +208,10 @@ TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
   EXPECT_FALSE(Contains(map, "\n10,"));
 }
 
-// FAULTS 46
+// Fault 46 of tests/faults/README.md.
 TEST_F(DataFault, AnotherUnitIsAWarning) {
-  // Disparities of a target at 0.325 m: in px as configured, then 1000 times larger.
+  // Disparities of a target at 0.325 m, first in px as in the config, then in a unit that makes
+  // them 1000 times larger.
   const auto table = [](double unit) {
     std::string rows = "t_s,d\n";
     for (int k = 0; k < 15; ++k) {
@@ -228,7 +232,7 @@ TEST_F(DataFault, AnotherUnitIsAWarning) {
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), ",unit,"));
 }
 
-// FAULTS 48
+// Fault 48 of tests/faults/README.md.
 TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
   std::string rows = "t_s,d\n", tracks;
   for (int k = 0; k < 200'000; ++k) rows += std::to_string(0.001 * k) + ",80\n";
@@ -246,8 +250,8 @@ TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
   }
 }
 
-/// Returns the truth of 20 frames with rotations about y up to 4 rad. Every third quaternion is
-/// negated, or all others are.
+/// Returns the truth of 20 frames with rotations about y from 0 to 3.8 rad. If `turned`, every
+/// third quaternion is negated; otherwise all others are.
 std::string Turning(bool turned, double length = 1.0) {
   std::ostringstream rows;
   rows.precision(17);
@@ -259,7 +263,7 @@ std::string Turning(bool turned, double length = 1.0) {
   return rows.str();
 }
 
-// FAULTS 49
+// Fault 49 of tests/faults/README.md.
 TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
   std::string rows;
   for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
@@ -283,11 +287,11 @@ TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
                                     .Text()));
   }
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(files[i], files[i + 4]);
-  // The signs are continuous: at 2 rad w is below 0.
+  // The signs make the quaternion continuous: at the last rotation, 3.8 rad, w is negative.
   EXPECT_TRUE(Contains(files[2], ",0,0,0,-0.3")) << files[2];
 }
 
-// FAULTS 49
+// Fault 49 of tests/faults/README.md.
 TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   std::string rows;
   for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
@@ -300,12 +304,12 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
   Run("map.yaml");
   const Config run = Json("out/run.json");
   EXPECT_EQ(run.root().At("normalised").At("cam.orientation").Number(), 20);
-  // elements of at most 1, with a few rounding errors
+  // Elements are at most 1 and have a few rounding errors.
   ExpectNear(Read("out/truth.csv"), truth, 1e-12);
   Write("truth.tum", Turning(false, 1.0011));
   const Outcome tum = Run("map.yaml", {}, 65);
   EXPECT_TRUE(Contains(tum.err, "truth.tum:1: quaternion of length 1.0011")) << tum.err;
-  // The quaternion is read from the columns of a table.
+  // Here the quaternion is read from the columns of a table.
   const testing::Arguments columns = {"--set",
                                       "source={type: csv, path: turn.csv, streams: {tracks: [w, "
                                       "x]}, truth: {orientation: [w, x, y, z]}}"};
@@ -334,7 +338,7 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));
 }
 
-// The choice between q and -q depends on the order of the timestamps, not of arrival.
+// The choice between q and -q depends on the order of the timestamps, not on the order of arrival.
 TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   Write("tracks.csv", Plane(0, 0.0));
   const testing::Arguments sorted = {
@@ -352,7 +356,7 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   EXPECT_EQ(Read("out/truth.csv"), truth);
 }
 
-// FAULTS 78
+// Fault 78 of tests/faults/README.md.
 TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
   const Outcome alone = Call({"explain", "map.yaml"});
@@ -369,7 +373,7 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
   const char* const observed = "the state is fully observable";
-  // Measured depths make the scale observable, and so do known landmarks.
+  // Measured depths make the scale observable. Landmarks of known position do so too.
   const Outcome depth =
       Call({"explain", "map.yaml", "--set", "sensors.pixels.model=depth_feature", "--set",
             "sensors.pixels.sigma_depth_m=0.02", "--set", "source.measures=depth"});

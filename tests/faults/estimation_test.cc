@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// z = x0 - x1 + n
+/// Measures z = x0 - x1 + n.
 struct Difference : Sensor<Vec<1>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -34,7 +34,8 @@ struct Difference : Sensor<Vec<1>, Vec<2>> {
   }
 };
 
-/// Two elements x with the covariance P, and a measurement of their difference.
+/// Returns a problem with two elements x of covariance P, and a sensor that measures their
+/// difference.
 Problem TwoElements(const Eigen::Matrix2d& p, double sigma) {
   Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};
@@ -49,10 +50,10 @@ Problem TwoElements(const Eigen::Matrix2d& p, double sigma) {
   return problem;
 }
 
-/// Eigenvalues 2.1 and -0.1; S = 1 - 2.2 + 1 + 0.01 < 0.
+/// Returns a matrix P with the eigenvalues 2.1 and -0.1. It gives S = 1 - 2.2 + 1 + 0.01 < 0.
 Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished(); }
 
-// FAULTS 75
+// Fault 75 of tests/faults/README.md.
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   for (const bool iterated : {false, true}) {
@@ -63,8 +64,8 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
     EXPECT_TRUE(HasEvent(report, EventKind::kRepaired));
     EXPECT_EQ(filter->state().values(), (std::vector<double>{1.0, 2.0}));
-    // The repaired matrix that has the same factors: l = 1.1 and pivots 1 and -0.21, which becomes
-    // zero.
+    // The factors of P are l = 1.1 and the pivots 1 and -0.21. The repair sets the negative pivot
+    // to zero and keeps the other factors.
     const Eigen::MatrixXd p = filter->state().covariance().Dense();
     const Eigen::Matrix2d expected = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.21).finished();
     EXPECT_TRUE(p.isApprox(expected, 1e-12)) << p;
@@ -77,13 +78,13 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   }
 }
 
-/// An EKF whose P the test can overwrite.
+/// An EKF that gives the test access to P.
 struct Open : Ekf {
   using Ekf::Ekf;
   using Ekf::engine;
 };
 
-// FAULTS 75: the limit on the number of repairs.
+// Fault 75 of tests/faults/README.md: the number of repairs is limited.
 TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -98,7 +99,8 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   }
 }
 
-// FAULTS 75: a repair that a rollback undoes, as for a late frame, does not count.
+// Fault 75 of tests/faults/README.md: a repair that is undone by a rollback, as for a late frame,
+// is not counted.
 TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   const Problem problem = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
@@ -112,7 +114,7 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   }
 }
 
-// FAULTS 75: the exit code; the other estimators continue.
+// Fault 75 of tests/faults/README.md: the exit code is 79, and the other estimators continue.
 TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();
   EstimatorSpec named;
@@ -136,7 +138,7 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   EXPECT_FALSE(result.estimators.front().diverged);
 }
 
-// FAULTS 79: S = H P H' + R = 0, although P is valid.
+// Fault 79 of tests/faults/README.md: S = H P H' + R = 0, although P is valid.
 TEST(SingularInnovation, IsReportedAndChangesNothing) {
   const Eigen::Matrix2d ones = Eigen::Matrix2d::Ones();  // x0 - x1 is known exactly
   const Problem problem = TwoElements(ones, 0.0);
@@ -153,7 +155,8 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
   EXPECT_FALSE(ekf.diverged());
 }
 
-// FAULTS 79: the same noiseless measurement twice. Each S alone is regular.
+// Fault 79 of tests/faults/README.md: two measurements are equal and have no noise. The S of each
+// alone is regular.
 TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});

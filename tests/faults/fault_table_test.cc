@@ -13,8 +13,8 @@ namespace {
 
 const fs::path kTests = fs::path(ALIDADE_SOURCE_DIR) / "tests";
 
-/// Returns `Suite.Name` of every test in the sources and `ConfigFault.NN_*` of every config's
-/// number.
+/// Returns the name `Suite.Name` of every test in the sources, and `ConfigFault.NN_*` for the
+/// number of every config fault.
 std::set<std::string> TestsInSources() {
   std::set<std::string> tests;
   const std::regex test(R"(\nTEST(?:_F|_P)?\((\w+),\s+(\w+)\))"), config(R"re("(\d\d_))re");

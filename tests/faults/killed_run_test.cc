@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 91: the files of a killed run, and how a killed sweep is resumed.
+// Fault 91 of tests/faults/README.md: checks the files of a killed run, and that a killed sweep can
+// be resumed.
 #include <algorithm>
 
 #include "support/run_files.h"
@@ -18,7 +19,7 @@ TEST_F(KilledRun, LeavesItsRowsAndARecordThatSaysRunning) {
   };
   feed("t_s,d\n0,80\n");
   const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
-  // Rows are written to the file once a second, when the next row arrives.
+  // The run writes its rows to the file once a second, at the arrival of the next row.
   int row = 0;
   ASSERT_TRUE(Eventually([&] {
     feed(std::to_string(++row) + ",80\n");

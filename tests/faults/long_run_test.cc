@@ -15,7 +15,7 @@ const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
 
 class LongRun : public testing::ProgramTest {
  protected:
-  /// Returns the peak resident memory of a run in KiB.
+  /// Returns the peak resident memory of a run of `config` in KiB.
   long PeakOf(const std::string& config, testing::Arguments settings) {
     testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
     for (std::string& setting : settings) {
@@ -23,7 +23,7 @@ class LongRun : public testing::ProgramTest {
     }
     const pid_t pid = Start(arguments);
     const std::string status = "/proc/" + std::to_string(pid) + "/status";
-    // rusage cannot be used, because its peak includes that of this process.
+    // The peak of rusage includes that of this process, so it is read from /proc instead.
     long peak = 0;
     siginfo_t ended{};
     while (::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
@@ -39,7 +39,7 @@ class LongRun : public testing::ProgramTest {
   }
 };
 
-// FAULTS 47
+// Fault 47 of tests/faults/README.md.
 TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   const std::string file = (folder_ / "tracks.csv").string();
@@ -47,20 +47,21 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
     std::ofstream rows(file);
     for (int k = 0; k < frames; ++k) {
       for (int i = 0; i < 100; ++i) {
-        const int id = i + 100 * ((k + i) / 50);  // each id appears in 50 frames
+        const int id = i + 100 * ((k + i) / 50);  // each id appears in 50 consecutive frames
         rows << k << ',' << id << ",0," << 6 * i << ".25\n" << k << ',' << id << ",1,20.5\n";
       }
     }
     rows.close();
     return PeakOf(kBench + "stream.yaml", {"source.path=" + file});
   };
-  // 3 and 30 MB. Storing the 900 000 measurements would take 100 bytes or more for each.
+  // The files have 3 and 30 MB. If the run stored the additional 900 000 measurements, each would
+  // take 100 bytes or more.
   const long shorter = peak(1'000), longer = peak(10'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
   EXPECT_LT(longer, 100 * 1'024);
 }
 
-// FAULTS 47: a table with truth, so that errors and the lag are computed.
+// Fault 47 of tests/faults/README.md: the table has truth, so errors and the lag are computed.
 TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   const auto peak = [&](int count) {
@@ -71,7 +72,8 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
     rows.close();
     return PeakOf("table.yaml", {"source.truth={depth: depth}"});
   };
-  // Storing estimate and truth of every row would take 16 bytes a row, 6 MB.
+  // If the run stored the estimate and the truth of each row, they would take 16 bytes a row,
+  // together 6 MB.
   const long shorter = peak(120'000), longer = peak(520'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
 }
@@ -82,8 +84,8 @@ TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
     return PeakOf(kBench + "walk.yaml", {"source.max_frames=" + std::to_string(frames),
                                          "source.max_features_per_frame=20"});
   };
-  // The path of the scene is generated in advance: 104 bytes a frame, 0.3 MB. Storing all landmarks
-  // would take 12 MB.
+  // The path of the scene is generated in advance and takes 104 bytes a frame, or 0.3 MB. Storing
+  // all landmarks would take 12 MB.
   const long shorter = peak(1'000), longer = peak(4'000);
   EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
   const Config run = Json("out/run.json");
@@ -91,7 +93,8 @@ TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
   EXPECT_GT(counts.At("landmarks.deleted").Number(), 50);
 }
 
-// A frame is processed once the first row of the next frame arrives, even if the pipe then stalls.
+// A frame is processed when the first row of the next frame arrives, even if no further rows
+// follow.
 TEST_F(LongRun, APipeIsTakenAsItGrows) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   const int pipe = ::open((folder_ / "pipe").c_str(), O_RDWR | O_CLOEXEC);
@@ -112,7 +115,7 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     }));
   }
   ::kill(run, SIGINT);
-  feed(kFrames + 1);  // a signal just before the run waits for data is handled at the next row
+  feed(kFrames + 1);  // a signal that arrives just before the run waits is handled at the next row
   const testing::Outcome stopped = Wait(run);
   EXPECT_EQ(stopped.code, 75) << stopped.err;
   EXPECT_GE(Json("out/run.json").root().At("frames").Number(), kFrames);

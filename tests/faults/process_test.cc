@@ -13,7 +13,7 @@ namespace {
 
 using testing::kDepthConfig;
 
-/// Returns the last state of every estimator and all metrics.
+/// Last states of all estimators, and the metrics of the first one.
 struct Result {
   std::vector<double> values, covariance;
   std::map<std::string, double> metrics;
@@ -38,11 +38,11 @@ Experiment Build(const PluginHost& host, const std::string& text = kDepthConfig)
   return BuildExperiment(Config::FromText(text, "config.yaml"), host);
 }
 
-// FAULTS 72
+// Fault 72 of tests/faults/README.md.
 TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
   const PluginHost host(std::vector<std::filesystem::path>{});
   Experiment first = Build(host);
-  Experiment waiting = Build(host);  // created now, run last
+  Experiment waiting = Build(host);  // is created before the other runs and runs after them
   const Result expected = Finish(first);
   EXPECT_FALSE(expected.metrics.empty());
   std::string other = kDepthConfig;

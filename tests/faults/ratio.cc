@@ -6,7 +6,8 @@
 
 namespace {
 
-/// Two blocks, each of which can be initialised from the other: they can form a cycle.
+/// A ratio of two blocks. Each block can be initialised from the other, so the sensor can form a
+/// cycle of initialisations.
 struct Ratio : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>, alidade::Vec<1>> {
   static constexpr std::array kRoles{alidade::Quantity{"numerator"},
                                      alidade::Quantity{"denominator"}};

@@ -19,7 +19,7 @@ namespace {
 
 class RunSafety : public ProgramTest {
  protected:
-  /// Expects no files other than the fixture's and `names`.
+  /// Expects that the folder has no files other than those of the fixture and `names`.
   void ExpectOnly(std::vector<std::string> names) const {
     names.insert(names.end(), {"config.yaml", "table.yaml", "stdout", "stderr"});
     for (const auto& entry : fs::directory_iterator(folder_)) {
@@ -27,7 +27,8 @@ class RunSafety : public ProgramTest {
       EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
     }
   }
-  /// Expects either no folder `out` or one whose record has the reason of the failure.
+  /// Expects that the folder `out` does not exist, or that its record contains the reason of the
+  /// failure.
   void ExpectRecordOfFailure(const std::string& reason) const {
     ExpectOnly({"out"});
     if (!Exists("out")) return;
@@ -35,15 +36,15 @@ class RunSafety : public ProgramTest {
     EXPECT_EQ(record.root().At("status").Text(), "failed");
     EXPECT_TRUE(Contains(record.root().At("reason").Text(), reason)) << Read("out/run.json");
   }
-  /// Removes the `out.partial` of an unfinished run; returns whether it existed.
+  /// Removes the `out.partial` of an unfinished run. Returns true if it existed.
   bool LeftPartial() const { return fs::remove_all(folder_ / "out.partial") > 0; }
-  /// Returns whether the memory suffices to start the program. With less, the C++ runtime cannot
-  /// even throw and aborts.
+  /// Returns true if the memory suffices to start the program. With less memory the C++ runtime
+  /// cannot even throw, and aborts.
   bool Starts() const { return Call({"--version"}).code == 0; }
   std::string Estimates(const std::string& run) const { return Read(run + "/ekf/estimates.csv"); }
 };
 
-// FAULTS 88
+// Fault 88 of tests/faults/README.md.
 TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);
   std::uintmax_t largest = 0;
@@ -53,7 +54,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   fs::remove_all(folder_ / "whole");
   int refused = 0, kept = 0;
   for (std::uintmax_t blocks = 0; blocks <= largest / 512 + 1; blocks += 1 + blocks / 3) {
-    // The shell counts blocks of 512 bytes.
+    // `ulimit -f` counts blocks of 512 bytes.
     before_ = "ulimit -f " + std::to_string(blocks) + "; exec 2>/dev/null >/dev/null";
     const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
     EXPECT_EQ(run.signal, 0) << blocks;
@@ -77,7 +78,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   EXPECT_TRUE(LeftPartial());
 }
 
-// FAULTS 89
+// Fault 89 of tests/faults/README.md.
 TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
   for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out", "--no-figures"},
                                    {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
@@ -95,12 +96,12 @@ TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
         << command[0] << outcome.err;
     fs::remove(folder_ / "pipe");
   }
-  // The output of the commands is complete.
+  // The run and the sweep were completed before the output failed.
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Json("sweep/sweep.json").root().At("runs_used").Number(), 1);
 }
 
-// FAULTS 92
+// Fault 92 of tests/faults/README.md.
 TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   const Arguments run = {"run", "config.yaml", "-o", "out", "--no-figures"};
   ASSERT_EQ(Call(run).code, 0);
@@ -116,7 +117,7 @@ TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
   EXPECT_NE(Estimates("out"), before);
 }
 
-// FAULTS 92: --force does not delete runs inside a run's folder.
+// Fault 92 of tests/faults/README.md: --force does not delete runs inside the folder of a run.
 TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base", "--no-figures"}).code, 0);
@@ -136,7 +137,7 @@ TEST_F(RunSafety, ForceSparesRunsInsideARun) {
   EXPECT_TRUE(Exists("out/ekf/sweep/sweep.json"));
 }
 
-// FAULTS 94
+// Fault 94 of tests/faults/README.md.
 TEST_F(RunSafety, TheClockIsInTimingAlone) {
   const auto record = [&](const std::string& output) {
     const Outcome run = Call({"run", "config.yaml", "-o", output, "--quiet"});
@@ -160,7 +161,7 @@ TEST_F(RunSafety, TheClockIsInTimingAlone) {
   EXPECT_GT(same, 12);
 }
 
-// FAULTS 96
+// Fault 96 of tests/faults/README.md.
 TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
   int failed = 0, recorded = 0;
@@ -172,9 +173,9 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
         {"run", "config.yaml", "-o", "out", "--no-figures", "--set", "source.duration_s=2000"});
     EXPECT_EQ(run.signal, 0) << kib << " KiB: " << run.err;
     if (run.code == 0) break;
-    if (run.code == 127) continue;  // the loader ran out of memory
+    if (run.code == 127) continue;  // the dynamic loader ran out of memory
     if (run.code == 69) {
-      // Loading a plugin or reading its folder ran out of memory.
+      // The program ran out of memory when it loaded a plugin or read the folder of the plugins.
       EXPECT_TRUE(Contains(run.err, "cannot be loaded") ||
                   Contains(run.err, "plugins: Cannot allocate memory"))
           << kib << " KiB: " << run.err;
@@ -191,7 +192,7 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
   EXPECT_GT(recorded, 0);
 }
 
-// FAULTS 96: in the threads of a sweep.
+// Fault 96 of tests/faults/README.md: memory runs out in the threads of a sweep.
 TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
   int failed = 0;
@@ -203,7 +204,8 @@ TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
                                 "--set", "source.duration_s=500"});
     EXPECT_EQ(sweep.signal, 0) << kib << " KiB: " << sweep.err;
     if (sweep.code == 0) break;
-    if (sweep.code == 69 || sweep.code == 127) continue;  // not enough memory to load
+    // The memory does not suffice to load the program or a plugin.
+    if (sweep.code == 69 || sweep.code == 127) continue;
     EXPECT_TRUE(sweep.code == 1 || sweep.code == 70) << kib << " KiB: " << sweep.err;
     EXPECT_TRUE(Contains(sweep.err, "out of memory")) << kib << " KiB: " << sweep.err;
     EXPECT_EQ(Exists("out/failures.csv"), sweep.code == 1) << kib << " KiB";

@@ -25,16 +25,17 @@ struct Titled : Probe {
   explicit Titled(alidade::Params& p) : Probe(p) {
     const std::string title = p.Text("title", "what it is called", "nameless");
     const std::string needed = p.Text("needed", "what it cannot do without");
-    p.Fail("", (title + '|' + needed).c_str());  // shown to the test
+    p.Fail("", (title + '|' + needed).c_str());  // makes the parameters visible to the test
   }
 };
-/// Tries to insert a line of its own into the messages.
+/// Tries to insert a line of its own into the messages of the program.
 struct Forges : Probe {
   explicit Forges(alidade::Params& p) : Probe(p) {
     p.Fail("forged\nerror: key", "one\nerror: two \033[31m\xff \u03bb");
   }
 };
-/// Reads one parameter more than the maximum, or the same parameter as often.
+/// Reads one parameter more than the maximum number. Without `distinct` it reads the same parameter
+/// each time.
 struct AsksMuch : Probe {
   explicit AsksMuch(alidade::Params& p) : Probe(p) {
     const bool distinct = p.Flag("distinct", "");
@@ -112,8 +113,8 @@ constexpr AlidadeParam kAnyChoices = Declared(ALIDADE_PARAM_CHOICE, -1, nullptr,
 constexpr AlidadeParam kDefaultBeyond =
     Declared(ALIDADE_PARAM_CHOICE, 1, &kBeyond, ALIDADE_PARAM_HAS_DEFAULT);
 
-/// A model that reads `kParam` directly, without alidade::Params, which always passes a complete
-/// one.
+/// Entry of a model that reads `kParam` directly from the host. alidade::Params cannot be used,
+/// because it always passes a complete parameter.
 template <const AlidadeParam& kParam>
 constexpr AlidadeEntry Reading(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");

@@ -25,12 +25,12 @@ using alidade::Vec;
 
 namespace {
 
-volatile int g_calls = 0;  // for the models with hidden state
-// volatile: prevents the compiler from evaluating the faults at compile time.
+volatile int g_calls = 0;  // used by the models with hidden state
+// volatile, so that the compiler does not evaluate the faults at compile time.
 volatile double g_zero = 0.0;
 volatile int g_first = 0;
 
-/// z = (2 x, x y), defined for y > 0.
+/// The correct model: z = (2 x, x y), defined for y > 0.
 struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"y", "m"}};
   static constexpr Quantity kMeasurement{"z", "m", "", "first,second"};
@@ -49,7 +49,7 @@ struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
 };
 
-/// z = x + b if a bias b is bound, else z = x.
+/// Measures z = x + b if a bias b is bound, and z = x otherwise.
 struct MayHaveBias : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"},
                                      Quantity{"bias", "m", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -75,7 +75,7 @@ struct WrongJacobian : Right {
   }
 };
 
-/// Returns different values for double and for dual numbers.
+/// Returns other values for dual numbers than for double.
 struct TwoValues : Right {
   using Right::Right;
   template <class T>
@@ -97,14 +97,14 @@ struct NotDeterministic : Right {
   }
 };
 
-/// Mixes the previous argument into the result.
+/// Adds a part of the previous argument to the result.
 struct HiddenState : Right {
   using Right::Right;
   mutable double last = 0.0;
   template <class T>
   bool Predict(const T* x, const T* y, T* z) const {
     if (!Right::Predict(x, y, z)) return false;
-    // the value part, also of a dual number
+    // The value part of x[0], also if x[0] is a dual number.
     const double now = *reinterpret_cast<const double*>(x);
     if (now != last) {
       before = last;
@@ -208,7 +208,7 @@ struct ThrowsInCreate : Right {
   explicit ThrowsInCreate(Params&) { throw std::runtime_error("the dog ate it"); }
 };
 
-/// Does not predict; kWhat selects the misbehaviour.
+/// A sensor whose Predict misbehaves; kWhat selects how.
 template <int kWhat>
 struct Misbehaves : Right {
   using Right::Right;
@@ -258,7 +258,7 @@ struct LosesItself : Right {
 using Seen = AlidadeObservation;
 using Eval = decltype(AlidadeSensor::eval);
 
-/// The correct model with another evaluation function.
+/// Makes the correct model with another evaluation function.
 template <Eval kEval>
 void MakeRaw(Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Right>::kCalls;
@@ -283,7 +283,7 @@ std::int32_t WritesItsInput(const void*, const Seen*, const double* const* x, do
   const_cast<double*>(x[1])[0] += 1.0;
   return code;
 }
-/// Ignores the strides and writes the rows of a Jacobian one after the other.
+/// Ignores the strides: writes the rows of a Jacobian directly one after the other.
 std::int32_t IgnoresStrides(const void*, const Seen*, const double* const* x, double* z,
                             double* const* j, const std::int32_t*) {
   const std::int32_t dense[] = {1, 1};
@@ -306,7 +306,8 @@ std::int32_t NowhereDefined(const void*, const Seen*, const double* const*, doub
 
 // ---- landmarks --------------------------------------------------------------------------------
 
-/// z = bearing + rho x; z does not determine rho. kWhat selects a fault of the inverse model.
+/// Measures z = bearing + rho x, from which rho cannot be determined. kWhat selects a fault of the
+/// inverse model.
 template <int kWhat>
 struct Landmark : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"},
@@ -356,7 +357,7 @@ void MakePastTheLandmark(Params& p, AlidadeInstance* instance) {
 
 // ---- with rotations, motion --------------------------------------------------------------------
 
-/// b = R(q)' (0, 0, 1)
+/// Measures the direction b = R(q)' (0, 0, 1).
 struct Gravity : alidade::Sensor<alidade::UnitVector, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"orientation"}};
   static constexpr Quantity kMeasurement{"down"};
@@ -390,7 +391,8 @@ struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
   }
 };
 
-/// z = (x, q). From a measured -q, which is the same rotation, the inverse computes a different x.
+/// Measures z = (x, q). -q is the same rotation as q, but the inverse model computes another x from
+/// it.
 struct TwoCoversOfAPart
     : alidade::Sensor<alidade::Product<Vec<1>, UnitQuaternion>, Vec<1>, UnitQuaternion> {
   static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"orientation"}};
@@ -416,7 +418,7 @@ struct TwoCoversOfAPart
   }
 };
 
-/// A rotating body with a control input; kWhat selects a fault.
+/// A rotating body with a control input. kWhat selects a fault.
 template <int kWhat>
 struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"distance", "m"}, Quantity{"orientation"}};
@@ -436,14 +438,14 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   }
 };
 
-/// An Euler step that declares the order kOrder.
+/// Makes an Euler step but declares the order kOrder.
 template <int kOrder>
 struct Declared : Turning<2> {
   using Turning<2>::Turning;
   static constexpr int kStepOrder = kOrder;
 };
 
-/// A point with noise; kWhat selects the kind of the noise and the kind that it declares.
+/// A point with noise. kWhat selects the kind of its noise and the kind that it declares.
 enum class Noise { kHeld, kHeldUndeclared, kAddsUpUndeclared, kOfEachStep };
 template <Noise kWhat>
 struct Noisy : alidade::Motion<1, Vec<1>, Vec<1>> {

@@ -10,7 +10,7 @@
 
 namespace {
 
-/// Fails if a second instance is being created at the same time.
+/// Creation fails if another instance is being created at the same time.
 struct Alone : Probe {
   explicit Alone(alidade::Params& p) : Probe(p) {
     static std::atomic<int> inside{0};

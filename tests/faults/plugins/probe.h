@@ -3,7 +3,7 @@
 
 #include "alidade/model/model.h"
 
-/// z = PROBE_GAIN x: the base model of the deliberately faulty plugins.
+/// The sensor z = PROBE_GAIN x, from which the deliberately faulty plugins are derived.
 #ifndef PROBE_GAIN
 #define PROBE_GAIN 2.0
 #endif

@@ -32,7 +32,7 @@ struct Walk : alidade::Motion<1, alidade::Vec<1>> {
   void SqrtQ(double dt_s, alidade::MatrixRef l) const { l(0, 0) = std::sqrt(dt_s); }
 };
 
-/// The model Inverse with one faulty function.
+/// Makes the model Inverse with one faulty function, which kSpoil sets.
 template <void (*kSpoil)(AlidadeSensor&)>
 void MakeSensor(alidade::Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls = alidade::detail::SensorCalls<Inverse>::kCalls;
@@ -56,7 +56,7 @@ void ThrowInInitialise(AlidadeSensor& calls) {
                         double* const*, const std::int32_t*, double*, std::int32_t, double*,
                         std::int32_t) -> std::int32_t { Throw(); };
 }
-/// Throws at x = 0, fails at x < 0.
+/// Throws at x = 0 and returns an error for x < 0.
 void ThrowAtZero(AlidadeSensor& calls) {
   calls.eval = [](const void*, const Seen*, const double* const* x, double* z, double* const*,
                   const std::int32_t*) -> std::int32_t {
@@ -95,7 +95,7 @@ void ThrowInSqrtQ(AlidadeMotion& calls) {
                     std::int32_t) -> std::int32_t { Throw(); };
 }
 
-/// An entry whose `create` does not catch exceptions.
+/// Returns an entry whose `create` does not catch exceptions.
 template <int kWhat>
 constexpr AlidadeEntry ThrowingCreate(const char* name) {
   AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");

@@ -236,7 +236,7 @@ source:
   EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
 }
 
-// Blocks have 512 bytes. Each file except the video fits into 16 blocks. An image needs more than 2.
+// Blocks have 512 bytes. Each file but the video fits into 16 blocks. An image needs more than 2.
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});

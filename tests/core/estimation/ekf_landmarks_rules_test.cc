@@ -88,7 +88,7 @@ TEST(Landmarks, ThatHaveToWaitTakeNoMemory) {
   EXPECT_LE(p.lower().outerStride(), 2 * p.size());
 }
 
-// FAULTS 39
+// Fault 39 of tests/faults/README.md.
 TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   LandmarkOptions options;
   options.max_missed_frames = 2;
@@ -156,7 +156,7 @@ TEST(Landmarks, ThatFailTooOftenAreForgotten) {
   EXPECT_EQ(ekf.landmarks()[0].accepted, 4);
 }
 
-// FAULTS 83
+// Fault 83 of tests/faults/README.md.
 TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
   using enum LandmarkOptions::NegativeDepth;
   for (const auto policy : {kKeep, kDelete}) {

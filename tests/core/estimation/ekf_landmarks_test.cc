@@ -314,7 +314,7 @@ TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
   EXPECT_TRUE(IsPoint(landmarks[1]));
 }
 
-// FAULTS 41
+// Fault 41 of tests/faults/README.md.
 TEST(Landmarks, BehindTheCameraAreOutOfDomainAndNoDivergence) {
   Ekf ekf = EkfOf([] {
     LandmarkOptions options = WithPrior();

@@ -13,7 +13,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-// FAULTS 76
+// Fault 76 of tests/faults/README.md.
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
@@ -39,7 +39,7 @@ struct Exploding : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-// FAULTS 76
+// Fault 76 of tests/faults/README.md.
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
@@ -96,7 +96,7 @@ TEST(Ekf, AFailedStepMovesNothing) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// FAULTS 38
+// Fault 38 of tests/faults/README.md.
 TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
   EkfOptions options;
   options.max_dt_s = 1e-9;
@@ -185,7 +185,7 @@ TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-9);
 }
 
-// FAULTS 77
+// Fault 77 of tests/faults/README.md.
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
@@ -206,7 +206,7 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
 }
 
-// FAULTS 77
+// Fault 77 of tests/faults/README.md.
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   Problem problem = DepthFilter();
   problem.priors[0].mean = {3.0};

@@ -163,7 +163,7 @@ struct Unwrapped : Opposite {
   }
 };
 
-// FAULTS 84
+// Fault 84 of tests/faults/README.md.
 TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   Problem problem = Turn();
   AddSensor(problem, "unwrapped", MakeSensor(Unwrapped(), "unwrapped"), {"t.a"});

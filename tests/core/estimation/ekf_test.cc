@@ -88,7 +88,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
   }
 }
 
-// FAULTS 80
+// Fault 80 of tests/faults/README.md.
 TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
   const Problem problem = DepthFilter();
   EkfOptions options;
@@ -316,7 +316,7 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), -0.2);
 }
 
-// FAULTS 73
+// Fault 73 of tests/faults/README.md.
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   Problem problem = MovingPoint();
   AddSensor(problem, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
@@ -360,7 +360,7 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
   EXPECT_EQ(stale(1.0).size(), 1u);
 }
 
-// FAULTS 38
+// Fault 38 of tests/faults/README.md.
 TEST(Ekf, AGapIsSteppedInEqualParts) {
   EkfOptions options;
   options.max_dt_s = 0.3;

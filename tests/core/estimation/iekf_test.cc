@@ -147,7 +147,7 @@ TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 0.0, 1e-6);
 }
 
-// FAULTS 81
+// Fault 81 of tests/faults/README.md.
 TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   const Problem problem = FarArcTangent();
   IekfOptions options;

@@ -66,7 +66,8 @@ Eigen::Matrix3d InSpace(const State& state) {
 
 // In the tangent plane at the prior, h is the identity: 1/P+ = 1/P + 1/R. The update then rotates P
 // with the direction, by the smallest rotation.
-TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  // FAULTS 84
+// Fault 84 of tests/faults/README.md.
+TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {
   const Problem problem = DirectionNearTheSeam();
   SquareRootEkf filter(problem, {}, StreamsOf(problem));
   const Eigen::Vector3d before(problem.priors[0].mean.data());

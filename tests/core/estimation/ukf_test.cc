@@ -211,7 +211,7 @@ struct First : Sensor<Vec<1>, Vec<2>> {
   }
 };
 
-// FAULTS 82
+// Fault 82 of tests/faults/README.md.
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   Problem problem;
   MotionBinding binding{"p", testing::ConstantMotion(2), {}};

@@ -122,7 +122,7 @@ TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   EXPECT_EQ(run.estimators[0].counts.at("accepted:inverse_scale"), 60);
 }
 
-// FAULTS 85
+// Fault 85 of tests/faults/README.md.
 TEST(Reference, ThatFailedIsNone) {
   Experiment experiment = MakeCompared(true);
   const RunResult run = alidade::Run(experiment, {});

@@ -190,7 +190,7 @@ TEST(Product, IsItsPartsOneAfterTheOther) {
   EXPECT_EQ(off, x);
 }
 
-// FAULTS 84
+// Fault 84 of tests/faults/README.md.
 TEST(Angle, WrapsAtPlusAndMinusPi) {
   const Geometry angle = Geometry::Angle();
   const auto plus = [&](double x, double d) {

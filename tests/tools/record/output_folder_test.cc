@@ -62,7 +62,7 @@ TEST(OutputFolder, StaysPartialOnlyIfItIsToBeKept) {
   EXPECT_EQ(Read(temporary / "out.partial/ekf/a.csv"), "rows\n");
 }
 
-// FAULTS 92
+// Fault 92 of tests/faults/README.md.
 TEST(OutputFolder, LeavesAnExistingFolderAlone) {
   const TemporaryFolder temporary;
   const fs::path out = temporary / "out";
@@ -229,7 +229,7 @@ TEST(OutputFolder, NeedsAName) {
   EXPECT_EQ(internal::PartialOf("a/../b/"), "b.partial");
 }
 
-// FAULTS 93
+// Fault 93 of tests/faults/README.md.
 TEST(OutputFolder, AFolderThatCannotBeWrittenToIsRefused) {
   const TemporaryFolder temporary;
   fs::create_directories(temporary / "mine");
@@ -244,7 +244,7 @@ TEST(OutputFolder, AFolderThatCannotBeWrittenToIsRefused) {
   EXPECT_TRUE(fs::is_empty(temporary / "mine"));
 }
 
-// FAULTS 87
+// Fault 87 of tests/faults/README.md.
 TEST(OutputFile, TakesNoMoreAfterAFailure) {
   OutputFile file("/dev/full");
   file.Write("1\n");

@@ -12,7 +12,7 @@
 #include "alidade/base/error.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Helpers that call plugins and read the structs of plugin_abi.h by its rules.
+/// Helpers that call plugins and read the structs of plugin_abi.h by the rules of that file.
 namespace alidade::internal {
 
 [[noreturn]] inline void Refuse(const std::filesystem::path& plugin, const std::string& reason) {
@@ -22,28 +22,30 @@ namespace alidade::internal {
 /// Returns a text, which may be null, as a string.
 inline std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
-/// Returns the rule of texts that `text` breaks, as in `is not UTF-8`, or "".
+/// Returns the reason why `text` breaks the rules for texts, such as `is not UTF-8`; "" if it
+/// breaks none.
 std::string TextDefect(const char* text);
 
 /// Returns a text of a plugin for a message: UTF-8 of at most ALIDADE_MAX_TEXT bytes. Control
 /// characters and invalid bytes are replaced by `?`.
 std::string PrintableText(const char* text);
 
-/// Returns true for 1 to ALIDADE_MAX_NAME bytes of printable ASCII without blanks.
+/// Returns true if `name` has 1 to ALIDADE_MAX_NAME bytes of printable ASCII without blanks.
 bool IsValidName(const char* name);
 
-/// Returns true if all reserved members are zero, as required.
+/// Returns true if all reserved members are zero, as plugin_abi.h requires.
 template <class T, std::size_t N>
 bool AllZero(const T (&reserved)[N]) {
   return std::all_of(reserved, reserved + N, [](const T& member) { return member == T{}; });
 }
 
-/// Returns the bits of `flags` in ALIDADE_MUST_UNDERSTAND that are not in `known`, as in `0x20000`,
-/// or "".
+/// Returns the bits of `flags` that are in ALIDADE_MUST_UNDERSTAND but not in `known`, as a text
+/// such as `0x20000`; "" if no such bit is set.
 std::string UnknownBits(std::uint32_t flags, std::uint32_t known);
 
-/// Returns a copy of a struct of plugin_abi.h up to the size that it states, excluding an
-/// incomplete pointer. Members beyond that size are zero. `limit` bounds the stated size, in bytes.
+/// Returns a copy of a struct of plugin_abi.h, up to the size that the struct states. Omits a
+/// pointer that lies only partly within this size. Members beyond the size are zero. `limit` bounds
+/// the stated size, in bytes.
 template <class T>
 T ReadPrefix(const T* source, std::size_t limit = sizeof(T)) {
   T copy{};
@@ -66,8 +68,8 @@ bool IsValidStride(std::uint32_t stride) {
   return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
 }
 
-/// Returns a measurement for a plugin: its values z, null if only a prediction is requested, and
-/// the known numbers that come with it.
+/// Returns a measurement for a plugin: the values `z`, and the `known` numbers that accompany them.
+/// `z` is null if only a prediction is requested.
 inline AlidadeObservation MakeObservation(const double* z, const double* known) {
   AlidadeObservation observation{};
   observation.struct_size = sizeof(observation);
@@ -76,8 +78,8 @@ inline AlidadeObservation MakeObservation(const double* z, const double* known) 
   return observation;
 }
 
-/// Runs `call` and returns the text of the exception that it throws, or "". Calls of the plugin ABI
-/// must not throw, but their code may be C++.
+/// Runs `call`. Returns the text of the exception that `call` throws, or "" if it does not throw.
+/// Functions of the plugin ABI must not throw, but they may be written in C++.
 template <class Call>
 std::string CatchExceptionText(const Call& call) {
   try {

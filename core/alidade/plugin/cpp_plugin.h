@@ -11,24 +11,25 @@
 namespace alidade {
 
 /// ABI number of C++ plugins, which share classes with the library. A plugin is loaded only if its
-/// number equals that of the library. Increase it with each change of the layout or meaning of an
-/// installed class or function. The classes of a debug standard library have another layout.
+/// number equals that of the library. Increase the number with each change of the layout or meaning
+/// of an installed class or function. The classes of a debug standard library have a different
+/// layout, hence the second definition.
 #if defined(_GLIBCXX_DEBUG)
 #define ALIDADE_CPP_ABI "4 with _GLIBCXX_DEBUG"
 #else
 #define ALIDADE_CPP_ABI "4"
 #endif
 
-/// Implementation of an interface by a plugin. The loader does not know the type of the factory;
-/// the code that requests the kind casts it.
+/// Implementation of an interface by a plugin. The loader does not know the type of `factory`. The
+/// code that requests an implementation of this kind casts the pointer to the correct type.
 struct CppEntry {
-  const char* kind;  ///< name of the interface, also in messages: `source`
+  const char* kind;  ///< name of the interface, such as `source`; messages use it too
   const char* name;
   const char* doc;
   const char* citation;
-  /// Keys that are not read through Params, one for each line: `key  meaning`.
+  /// Keys that are not read through Params, one per line: `key  meaning`.
   const char* keys;
-  const void* factory;  ///< of the type that the header of the interface defines
+  const void* factory;  ///< pointer to the type that the header of the interface defines
 };
 
 /// Table that a C++ plugin exports.
@@ -44,7 +45,7 @@ template <std::size_t N>
 struct CppEntries {
   CppEntry entries[N];
 };
-/// Returns the entries of the factories, by the function EntryOf for their type.
+/// Returns the entries of the factories, which the function EntryOf of their type creates.
 template <class Factory, std::size_t N>
 constexpr CppEntries<N> EntriesOf(const Factory (&factories)[N]) {
   CppEntries<N> result{};
@@ -54,7 +55,7 @@ constexpr CppEntries<N> EntriesOf(const Factory (&factories)[N]) {
 
 }  // namespace alidade
 
-/// Exports the factories `...`, each in braces, of the type `Factory`.
+/// Exports the factories `...` of the type `Factory`. Each factory is an initialiser in braces.
 #define ALIDADE_CPP_PLUGIN(Factory, ...)                                           \
   static constexpr Factory alidade_factories[] = {__VA_ARGS__};                    \
   static constexpr auto alidade_offers = alidade::EntriesOf(alidade_factories);    \

@@ -19,8 +19,8 @@ namespace {
 using internal::ParamReader;
 using internal::ParamRecorder;
 
-/// Locks all creation. The mutex is recursive, because a source may create models. Most creations
-/// last microseconds, so that retrying is cheaper than sleeping.
+/// Locks the creation of all objects. The mutex is recursive, because a source may create models.
+/// Most creations last microseconds, so retrying is cheaper than sleeping.
 std::unique_lock<std::recursive_mutex> LockCreation() {
   static std::recursive_mutex mutex;
   constexpr int kTries = 100;
@@ -33,7 +33,8 @@ std::unique_lock<std::recursive_mutex> LockCreation() {
   return lock;
 }
 
-/// Instance that `create` fills. It is destroyed unless it is released.
+/// Instance that the plugin's `create` function fills. The destructor destroys the model unless it
+/// was released.
 class NewInstance {
  public:
   explicit NewInstance(const PluginEntry& entry) : name_(entry.name), plugin_(entry.plugin) {
@@ -53,7 +54,7 @@ class NewInstance {
     exception_text_ = internal::CatchExceptionText([&] { code = entry.create(&host, &c_); });
     return code;
   }
-  /// Returns the text of the exception of `create`, or "".
+  /// Returns the text of the exception that `create` threw, or "".
   const std::string& exception_text() const { return exception_text_; }
   std::uint32_t kind() const { return c_.kind; }
   AlidadeInstance Release() { return std::exchange(c_, AlidadeInstance{}); }
@@ -198,7 +199,8 @@ std::vector<ParamInfo> FactorySchema(const PluginEntry& entry,
     try {
       call(params);
     } catch (...) {
-      // The factory may need a file that does not exist. The parameters read before are valid.
+      // The factory may need a file that does not exist. The parameters that it read before the
+      // failure are valid.
     }
   });
   std::vector<ParamInfo> result = ListedKeys(entry.keys);

@@ -15,10 +15,10 @@ namespace alidade::internal {
 namespace {
 
 enum Register { kEax, kEbx, kEcx, kEdx };
-/// Registers that the operating system must save, as bits of XCR0.
+/// Registers that the operating system must save for an instruction set, as bits of XCR0.
 enum : std::uint32_t { kNothing = 0, kYmm = 0x6, kZmm = 0xe6 };
 
-/// Position of an instruction set in the output of cpuid: leaf and subleaf, register, bit.
+/// Instruction set, with its position in the output of cpuid: leaf, subleaf, register and bit.
 struct InstructionSet {
   std::uint32_t isa;
   const char* name;
@@ -29,7 +29,7 @@ struct InstructionSet {
 };
 
 constexpr std::uint32_t kExtended = 0x80000001u;
-/// Sorted by leaf.
+/// Known instruction sets, sorted by leaf.
 constexpr InstructionSet kKnown[] = {
     {ALIDADE_ISA_SSE3, "SSE3", 1, 0, kEcx, 0},
     {ALIDADE_ISA_SSSE3, "SSSE3", 1, 0, kEcx, 9},
@@ -72,15 +72,16 @@ std::uint32_t SavedRegisters() {
   return low;
 }
 
-/// Reads the instruction sets from the processor. It reads each leaf once, because cpuid is slow in
-/// a virtual machine.
+/// Reads the instruction sets from the processor. Reads each leaf only once, because cpuid is slow
+/// in a virtual machine.
 std::uint32_t ReadInstructionSets() {
   const std::uint32_t saved = SavedRegisters();
   std::uint32_t isa = 0, registers[4] = {};
   const InstructionSet* last = nullptr;
   for (const InstructionSet& set : kKnown) {
     if (last == nullptr || last->leaf != set.leaf || last->subleaf != set.subleaf) {
-      std::ranges::fill(registers, 0u);  // remains zero if the processor lacks the leaf
+      // The registers remain zero if the processor lacks the leaf.
+      std::ranges::fill(registers, 0u);
       __get_cpuid_count(set.leaf, set.subleaf, &registers[kEax], &registers[kEbx], &registers[kEcx],
                         &registers[kEdx]);
     }
@@ -109,8 +110,7 @@ std::string InstructionSetNames(std::uint32_t isa) {
     if ((isa & bit) == 0) continue;
     const auto* const entry = std::ranges::find(kKnown, bit, &InstructionSet::isa);
     if (!names.empty()) names += ", ";
-    names += entry != std::end(kKnown) ? entry->name
-                                       : "unknown to this version, bit " + std::to_string(bit);
+    names += entry != std::end(kKnown) ? entry->name : "an unknown set, bit " + std::to_string(bit);
   }
   return names;
 }

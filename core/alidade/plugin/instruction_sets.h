@@ -11,7 +11,7 @@ namespace alidade::internal {
 /// saves.
 std::uint32_t InstructionSetsOfProcessor();
 
-/// Returns the names of instruction sets, `AVX2, FMA`. An unknown bit is named by its number.
+/// Returns the names of instruction sets, such as `AVX2, FMA`. Names an unknown bit by its number.
 std::string InstructionSetNames(std::uint32_t isa);
 
 }  // namespace alidade::internal

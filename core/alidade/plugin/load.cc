@@ -32,7 +32,7 @@ void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& f
   }
 }
 
-/// Loads the library for the rest of the process.
+/// Loads the library. It remains loaded until the process ends.
 const boost::dll::shared_library& LoadPermanently(const std::filesystem::path& file) {
   using boost::dll::load_mode::rtld_local;
   using boost::dll::load_mode::rtld_now;
@@ -67,7 +67,8 @@ const void* FactoryOnDemand(const std::string& kind, const std::string& name,
   std::filesystem::path searched = folder;
   if (searched.empty()) {
     const std::filesystem::path library_folder = FolderOfLibrary();
-    if (!library_folder.empty()) searched = library_folder / name;  // never the working folder
+    // If the folder of the library is unknown, `name` alone would refer to the working folder.
+    if (!library_folder.empty()) searched = library_folder / name;
   }
   std::vector<std::filesystem::path> files;
   std::error_code error;

@@ -12,18 +12,19 @@ namespace alidade::internal {
 /// Plugin that stays loaded for the rest of the process.
 struct LoadedPlugin {
   std::filesystem::path file;       ///< canonical
-  const AlidadeTable* table;        ///< of a C-ABI plugin, else null
-  const CppPluginTable* cpp_table;  ///< of a C++ plugin, else null
+  const AlidadeTable* table;        ///< table of a C-ABI plugin, else null
+  const CppPluginTable* cpp_table;  ///< table of a C++ plugin, else null
 };
 
-/// Checks trust and build tag, loads the plugin and checks its table. `canonical` is `file` with
-/// its symbolic links resolved. Errors: kPlugin, kNotTrusted.
+/// Checks whether `file` is trusted and its build tag is compatible, loads the plugin and checks
+/// its table. `path without symbolic links` is `file` with its symbolic links resolved. Errors:
+/// kPlugin, kNotTrusted.
 LoadedPlugin LoadPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
 /// Loads the only plugin in `folder`, or in `lib/alidade/NAME` next to this library if `folder` is
-/// "". Returns the factory of its first entry, which is of the kind `kind`. Errors: those of
-/// LoadPlugin; kPlugin if the folder contains no plugin (`missing` with the searched folder), more
-/// than one plugin, or one of another kind.
+/// "". Returns the factory of the plugin's first entry, which must be of the kind `kind`. Errors:
+/// those of LoadPlugin; kPlugin if the folder contains more than one plugin, a plugin of another
+/// kind, or no plugin. In the last case the message consists of `missing` and the searched folder.
 const void* FactoryOnDemand(const std::string& kind, const std::string& name,
                             const std::filesystem::path& folder, const std::string& missing);
 

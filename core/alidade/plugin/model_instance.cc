@@ -39,7 +39,7 @@ Geometry GeometryOf(const AlidadeSpace& space) {
   return Geometry::Product(std::move(parts));
 }
 
-/// Returns true if geometry and sizes are known to this version.
+/// Returns true if this version knows the geometry, and the sizes fit it.
 bool IsKnownGeometry(const AlidadeSpace& space) {
   if (FindGeometry(space.geometry) == nullptr) return false;
   const Geometry geometry = GeometryOf(space);
@@ -47,10 +47,10 @@ bool IsKnownGeometry(const AlidadeSpace& space) {
          space.tangent == geometry.tangent;
 }
 
-/// Returns the rule that `space` breaks, or "".
+/// Returns the reason why `space` breaks the rules of plugin_abi.h; "" if it breaks none.
 std::string SpaceDefect(const AlidadeSpace& space);
 
-/// Returns the rule that the parts of `space` break, or "".
+/// Returns the reason why the parts of `space` break the rules; "" if they break none.
 std::string PartsDefect(const AlidadeSpace& space) {
   const bool is_product = space.geometry == ALIDADE_PRODUCT;
   if (!is_product && (space.parts != nullptr || space.part_count != 0)) {

@@ -13,15 +13,16 @@
 namespace alidade {
 
 namespace internal {
-/// Destroys the model of `instance`. An exception is logged as a warning.
+/// Destroys the model of `instance`. Logs an exception of the plugin as a warning.
 void DestroyInstance(const AlidadeInstance& instance, const std::string& name,
                      const std::string& plugin) noexcept;
 }  // namespace internal
 
-/// Owner of one instance that a plugin created. It provides the description as C++ values.
+/// Owner of one instance that a plugin created. It provides the description of the instance as C++
+/// values.
 class ModelInstance {
  public:
-  /// Takes ownership of `instance`. Messages contain the model's `name` and its file `plugin`.
+  /// Takes ownership of `instance`. Messages contain the `name` of the model and the file `plugin`.
   /// Errors: kPlugin if the description breaks the rules of plugin_abi.h.
   ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin);
   ~ModelInstance();
@@ -31,27 +32,31 @@ class ModelInstance {
   const AlidadeInstance& c() const { return instance_; }
   const std::string& name() const { return name_; }
   const std::string& plugin() const { return plugin_; }
-  const std::vector<Space>& spaces() const { return spaces_; }  ///< roles, or blocks
-  /// Returns prior and dynamics by role, for the roles whose prior the model defines.
+  /// Roles of a sensor, or blocks of a motion model.
+  const std::vector<Space>& spaces() const { return spaces_; }
+  /// Returns the prior and dynamics of each role whose prior the model defines. The key is the
+  /// index of the role.
   const std::map<std::size_t, OwnedRole>& owned() const { return owned_; }
-  /// Returns the measurement of a sensor, or the control input of a motion model. The name is empty
-  /// for a motion model without control input.
+  /// Returns the space of a sensor's measurement, or of a motion model's control input. The name of
+  /// the space is empty if the motion model has no control input.
   const Space& space() const { return space_; }
-  /// Returns the known numbers that come with each measurement. The name is empty without them.
+  /// Returns the space of the known numbers that accompany each measurement. The name of the space
+  /// is empty if a measurement has no known numbers.
   const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
-  /// Returns the order in dt of the error with which the step of a motion model is additive in dt;
-  /// 0 if it is exactly additive.
+  /// Returns the order in dt of the error by which two successive steps of a motion model differ
+  /// from one step over both. Returns 0 if the step is exactly additive in dt.
   int step_order() const {
     return static_cast<int>(capabilities_ >> ALIDADE_STEP_ORDER_SHIFT & 15u);
   }
-  /// Replaces the model's noise by L, n x n row-major: R = L L' of a sensor, or Qw = L L' of a
-  /// motion model.
+  /// Replaces the model's noise by the covariance L L', which is R of a sensor or Qw of a motion
+  /// model. `root` is L, n x n row-major.
   void SetNoise(std::vector<double> root);
-  /// Returns the L of SetNoise; empty if the model's noise applies.
+  /// Returns the matrix L of SetNoise(), or an empty vector if the model's own noise applies.
   const std::vector<double>& noise_root() const { return noise_root_; }
-  /// Returns the text of the last call in this thread that returned ALIDADE_ERROR; "" without one.
+  /// Returns the error text of the last call in this thread that returned ALIDADE_ERROR; "" if
+  /// there was no such call.
   std::string error_text() const;
 
  private:
@@ -63,7 +68,7 @@ class ModelInstance {
   Space ReadSpace(const AlidadeSpace& space, const std::string& subject) const;
   [[noreturn]] void Refuse(const std::string& reason) const;
 
-  AlidadeInstance instance_;  ///< its pointers refer to the copies below
+  AlidadeInstance instance_;  ///< pointers of this struct refer to the copies below
   AlidadeDescription description_{};
   AlidadeSensor sensor_{};
   AlidadeMotion motion_{};

@@ -19,7 +19,7 @@ namespace alidade::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// A double represents all integers up to this magnitude.
+/// Largest magnitude up to which a double represents every integer.
 constexpr double kMaxExactInteger = 9007199254740992.0;
 
 std::string RangeText(const AlidadeParam& param) {
@@ -59,14 +59,14 @@ bool HasFallback(const AlidadeParam& param) {
   return (param.flags & ALIDADE_PARAM_HAS_DEFAULT) != 0;
 }
 
-/// Returns true if the name is that of a standard deviation of the noise.
+/// Returns true if the key of the parameter names a standard deviation of the model's noise.
 bool IsNoise(const AlidadeParam& param) {
   const std::string_view key = param.key;
   return param.kind == ALIDADE_PARAM_NUMBER &&
          (key.starts_with("sigma_") || key.starts_with("noise."));
 }
 
-/// Returns the default of the parameter, or else values within its range.
+/// Returns the default of the parameter. If it has no default, returns values within its range.
 std::vector<double> StandIn(const AlidadeParam& param) {
   if (HasFallback(param) && param.count > 0) return Fallback(param);
   const bool has_lower_bound = param.low > -kInfinity, has_upper_bound = param.high < kInfinity;
@@ -110,8 +110,8 @@ ParamInfo Describe(const AlidadeParam& param) {
   return info;
 }
 
-/// Returns true if the default exists as declared and is valid: one of the names of a choice, or a
-/// number within the range.
+/// Returns true if the parameter has no default or a valid one: one of the names of a choice, or
+/// numbers within the range.
 bool IsValidFallback(const AlidadeParam& param) {
   if (!HasFallback(param) || param.count < 0) return true;
   if (IsText(param)) return TextDefect(param.fallback_text).empty();
@@ -125,14 +125,14 @@ bool IsValidFallback(const AlidadeParam& param) {
   });
 }
 
-/// Returns true for a name, or several names separated by dots.
+/// Returns true if `key` is a name, or several names separated by dots.
 bool IsValidKey(const char* key) {
   if (!IsValidName(key)) return false;
   const std::string_view text = key;
   return text.front() != '.' && text.back() != '.' && text.find("..") == text.npos;
 }
 
-/// Returns the rule of plugin_abi.h that a parameter breaks, or "".
+/// Returns the reason why a parameter breaks the rules of plugin_abi.h; "" if it breaks none.
 std::string ParamDefect(const AlidadeParam& param) {
   constexpr std::uint32_t kFlags = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
                                    ALIDADE_PARAM_HIGH_OPEN | ALIDADE_PARAM_OR_NONE;
@@ -165,14 +165,14 @@ std::string ParamDefect(const AlidadeParam& param) {
   return IsValidFallback(param) ? "" : "its default is invalid";
 }
 
-/// Returns a copy of a requested parameter. Throws if it breaks the rules of plugin_abi.h, or does
-/// not fit the function or the capacity of the request.
+/// Returns a copy of a requested parameter. Throws if the parameter breaks the rules of
+/// plugin_abi.h, or does not fit the requested function or its capacity.
 AlidadeParam CheckParam(const AlidadeParam* source, bool reads_text, bool has_capacity) {
   if (source == nullptr) throw Error(ExitCode::kPlugin, "requests a null parameter");
   const AlidadeParam param = ReadPrefix(source);
   std::string defect = ParamDefect(param);
   if (defect.empty() && (reads_text != IsText(param) || !has_capacity))
-    defect = "it is requested as another kind";
+    defect = "the function of the request or its capacity is wrong";
   if (!defect.empty()) {
     throw Error(ExitCode::kPlugin, "requests parameter '" +
                                        (IsValidName(param.key) ? std::string(param.key) : "") +
@@ -192,13 +192,13 @@ AlidadeParam CheckParam(const AlidadeParam* source, const char* text, std::int32
   return CheckParam(source, true, text != nullptr && capacity > ALIDADE_MAX_TEXT);
 }
 
-/// Copies `source`, of at most ALIDADE_MAX_TEXT bytes, and returns its length.
+/// Copies `source`, which has at most ALIDADE_MAX_TEXT bytes. Returns its length.
 std::int32_t CopyText(const std::string& source, char* destination) {
   std::memcpy(destination, source.c_str(), source.size() + 1);
   return static_cast<std::int32_t>(source.size());
 }
 
-/// Returns the meaning of a parameter, as in `(px, > 0: rectified focal length)`.
+/// Returns the meaning of a parameter, such as `(px, > 0: rectified focal length)`.
 std::string Meaning(const AlidadeParam& param) {
   const ParamInfo info = Describe(param);
   std::vector<std::string> parts;
@@ -252,8 +252,8 @@ std::vector<double> ReadValues(const AlidadeParam& param, const Node& node) {
   return values;
 }
 
-/// Finds the node of a dotted key below `map`. If it does not exist, `map` becomes the last map on
-/// the way, and `key` the missing part of the key.
+/// Finds the node of a dotted key below `map`. If the node does not exist, sets `map` to the last
+/// map on its path that exists, and `key` to the missing part.
 std::optional<Node> FindBelow(Node& map, std::string& key) {
   for (std::size_t dot; (dot = key.find('.')) != std::string::npos; key.erase(0, dot + 1)) {
     const std::optional<Node> child = map.Find(key.substr(0, dot));
@@ -332,7 +332,8 @@ std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, cha
 
 void ParamReader::Fail(void* context, const char* key, const char* text) noexcept try {
   auto* reader = static_cast<ParamReader*>(context);
-  if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // the plugin caught it
+  // The plugin caught a bad_alloc and reported its text.
+  if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();
   if (Text(key).empty()) {
     reader->failure_ = Text(text).empty() ? "it did not report a reason" : PrintableText(text);
     return;
@@ -353,7 +354,8 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
   static_cast<ParamReader*>(context)->exception_ = std::current_exception();
 }
 
-/// Returns the parameter of `check`. Reports a broken rule as an error of the plugin, at the entry.
+/// Returns the parameter that `check` returns. Reports a broken rule as an error of the plugin, at
+/// the place of the config entry.
 AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& check) {
   try {
     const AlidadeParam param = check();
@@ -369,7 +371,7 @@ AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& check) {
   }
 }
 
-/// Returns the map that contains `key`: the entry or the root.
+/// Returns the map in which `key` belongs: the entry or the root.
 Node ParamReader::BaseOf(const std::string& key) const {
   const std::string first = key.substr(0, key.find('.'));
   if (first == key || (first != "camera" && first != "landmarks")) return entry_;
@@ -426,13 +428,13 @@ std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
   return node;
 }
 
-/// Refuses `values` of the config at `node` that differ from the calibration of the data.
+/// Fails if `values`, read from the config at `node`, differ from the calibration of the data.
 void ParamReader::ExpectCalibrated(const AlidadeParam& param, const Node& node,
                                    const std::vector<double>& values) const {
   const std::optional<Node> data = InCalibration(param.key);
   if (!data) return;
   const auto is_same = [](double a, double b) {
-    constexpr double kTolerance = 1e-6;  // relative: one of the two texts may have fewer digits
+    constexpr double kTolerance = 1e-6;  // relative; one of the two texts may have fewer digits
     return std::abs(a - b) <= kTolerance * std::max(std::abs(a), std::abs(b));
   };
   const std::vector<double> calibrated = ReadValues(param, *data);
@@ -457,7 +459,8 @@ void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
   try {
     static_cast<void>(map.At(first));
   } catch (const Error& e) {
-    // The error of the config also suggests a similar key, or one with another unit.
+    // The message of the config also suggests a similar key, or a key with another unit. Retain
+    // this suggestion.
     constexpr std::string_view kPhrase = ": missing key";
     std::string text = e.what();
     const std::size_t position = text.find(kPhrase);
@@ -506,7 +509,7 @@ std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* source, 
   } catch (const std::bad_alloc&) {
     recorder->out_of_memory_ = true;
   } catch (const std::exception&) {
-    // See Read.
+    // As in Read(), an invalid request is reported when the model is created.
   }
   return -1;
 }

@@ -14,38 +14,39 @@
 
 namespace alidade::internal {
 
-/// Returns a host for one creation. The caller sets its functions, which receive `context`.
+/// Returns the host of one creation of a model. The caller sets the host's functions, which receive
+/// `context`.
 AlidadeHost MakeHost(void* context);
 
-/// Reader of a model's parameters. It looks for a parameter in these maps, in this order:
+/// Reader of a model's parameters. It searches these maps for a parameter, in this order:
 ///
 ///   1. the config entry of the model; a dotted key addresses nested maps
-///   2. the root of the config, for keys that begin with `camera.` or `landmarks.`, which sensors
-///      and source share
+///   2. the root of the config, for keys that begin with `camera.` or `landmarks.`, which
+///      the sensors and the source share
 ///   3. the calibration of the data, `calibration` at the root (WithCalibration); a key without a
 ///      dot is read there only if the parameter has no default
 ///
-/// A value in both the config and the calibration must agree to 1e-6 of its value. All errors are
-/// collected, so that one run reports all of them. A request that breaks the rules of plugin_abi.h
-/// is an error kPlugin.
+/// If both the config and the calibration contain a value, the two must agree to a relative 1e-6.
+/// The reader collects all errors, so one run reports all of them. A request that breaks the rules
+/// of plugin_abi.h is an error kPlugin.
 class ParamReader {
  public:
-  /// `owner` names the model in messages, as in `model 'scale_2d'`. `representation` replaces the
-  /// value of `landmarks.representation`, if it is one of the choices. `has_covariance`: the entry
-  /// has a covariance instead of the model's noise. The parameters `sigma_*` and `noise.*` are then
-  /// stand-ins, and refused in the entry.
+  /// `owner` names the model in messages, such as `model 'scale_2d'`. `representation` replaces the
+  /// value of `landmarks.representation`, if it is one of the choices. `has_covariance` is true if
+  /// the entry contains a covariance instead of the model's noise. The model's parameters `sigma_*`
+  /// and `noise.*` then have stand-in values, and the entry must not contain them.
   ParamReader(const Node& entry, std::string owner, std::string representation = {},
               bool has_covariance = false);
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Returns the reason for which the model cannot be created, if it does not belong to a key; else
-  /// "".
+  /// Returns the reason why the model cannot be created, if the reason does not concern a single
+  /// key; otherwise "".
   const std::string& failure() const { return failure_; }
-  /// Throws all errors as one, kBadConfig, in the order of their positions (the order of the reads
-  /// depends on the compiler). If a call failed otherwise, as when memory runs out, throws that
-  /// exception. Returns if there was no error.
+  /// Throws one Error kBadConfig that contains all errors, sorted by position (the order of the
+  /// reads depends on the compiler). If a call failed for another reason, such as a lack of memory,
+  /// throws that exception instead. Returns if there was no error.
   void Check() const;
 
  private:
@@ -69,12 +70,13 @@ class ParamReader {
   Node entry_;
   std::string owner_, representation_;
   bool has_covariance_;
-  ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
+  ExitCode code_ = ExitCode::kBadConfig;  ///< exit code of `errors_`
   AlidadeHost host_{};
   std::unordered_set<std::string> keys_;  ///< all requested keys
   std::vector<std::string> errors_;
   std::string failure_;
-  std::exception_ptr exception_;  ///< of a call, stored because it must not reach the plugin
+  /// Exception of a call, stored because it must not reach the plugin.
+  std::exception_ptr exception_;
 };
 
 /// Recorder of the parameters that a model requests while it is created with stand-in values.
@@ -85,7 +87,8 @@ class ParamRecorder {
   ParamRecorder& operator=(const ParamRecorder&) = delete;
 
   const AlidadeHost& host() const { return host_; }
-  /// Runs `create` once, and again for each other value of each choice.
+  /// Runs `create` once with the default, else the first value, of every choice. Then runs it once
+  /// for each other value of each choice.
   template <class Create>
   void Run(const Create& create) {
     trials_.assign(1, Trial{});
@@ -106,10 +109,11 @@ class ParamRecorder {
  private:
   struct Request {
     ParamInfo info;
-    int value = 0;  ///< of a choice: the index that was returned
+    int value = 0;  ///< index that was returned, if the parameter is a choice
   };
   struct Trial {
-    std::string choice;  ///< key of the choice that differs; "" in the first trial
+    /// Key of the choice that differs from the first trial; "" in the first trial.
+    std::string choice;
     int value = 0;
     std::vector<Request> requests;
   };

@@ -8,14 +8,14 @@
 /// Folders of plugins.
 namespace alidade::internal {
 
-/// Returns the folders of ALIDADE_PLUGIN_PATH, in its order.
+/// Returns the folders that the environment variable ALIDADE_PLUGIN_PATH lists, in the same order.
 std::vector<std::filesystem::path> PluginFoldersOfEnvironment();
 
 /// Returns the plugin folder of the user; nullopt if the user has no home folder.
 std::optional<std::filesystem::path> PluginFolderOfUser();
 
 /// Returns the folder of the plugins of this build: `lib/alidade` next to this library, in the
-/// build tree or the installation; "" if it cannot be determined.
+/// build tree or the installation. Returns "" if the folder cannot be determined.
 std::filesystem::path FolderOfLibrary();
 
 }  // namespace alidade::internal

@@ -25,14 +25,14 @@ using internal::Refuse;
 using internal::Text;
 using internal::WithArticle;
 
-/// Origin of places in the config or on the command line.
+/// Origin of places that the config or the command line names.
 constexpr const char* kGiven = "given";
 
 const char* ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? kSensorKind : kMotionKind;
 }
 
-/// Appends the entries of the plugin. Appends entries of unknown kind to the refusals.
+/// Appends the entries of the plugin to `entries`, and those of an unknown kind to `refusals`.
 void AddEntries(const internal::LoadedPlugin& plugin, std::vector<PluginEntry>& entries,
                 std::vector<Refusal>& refusals) {
   if (plugin.cpp_table != nullptr) {
@@ -102,7 +102,7 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   searched_.push_back(place.string() + " (" + origin + "): " + result);
 }
 
-/// `loads_all`: also loads plugins that offer none of the requested names.
+/// If `loads_all` is true, also loads plugins that offer none of the requested names.
 void PluginHost::LoadFolder(const fs::path& folder, bool is_required, bool loads_all) {
   std::set<fs::path> files;
   std::error_code error;
@@ -183,8 +183,8 @@ void PluginHost::FailMissing(const std::string& kind, const std::string& name,
       throw Error(ExitCode::kPlugin,
                   ErrorLine(location.place(), location.path(),
                             "the " + kind + " '" + name + "' of " + entry.plugin.string() +
-                                " was requested, but the config does not contain its name, so "
-                                "that the plugin was not loaded",
+                                " was requested, but the config does not contain its name, so the "
+                                "plugin was not loaded",
                             "its name in the config, or the plugin in `plugins:`"));
     }
     if (entry.kind == kind) names.push_back(entry.name);

@@ -13,14 +13,15 @@
 
 namespace alidade {
 
-/// Parameter of a model, which the model declares when it reads it.
+/// Parameter of a model. The model declares the parameter by reading it.
 struct ParamInfo {
   std::string key, unit, doc;
   std::string type;                  ///< number, integer, flag, choice, or `number[3]`
-  std::string range;                 ///< `> 0`, `[1, 3]`, or "" if everything is allowed
+  std::string range;                 ///< `> 0`, `[1, 3]`, or "" if every value is allowed
   std::string fallback;              ///< the default as text, "" if the key is required
-  std::vector<std::string> choices;  ///< of a choice
-  std::string condition;  ///< `noise_model = constant` if only that choice reads it, else ""
+  std::vector<std::string> choices;  ///< names of the values, if the type is `choice`
+  /// `noise_model = constant` if the model reads the parameter only with that choice; else "".
+  std::string condition;
 };
 
 /// Kinds of models. The headers of the interfaces define the kinds of C++ plugins.
@@ -29,18 +30,18 @@ inline constexpr const char* kMotionKind = "motion model";
 
 /// Entry of a loaded plugin: a model, or a factory of a C++ plugin.
 struct PluginEntry {
-  std::string kind;  ///< kSensorKind, kMotionKind, or that of the factory
+  std::string kind;  ///< kSensorKind, kMotionKind, or the kind of the factory
   std::string name, doc, citation, family;
   std::filesystem::path plugin;   ///< file of the plugin
   unsigned thread_flags = 0;      ///< ALIDADE_THREAD_*; 0 for a factory
-  std::string keys = {};          ///< of a factory: CppEntry::keys
+  std::string keys = {};          ///< CppEntry::keys; empty for a model
   const void* factory = nullptr;  ///< CppEntry::factory; null for a model
-  AlidadeEntry model = {};        ///< of a model: the entry of its table
+  AlidadeEntry model = {};        ///< entry in the plugin's table; empty for a factory
 
   bool is_model() const { return factory == nullptr; }
 };
 
-/// Refused file of a searched folder, with the reason.
+/// Refused file of a searched folder, with the reason for the refusal.
 struct Refusal {
   std::filesystem::path file;
   std::string reason;
@@ -51,9 +52,9 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Host of plugins: finds and loads them. It loads a file only if CheckTrusted accepts the file and
-/// its build tag is compatible with this program. The build tag is read without loading the file.
-/// Plugins are never unloaded. Const members are thread-safe.
+/// Host of plugins: finds plugins and loads them. It loads a file only if CheckTrusted accepts the
+/// file and the build tag of the file is compatible with this program. The host reads the build tag
+/// without loading the file. Plugins are never unloaded. Const members are thread-safe.
 class PluginHost {
  public:
   /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
@@ -61,28 +62,32 @@ class PluginHost {
   /// applies to `files_and_folders`; refusals in other places are always listed. Errors: kPlugin,
   /// kNotTrusted.
   ///
-  /// `requested_names`, if set, contains every name that will be requested. To save time, plugins
-  /// outside `files_and_folders` are then not loaded if they list none of these names. Reporting a
-  /// name that is not found then loads all plugins, which is not thread-safe.
+  /// If `requested_names` is set, it must contain every name that will be requested. To save time,
+  /// the host then does not load plugins outside `files_and_folders` that list none of these names.
+  /// If Find does not find a name, its error message requires all plugins: loading them is not
+  /// thread-safe.
   explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
                       OnRefusal on_refusal = OnRefusal::kThrow,
                       const std::optional<std::set<std::string>>& requested_names = {});
 
-  /// Creates the model of that name by CreateModel. Errors: those of Find and of CreateModel.
+  /// Creates the model with that name by CreateModel. Errors: those of Find and of CreateModel.
   SharedSensor CreateSensor(const std::string& name, const Node& entry,
                             const std::string& representation = {}) const;
   SharedMotion CreateMotion(const std::string& name, const Node& entry) const;
-  /// Returns the only entry of that kind and name, which `node` requests. Errors: kPlugin, with the
-  /// searched places, if no plugin or more than one plugin offers it.
+  /// Returns the only entry with that kind and name. `node` is the node of the config that requests
+  /// the entry. Errors: kPlugin, with the searched places, if no plugin or more than one plugin
+  /// offers such an entry.
   const PluginEntry& Find(const std::string& kind, const std::string& name, const Node& node) const;
 
   /// Returns false if plugins may have been skipped because of `requested_names`.
   bool has_all_plugins() const { return !requested_names_; }
-  /// Returns a host that has loaded all plugins. Errors use it to list the available entries.
+  /// Returns a host that has loaded all plugins. Error messages list the available entries of this
+  /// host.
   PluginHost WithAllPlugins() const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
-  /// Returns every searched place, in order, with the number of entries found in loaded plugins.
+  /// Returns every searched place, in the order of the search. Each text includes the number of
+  /// entries that were found there.
   const std::vector<std::string>& searched() const { return searched_; }
   const std::vector<Refusal>& refusals() const { return refusals_; }
 
@@ -96,7 +101,7 @@ class PluginHost {
 
   std::vector<std::filesystem::path> configured_places_;
   std::optional<std::set<std::string>> requested_names_;
-  std::vector<std::filesystem::path> loaded_;  ///< canonical
+  std::vector<std::filesystem::path> loaded_;  ///< paths of loaded plugins, without symbolic links
   std::vector<PluginEntry> entries_;
   std::vector<std::string> searched_;
   std::vector<Refusal> refusals_;

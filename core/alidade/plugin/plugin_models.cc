@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-/// Returns the status of `call`, which calls the function `name` of the instance. A code that the
-/// ABI does not define is an error of `model`.
+/// Returns the status of `call`, which calls the function `name` of the instance. A result code
+/// that the ABI does not define counts as an error of `model`.
 template <class Call>
 Status StatusOf(const void* model, const ModelInstance& instance, const char* name,
                 const Call& call) {

@@ -6,14 +6,14 @@
 #include "alidade/estimation/models.h"
 #include "alidade/plugin/model_instance.h"
 
-/// Adapters of the plugin ABI to the interfaces that estimators use for models.
+/// Adapters from the plugin ABI to the model interfaces that estimators use.
 namespace alidade {
 
-/// Sensor that calls the functions of plugin_abi.h. An exception in a call is an error of the
-/// model.
+/// Sensor model that calls the functions of a plugin (plugin_abi.h). An exception in a call counts
+/// as an error of the model.
 class PluginSensor final : public SensorModel {
  public:
-  /// ContractViolation if the instance is not a sensor.
+  /// Error: ContractViolation if the instance is not a sensor.
   explicit PluginSensor(std::shared_ptr<const ModelInstance> instance);
   const ModelInstance& instance() const { return *instance_; }
 
@@ -28,14 +28,15 @@ class PluginSensor final : public SensorModel {
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* calls_;
   const void* self_;
-  AlidadeObservation empty_observation_;  ///< copying it is faster than zeroing a new one
+  /// Copied for each call, which is faster than zeroing a new one.
+  AlidadeObservation empty_observation_;
 };
 
-/// Motion model that calls the functions of plugin_abi.h. An exception in a call is an error of the
-/// model.
+/// Motion model that calls the functions of a plugin (plugin_abi.h). An exception in a call counts
+/// as an error of the model.
 class PluginMotion final : public MotionModel {
  public:
-  /// ContractViolation if the instance is not a motion model.
+  /// Error: ContractViolation if the instance is not a motion model.
   explicit PluginMotion(std::shared_ptr<const ModelInstance> instance);
   const ModelInstance& instance() const { return *instance_; }
 

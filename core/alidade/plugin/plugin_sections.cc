@@ -22,7 +22,7 @@ constexpr Elf64_Half kMachine = EM_AARCH64;
 #else
 constexpr Elf64_Half kMachine = EM_X86_64;
 #endif
-constexpr std::uint64_t kMaxBytes = 1 << 20;  // of one read
+constexpr std::uint64_t kMaxBytes = 1 << 20;  // limit of one read
 
 /// Reads `count` values of T at `offset`. Returns an empty vector if the file is shorter.
 template <class T>
@@ -38,7 +38,7 @@ std::vector<T> ReadAt(std::istream& file, std::uint64_t offset, std::uint64_t co
 /// Returns an empty vector if the file or section does not exist.
 std::vector<char> ReadSection(const fs::path& path, const std::string& name) {
   std::error_code error;
-  if (!fs::is_regular_file(path, error)) return {};  // a pipe would block
+  if (!fs::is_regular_file(path, error)) return {};  // reading a pipe would block
   std::ifstream file(path, std::ios::binary);
   const auto header = ReadAt<Elf64_Ehdr>(file, 0, 1);
   if (header.empty() || std::memcmp(header[0].e_ident, ELFMAG, SELFMAG) != 0 ||

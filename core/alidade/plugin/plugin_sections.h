@@ -7,11 +7,11 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// Sections of a plugin's file that describe it. They are read before the plugin is loaded.
+/// Sections of a plugin's file that describe the plugin. They are read before the plugin is loaded.
 namespace alidade {
 
-/// Reads the build tag from the `.alidade` section of a plugin's file. Errors: kPlugin (no build
-/// tag, a malformed one, another plugin ABI).
+/// Reads the build tag from the `.alidade` section of a plugin's file. Errors: kPlugin if the build
+/// tag is missing or malformed, or is for another plugin ABI.
 AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 namespace internal {

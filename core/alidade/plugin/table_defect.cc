@@ -31,14 +31,14 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   const std::string unknown = UnknownBits(entry.flags | entry.thread_flags, 0);
   if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
   if (!AllZero(entry.reserved)) return "uses reserved members";
-  if (entry.create == nullptr) return "cannot be created";
+  if (entry.create == nullptr) return "has no create function";
   return {};
 }
 
 std::string EntryDefect(const CppEntry& entry) {
   if (Text(entry.kind).empty()) return "an entry of its table has no kind";
   if (!IsValidName(entry.name)) return WithArticle(entry.kind) + " has no name";
-  if (entry.factory == nullptr) return std::string(entry.name) + " cannot be created";
+  if (entry.factory == nullptr) return std::string(entry.name) + " has no factory";
   return {};
 }
 

@@ -8,10 +8,12 @@
 
 namespace alidade::internal {
 
-/// Returns true if this version knows the kind of the entry. Other entries are ignored.
+/// Returns true if this version knows the kind of the entry. An entry of an unknown kind is
+/// ignored.
 bool IsKnown(const AlidadeEntry& entry);
 
-/// Returns the rule of plugin_abi.h or cpp_plugin.h that a table breaks, or "".
+/// Returns the reason why a table breaks the rules of plugin_abi.h or cpp_plugin.h; "" if it breaks
+/// none.
 std::string TableDefect(const AlidadeTable* table);
 std::string TableDefect(const CppPluginTable* table);
 

@@ -25,7 +25,8 @@ class TrustCheck {
     if (stat("/proc/self/exe", &program) == 0) owners_.push_back(program.st_uid);
   }
 
-  /// Follows the path from / and checks each folder and link, and finally the file itself.
+  /// Follows the path from the root folder. Checks each folder and link, and finally the file
+  /// itself.
   void Run() {
     const auto visit = [&](const fs::path& folder, const fs::path& entry, bool is_last) {
       const struct stat status = Status(folder);
@@ -63,8 +64,8 @@ class TrustCheck {
                    ", not by root, you or the owner of this program");
   }
   /// Returns true for the private group of the user: a primary group with the user's name and
-  /// without other members. The group of root is not private, because any user may have it in a
-  /// container.
+  /// without other members. The group of root is not private, because in a container any user may
+  /// belong to it.
   static bool IsPrivateGroup(gid_t id) {
     const uid_t user_id = geteuid();
     const passwd* const user = getpwuid(user_id);
@@ -75,7 +76,7 @@ class TrustCheck {
     for (char** member = entry->gr_mem; *member != nullptr; ++member) {
       if (name != *member) return false;
     }
-    bool is_shared = false;  // the primary group of another user
+    bool is_shared = false;  // whether the group is also the primary group of another user
     setpwent();
     while (const passwd* const other = getpwent()) {
       is_shared = is_shared || (other->pw_gid == id && other->pw_uid != user_id);

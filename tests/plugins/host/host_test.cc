@@ -227,7 +227,7 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"STRIDE", "entry stride of 3 bytes"},
       {"NULL_NAME", "entry 1 of its table has no name"},
       {"NULL_TABLE", "its table is null"},
-      {"NO_CREATE", "entry 1 of its table cannot be created"},
+      {"NO_CREATE", "entry 1 of its table has no create function"},
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "undefined symbol: alidade_plugin"},
       {"UNKNOWN_FLAGS", "entry 1 of its table has flags that this version does not know: 0x100000"},

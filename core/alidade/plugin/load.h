@@ -11,13 +11,13 @@ namespace alidade::internal {
 
 /// Plugin that stays loaded for the rest of the process.
 struct LoadedPlugin {
-  std::filesystem::path file;       ///< canonical
+  std::filesystem::path file;       ///< path without symbolic links
   const AlidadeTable* table;        ///< table of a C-ABI plugin, else null
   const CppPluginTable* cpp_table;  ///< table of a C++ plugin, else null
 };
 
 /// Checks whether `file` is trusted and its build tag is compatible, loads the plugin and checks
-/// its table. `path without symbolic links` is `file` with its symbolic links resolved. Errors:
+/// its table. `canonical` is `file` with its symbolic links resolved. Errors:
 /// kPlugin, kNotTrusted.
 LoadedPlugin LoadPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 

@@ -19,7 +19,8 @@ int Covariance::Add(int rows) {
 void Covariance::Reserve(int rows) {
   const int needed = size_ + rows;
   if (needed <= capacity_) return;
-  // An eighth more than requested: a landmark has two representations while it is converted.
+  // Reserves an eighth more than requested, because a landmark has two representations while it is
+  // converted.
   const int capacity = internal::PaddedSize(std::max(2 * capacity_, needed + needed / 8));
   const auto side = static_cast<std::size_t>(capacity);
   AlignedNumbers larger(side * side, 0.0);
@@ -29,8 +30,8 @@ void Covariance::Reserve(int rows) {
   capacity_ = capacity;
 }
 
-/// Removes `rows` rows from the smallest gap that is large enough, and returns their offset.
-/// Returns -1 if no gap is large enough.
+/// Removes `rows` rows from the smallest gap that is large enough. Returns their offset. Returns -1
+/// if no gap is large enough.
 int Covariance::UseGap(int rows) {
   auto smallest_gap = gaps_.end();
   for (auto gap = gaps_.begin(); gap != gaps_.end(); ++gap) {
@@ -51,7 +52,7 @@ void Covariance::Clear(int offset, int rows) {
 
 void Covariance::Release(int offset, int rows) {
   Clear(offset, rows);
-  // Adjacent gaps are merged. A gap at the end is removed.
+  // Merges the new gap with adjacent gaps. Removes a gap at the end.
   for (auto gap = gaps_.begin(); gap != gaps_.end();) {
     const bool is_before = gap->first + gap->second == offset;
     const bool is_after = offset + rows == gap->first;
@@ -114,7 +115,8 @@ void Covariance::SetRows(std::span<const int> rows, const ConstMatrix& diagonal_
     p.row(row).head(row) = column.head(row).transpose();
     p.col(row).segment(row, height) = column.tail(height);
   }
-  for (std::size_t i = 0; i < rows.size(); ++i) {  // replaces elements of `cross` among the rows
+  // Replaces the elements of `cross` that lie in these rows.
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       p(std::max(rows[i], rows[j]), std::min(rows[i], rows[j])) =
           diagonal_block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));

@@ -16,43 +16,45 @@ namespace internal {
 struct SymmetricView;
 }
 
-/// View of a symmetric matrix in its memory. Only the lower triangle is used.
+/// View of a symmetric matrix that another object stores. Only the lower triangle is used.
 using LowerTriangle = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using ConstLowerTriangle = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
-/// Covariance P of a state in its tangent. Blocks of rows are addressed by (offset, size). P is one
-/// dense symmetric matrix whose lower triangle is valid, with spare capacity in whole cache lines.
-/// lower() and view() provide P in its memory. Offsets and sizes come from Add, lie in [0, size()]
-/// and are not checked. In the steady state only functions that return a matrix allocate memory.
-/// projection.h computes P H' and H P H'.
+/// Covariance P of a state in its tangent space. A block of rows is addressed by its offset and
+/// size. P is one dense symmetric matrix, of which only the lower triangle is valid. Its memory has
+/// spare capacity and consists of whole cache lines. lower() and view() return P without a copy.
+/// Offsets and sizes must come from Add; they are not checked. Once the capacity suffices, only
+/// functions that return a matrix allocate memory. projection.h computes P H' and H P H'.
 class Covariance {
  public:
   /// Returns the number of rows in use, including gaps. A gap has zero rows and columns.
   int size() const { return size_; }
 
-  /// Adds `rows` > 0 rows, uncorrelated and zero, and returns their offset. Uses the smallest gap
-  /// that is large enough, or else the end. Amortised O(n).
+  /// Adds `rows` > 0 rows and columns of zeros. Returns their offset. Uses the smallest gap that is
+  /// large enough, or the end if no gap is. Amortised O(n).
   int Add(int rows);
   /// Allocates memory for `rows` further rows and an eighth more, or for twice the capacity if that
   /// is larger. Add calls it.
   void Reserve(int rows);
   /// Releases the rows [offset, offset + rows). O(n).
   void Release(int offset, int rows);
-  /// Moves rows into the smallest gap that is large enough, releases their former place and returns
-  /// their new offset. Returns -1 and changes nothing if no gap is large enough. O(n).
+  /// Moves rows into the smallest gap that is large enough, and releases their former place.
+  /// Returns their new offset. Returns -1 and changes nothing if no gap is large enough. O(n).
   int MoveToGap(int offset, int rows);
 
   /// Returns a copy of P(a, b), rows x columns. [a, a + rows) and [b, b + columns) are either the
   /// same rows or disjoint.
   Eigen::MatrixXd Block(int a, int rows, int b, int columns) const;
-  /// Sets P(a, b) and P(b, a) = P(a, b)', with rows as in Block. Of a diagonal block only the lower
-  /// triangle is used.
+  /// Sets P(a, b) = `value` and P(b, a) = `value`', with the same condition on the rows as Block().
+  /// Uses only the lower triangle of a diagonal block.
   void SetBlock(int a, int b, const ConstMatrix& value);
   /// Returns P(i, i), 0 <= i < size().
   double Variance(int i) const { return p()(i, i); }
-  /// Sets rows [offset, offset + k): `diagonal_block` (k x k), and zero elsewhere.
+  /// Sets rows and columns [offset, offset + k): their diagonal block to `diagonal_block` (k x k),
+  /// all other elements to zero.
   void SetRows(int offset, const ConstMatrix& diagonal_block);
-  /// Sets k rows: `diagonal_block` (k x k) among them, `cross` (n x k, n = size()) elsewhere.
+  /// Sets k rows and columns: their own block to `diagonal_block` (k x k), all other elements to
+  /// those of `cross` (n x k, n = size()).
   void SetRows(std::span<const int> rows, const ConstMatrix& diagonal_block,
                const ConstMatrix& cross);
 
@@ -62,7 +64,7 @@ class Covariance {
   bool Propagate(std::span<const int> rows, const double* f, const double* noise = nullptr,
                  int width = 0, const double* cross = nullptr);
 
-  /// Returns views of P in its memory.
+  /// Returns a view of P, without a copy.
   LowerTriangle lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(capacity_)}; }
   ConstLowerTriangle lower() const {
     return {p_.data(), size_, size_, Eigen::OuterStride<>(capacity_)};
@@ -79,7 +81,7 @@ class Covariance {
 
   AlignedNumbers p_;  ///< capacity x capacity; zero beyond size_
   int size_ = 0, capacity_ = 0;
-  std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)
+  std::vector<std::pair<int, int>> gaps_;  ///< offset and number of rows of each gap
   Scratch<Workspace> memory_;
   Scratch<AlignedNumbers> step_memory_;
   Scratch<std::vector<int>> moved_rows_;

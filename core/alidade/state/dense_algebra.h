@@ -6,8 +6,9 @@
 
 #include "alidade/state/jacobian_rows.h"
 
-/// Products and decompositions of dense matrices outside inner loops. They are compiled once,
-/// because Eigen's templates for each combination of operands dominate the time of a build.
+/// Products and decompositions of dense matrices, for code outside inner loops. They are compiled
+/// only once: Eigen's templates, compiled for each combination of operands, would dominate the
+/// build time.
 namespace alidade::internal {
 
 Eigen::MatrixXd Product(const ConstMatrix& a, const ConstMatrix& b);            ///< A B
@@ -15,35 +16,36 @@ Eigen::MatrixXd ProductTransposed(const ConstMatrix& a, const ConstMatrix& b);  
 Eigen::MatrixXd TransposedProduct(const ConstMatrix& a, const ConstMatrix& b);  ///< A' B
 Eigen::MatrixXd Congruence(const ConstMatrix& a, const ConstMatrix& p);         ///< A P A'
 
-/// Returns X with A X = B; A is square and regular.
+/// Returns X with A X = B; A is square and not singular.
 Eigen::MatrixXd SolveSquare(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 /// Returns X with A X = B; A is symmetric and positive definite.
 Eigen::MatrixXd SolvePositive(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
-/// Returns the X of least norm that minimises |A X - B|; A has any shape and rank.
+/// Returns the X of least norm that minimises |A X - B|; A may have any shape and rank.
 Eigen::MatrixXd SolveLeastNorm(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 /// Computes a square root A of a symmetric, positive semi-definite P = A A', singular or not, from
 /// the pivoted L D L' of its lower triangle. Replaces negative pivots by zero. Returns the most
-/// negative pivot divided by the largest variance, or 0 without negative pivots. `ldlt` is scratch
+/// negative pivot divided by the largest variance, or 0 if no pivot is negative. `ldlt` is scratch
 /// memory.
 double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p, Eigen::LDLT<Eigen::MatrixXd>& ldlt,
                     Eigen::MatrixXd& root);
 
-/// Returns e' P^-1 e; NaN if P is singular, indefinite or not finite. P is first scaled to unit
-/// variances, so that the test for singularity does not depend on units.
+/// Returns e' P^-1 e; NaN if P is singular, indefinite or not finite. First scales P to unit
+/// variances, so the test for singularity does not depend on units.
 double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error);
 
-/// A = V diag(l) V', the eigenvalues l in increasing order.
+/// Eigenvalues l, in increasing order, and eigenvectors V of A = V diag(l) V'.
 struct SymmetricEigen {
   Eigen::VectorXd values;
-  Eigen::MatrixXd vectors;  ///< columns
+  Eigen::MatrixXd vectors;  ///< V, one eigenvector per column
 };
 
 /// Returns the eigenvalues and eigenvectors of a symmetric matrix. Only its lower triangle is read.
 SymmetricEigen EigenOf(const Eigen::MatrixXd& symmetric);
 Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd& symmetric);
 
-/// Least-squares solution: minimises |A x - b|, with A = Q R of size m x n, m >= n, and full rank.
+/// Least-squares solution x, which minimises |A x - b|. A = Q R is m x n, m >= n, and has full
+/// rank.
 struct LeastSquares {
   Eigen::MatrixXd r;            ///< n x n, upper triangular
   Eigen::VectorXd x;            ///< n
@@ -51,12 +53,13 @@ struct LeastSquares {
 };
 LeastSquares SolveLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 
-/// Returns R of A = Q R, n x n; A is m x n, m >= n.
+/// Returns the n x n matrix R of A = Q R. A is m x n, m >= n.
 Eigen::MatrixXd UpperTriangleOf(const Eigen::MatrixXd& a);
-/// Returns orthonormal columns, m x (m - n), that are orthogonal to those of A, m x n of full rank.
+/// Returns m - n orthonormal columns that are orthogonal to the columns of A. A is m x n and has
+/// full rank.
 Eigen::MatrixXd ComplementOf(const Eigen::MatrixXd& a);
 
-/// Returns x that minimises |A x - b|, by QR with column pivoting; A has any rank.
+/// Returns x that minimises |A x - b|, by QR with column pivoting. A may have any rank.
 Eigen::VectorXd SolveByPivoting(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 /// Returns the rank of A. Pivots below `threshold` times the largest one count as zero.
 int RankOf(const Eigen::MatrixXd& a, double threshold);

@@ -7,7 +7,7 @@
 
 /// Settings of Eigen that the library and its users must share, because Eigen matrices are part of
 /// its API. The library aligns matrices to 16 bytes and allocates them by malloc. A program must do
-/// the same, whatever its compiler flags. The CMake target alidade::estimation ensures this.
+/// the same, whatever compiler flags it uses. The CMake target alidade::estimation ensures this.
 static_assert(
     EIGEN_MAX_ALIGN_BYTES == 16 && EIGEN_MAX_STATIC_ALIGN_BYTES == 16,
     "Eigen aligns matrices in another way than libalidade-estimation, because of -mavx, "

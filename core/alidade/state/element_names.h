@@ -8,15 +8,16 @@
 
 namespace alidade::internal {
 
-/// Splits "x,y,z" at its commas, without spaces; returns {""} for "".
+/// Splits a text such as "x,y,z" at its commas and removes spaces. Returns {""} for "".
 std::vector<std::string> SplitNames(const std::string& names);
-/// Returns the names of the ambient elements: `names`, split, or if that is "" the names of the
-/// geometry (w, x, y, z for a quaternion, numbers for a vector). The geometry is not a product.
+/// Returns the names of the ambient elements: the parts of `names`, or the default names of the
+/// geometry if `names` is "". The defaults are w, x, y, z for a quaternion, numbers for a vector,
+/// and "" for a scalar. The geometry must not be a product.
 std::vector<std::string> ElementsOf(const std::string& names, const Geometry& geometry);
 
 /// Returns ColumnNames(), or NumberedNames() if the space does not name its elements.
 std::vector<std::string> AmbientNames(const std::string& name, const Space& space);
-/// Returns `name` for one element, else `name.0`, `name.1` and so on.
+/// Returns `name` if `size` is 1, else `name.0`, `name.1` and so on.
 std::vector<std::string> NumberedNames(const std::string& name, std::size_t size);
 
 /// Returns a name for each tangent element: ColumnNames() for a vector, `name.rx`, `name.ry`,

@@ -13,28 +13,29 @@
 
 namespace alidade {
 
-/// Entry of the table of geometries: the properties of a geometry, and its functions on doubles. A
-/// vector and a product have no functions here, because the model determines their sizes.
+/// Entry of the table of geometries: the properties of a geometry, and its functions for doubles.
+/// The entries of a vector and a product have no functions, because the model determines the sizes.
 struct GeometryRow {
   std::uint32_t number = 0;  ///< number in the C table
   const char* name = "";
-  const char* elements = "";          ///< element names of a value, comma-separated; "": numbered
-  const char* tangent_elements = "";  ///< element names of a difference; "": as `elements`
+  const char* elements = "";          ///< comma-separated element names of a value; "": numbers
+  const char* tangent_elements = "";  ///< element names of a difference; "": same as `elements`
   std::uint32_t angular = 0;          ///< bit i: element i of a difference is an angle in rad
   bool double_cover = false;          ///< true if x and -x are the same value
-  int ambient = 0, tangent = 0;       ///< sizes of a value and of a difference; 0: from the model
+  int ambient = 0, tangent = 0;       ///< sizes of a value and a difference; 0: set by the model
   const double* identity = nullptr;
   void (*plus)(const double* x, const double* d, double* y) = nullptr;
   void (*minus)(const double* y, const double* x, double* d) = nullptr;
   void (*normalise)(double* x) = nullptr;
-  double (*distance)(const double* x) = nullptr;  ///< null: every x is a point of the manifold
+  double (*distance)(const double* x) = nullptr;  ///< null: every x lies on the manifold
   void (*transport)(const double* x, const double* y, double* j) = nullptr;  ///< null: identity
   void (*plus_jacobian)(const double* x, const double* d, double* j) = nullptr;
 };
 
 namespace detail {
 
-/// Computes j = d(x (+) (d + e))/de at e = 0, in the tangent space at x (+) d, by dual numbers.
+/// Computes j = d(x (+) (d + e))/de at e = 0 by dual numbers. The derivative lies in the tangent
+/// space at x (+) d.
 template <class G>
 void DifferentiatePlus(const double* x, const double* d, double* j) {
   using Dual = Jet<double, G::kTangent>;
@@ -49,7 +50,7 @@ void DifferentiatePlus(const double* x, const double* d, double* j) {
   }
 }
 
-/// Entry for the struct G of alidade/model/geometry.h.
+/// Entry of the table for the struct G of alidade/model/geometry.h.
 template <class G>
 struct TypedRow : GeometryRow {
   using Type = G;
@@ -60,7 +61,7 @@ struct TypedRow : GeometryRow {
     tangent = G::kTangent;
     identity = G::kIdentity.data();
     plus = [](const double* x, const double* d, double* y) {
-      double sum[G::kAmbient];  // y may be x
+      double sum[G::kAmbient];  // a separate array, because y may be the same array as x
       G::Plus(x, d, sum);
       G::Normalise(sum);
       for (int i = 0; i < G::kAmbient; ++i) y[i] = sum[i];
@@ -93,7 +94,7 @@ inline constexpr std::tuple kGeometries{
 inline constexpr GeometryRow kVectorRow{.number = ALIDADE_VECTOR, .name = "vector"};
 inline constexpr GeometryRow kProductRow{.number = ALIDADE_PRODUCT, .name = "product"};
 
-/// The entries of all geometries, including those whose size the model determines.
+/// Entries of all geometries, including those whose size the model determines.
 inline constexpr auto kGeometryRows = std::apply(
     [](const auto&... rows) {
       return std::array<const GeometryRow*, sizeof...(rows) + 2>{&kVectorRow, &rows...,
@@ -115,8 +116,8 @@ constexpr const GeometryRow* FindGeometry(std::uint32_t number) {
   return nullptr;
 }
 
-/// Calls f(G{}) with the struct G of the geometry of fixed size that has this number. For a vector
-/// and a product, returns false without a call.
+/// Calls f(G{}) with the struct G of the geometry that has this number. Returns false without a
+/// call for a vector and a product, which have no fixed size.
 template <class F>
 bool VisitGeometry(std::uint32_t number, const F& f) {
   const auto visit = [&](const auto& row) {

@@ -8,24 +8,25 @@
 
 namespace alidade {
 
-/// Matrix in the storage order of the plugin ABI.
+/// Row-major matrix, as in the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Read-only matrix, or a block of one.
+/// Read-only view of a matrix or of a block of a matrix.
 using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
 
 /// Columns of a Jacobian that belong to one block of the state.
 struct JacobianPart {
-  int offset;  ///< of the block in the covariance
+  int offset;  ///< offset of the block in the covariance
   int size;
-  int column;  ///< index of the first column
+  int column;  ///< index of the first of these columns
 };
 
-/// Non-zero columns of m rows of a Jacobian of n columns. A column that is listed twice is the sum.
+/// Non-zero columns of a Jacobian with m rows and n columns. If a column is listed twice, its value
+/// is the sum of both.
 struct JacobianRows {
   const double* data;  ///< m x width, row-major
   int rows;
-  std::span<const int> columns;  ///< rows of P, `width` of them
+  std::span<const int> columns;  ///< index in P of each column; `width` indices
 
   int width() const { return static_cast<int>(columns.size()); }
 };

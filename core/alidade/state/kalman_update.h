@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// Equations of a Kalman update of n states by m rows. Memory is reused by later updates. The steps
+/// Kalman update of n states by m rows of measurements. Later updates reuse the memory. The steps
 /// are
 ///
 ///   Begin        allocates P H'
@@ -18,13 +18,14 @@ namespace alidade::internal {
 ///                S = H P H' + R = L D L',  W = P H' L^-T,  dx = W D^-1 L^-1 r,  K = W D^-1 L^-1
 ///   Downdate     P' = P - W D^-1 W'
 ///
-/// kernels.h contains the loops, which depend on the size of P.
+/// kernels.h contains the loops, which are chosen according to the size of P.
 class KalmanUpdate {
  public:
-  /// Starts an update of P by at most `capacity` rows. P must stay in its memory.
+  /// Starts an update of P by at most `capacity` rows. The memory of P must not move until the
+  /// update ends.
   void Begin(Covariance& p, int capacity);
-  /// Computes P H' of a measurement, in its columns, and its S. Returns its NIS, or NaN if S is not
-  /// finite and positive definite.
+  /// Computes P H' of a measurement, in the measurement's columns, and its S. Returns its NIS, or
+  /// NaN if S is not finite and positive definite.
   double ComputeNis(const MeasurementRows& measurement) {
     return Kernels::For(kernels_->nis, measurement.h.rows)(update_, measurement);
   }
@@ -36,13 +37,14 @@ class KalmanUpdate {
   /// Replaces P by P - W D^-1 W'.
   void Downdate() { Kernels::For(kernels_->downdate, update_.m)(update_); }
 
-  int rows() const { return update_.m; }  ///< m of Solve
+  int rows() const { return update_.m; }  ///< number m of stacked rows in Solve()
   double* dx() { return update_.dx; }
   /// Returns L^-1 r.
   std::span<const double> y() const { return {update_.y, static_cast<std::size_t>(update_.m)}; }
   /// Returns K(i, j); requires `needs_gain` in Solve.
   double& gain(int i, int j) const { return update_.At(update_.gain, i, j); }
-  /// Copies the given rows of `count` columns of K, by columns; requires `needs_gain` in Solve.
+  /// Copies the given rows of `count` columns of K, column by column. Requires `needs_gain` in
+  /// Solve.
   void CopyGain(std::span<const int> rows, int column, int count, double* destination) const {
     if (update_.p.size > update_.panel_rows)
       return CopyGainOfPanels(rows, column, count, destination);
@@ -50,7 +52,8 @@ class KalmanUpdate {
       for (const int i : rows) *destination++ = update_.gain[j * update_.panel_rows + i];
     }
   }
-  /// Copies columns of P H' before Solve, or of W after it. `destination` has n rows.
+  /// Copies columns to `destination`, which has n rows: columns of P H' before Solve(), columns of
+  /// W after Solve().
   void CopyColumns(int column, Eigen::Ref<Eigen::MatrixXd> destination) const;
   double w(int i, int j) const { return update_.At(update_.w, i, j); }
   /// Copies L sqrt(D) to the lower triangle of an m x m matrix: S = L D L' = l l'.

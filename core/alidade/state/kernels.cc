@@ -19,14 +19,15 @@ namespace {
 
 constexpr int kSmall = 8;
 
-/// A variance that an update reduces below this fraction has lost nearly all its digits.
+/// If an update reduces a variance below this fraction of itself, the result has lost nearly all
+/// digits.
 constexpr double kCancelled = 1e-10;
 
 /// Returns true if x is positive and finite.
 inline bool IsPositive(double x) { return x > 0.0 && x < std::numeric_limits<double>::infinity(); }
 
-/// Column of all N states of a small filter, processed number by number. Reading recently written
-/// numbers as a vector would wait for the stores.
+/// Column of all N states of a small filter, processed number by number. A vector load of numbers
+/// that were just written one by one would wait for the stores.
 template <int N>
 struct Scalars {
   static constexpr int kRows = N, kStates = N;
@@ -47,7 +48,7 @@ struct Scalars {
   }
 };
 
-/// Column of N among many states, in one vector register.
+/// Column of N out of many states, in one vector register.
 template <int N>
 struct Vector {
   static constexpr int kRows = N, kStates = 0;
@@ -63,14 +64,16 @@ struct Vector {
   [[gnu::always_inline]] void AddSquares(double k, const Vector& x) { v += k * x.v * x.v; }
 };
 
-/// Kernels for panels of Column::kRows rows and updates of M rows (0: any number).
+/// Kernels for panels of Column::kRows rows and for updates of M rows. M = 0 means any number.
 template <class Column, int M>
 struct Arithmetic {
   static constexpr int kRows = Column::kRows, kStates = Column::kStates;
-  /// Height in panels of a tile of the downdate: enough sums to fill the pipelines.
+  /// Height of a tile of the downdate, in panels. It provides enough independent sums to fill the
+  /// pipelines.
   static constexpr int kTileHeight = kStates > 0 ? 1 : 2;
 
-  // Sizes of a small state or update as constants for the compiler.
+  // These functions return the size of a small state or update as a constant that the compiler
+  // knows.
   ALIDADE_KERNEL SymmetricView Sized(const SymmetricView& p) {
     return kStates > 0 ? SymmetricView{p.data, kStates, kSmall} : p;
   }
@@ -94,8 +97,8 @@ struct Arithmetic {
     }
     ALIDADE_UNROLL for (; i < n; ++i) y[i] += k * x[i];
   }
-  /// Computes S = L D L' in place, m x m by columns, from the lower triangle. Returns false unless
-  /// S is positive definite.
+  /// Factorises S = L D L' in place. S is m x m and column-major; only its lower triangle is read.
+  /// Returns false unless S is positive definite.
   ALIDADE_KERNEL bool Factorise(int m, double* s, double* inverse_d) {
     const int stride = PaddedSize(m);
     int begin = 0;
@@ -115,7 +118,7 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int c = 0; c < kRows; ++c) x[c].Store(diagonal_block + c * stride);
       if (!FactoriseBlock(kRows, diagonal_block, stride, inverse_d + begin)) return false;
     }
-    for (int i = begin; kStates == 0 && i < m; ++i) {  // the last rows, one by one
+    for (int i = begin; kStates == 0 && i < m; ++i) {  // processes the last rows one by one
       for (int j = 0; j < i; ++j) {
         double sum = s[std::ptrdiff_t{j} * stride + i];
         for (int k = 0; k < j; ++k) {
@@ -135,13 +138,14 @@ struct Arithmetic {
     }
     return kStates == 0 || FactoriseBlock(m, s, stride, inverse_d);
   }
-  /// Factorises a few rows, like Factorise, by columns.
+  /// Factorises a block of a few rows like Factorise(), column by column.
   ALIDADE_KERNEL bool FactoriseBlock(int m, double* s, int stride, double* inverse_d) {
     ALIDADE_UNROLL for (int k = 0; k < m; ++k) {
       double* const l = s + std::ptrdiff_t{k} * stride;
       if (!IsPositive(l[k])) return false;
       inverse_d[k] = 1.0 / l[k];
-      ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {  // updates the right, while l is L D
+      // Updates the columns to the right; l still contains L D.
+      ALIDADE_UNROLL for (int j = k + 1; j < m; ++j) {
         const double factor = -l[j] * inverse_d[k];
         ALIDADE_UNROLL for (int i = j; i < m; ++i) s[std::ptrdiff_t{j} * stride + i] +=
             factor * l[i];
@@ -177,8 +181,8 @@ struct Arithmetic {
     }
     return column;
   }
-  /// Computes P H' for rows [first, last) of H, in batches of kBatch rows, in the columns of w from
-  /// `first_column` on.
+  /// Computes P H' for rows [first, last) of H, kBatch rows at a time. Writes the result to the
+  /// columns of w from `first_column` on.
   template <int kBatch>
   ALIDADE_KERNEL void ProjectRows(const Update& u, const JacobianRows& rows, int first, int last,
                                   int first_column) {
@@ -201,7 +205,8 @@ struct Arithmetic {
   }
   ALIDADE_KERNEL void Project(const Update& u, const JacobianRows& rows, int m, int first_column) {
     if (M > 0) return ProjectRows<std::max(M, 1)>(u, rows, 0, m, first_column);
-    constexpr int kBatch = kStates > 0 ? 1 : 3;  // most measurements of more than two have three
+    // Most measurements with more than two rows have three.
+    constexpr int kBatch = kStates > 0 ? 1 : 3;
     const int batched = m - m % kBatch;
     ProjectRows<kBatch>(u, rows, 0, batched, first_column);
     if (kBatch > 1) ProjectRows<1>(u, rows, batched, m, first_column);
@@ -250,7 +255,8 @@ struct Arithmetic {
       }
     }
   }
-  /// Computes H of a measurement times P H' of the preceding ones, in batches of columns of H.
+  /// Multiplies H of a measurement by P H' of the preceding measurements, a few columns of H at a
+  /// time.
   ALIDADE_KERNEL void StackCrossTerms(const Update& u, const MeasurementRows& measurement,
                                       int stride) {
     constexpr int kBatch = 16;
@@ -281,8 +287,8 @@ struct Arithmetic {
       }
     }
   }
-  /// Converts rows of P H' to rows of W, in batches of kRows columns. The distance of two columns
-  /// is `step`.
+  /// Converts rows of P H' to rows of W, kRows columns at a time. Adjacent columns are `step`
+  /// numbers apart.
   ALIDADE_KERNEL void Divide(int m, const double* l, double* panel, int step, int stride) {
     int j = 0;
     for (; kStates == 0 && j + kRows <= m; j += kRows) {
@@ -312,7 +318,7 @@ struct Arithmetic {
       x.Store(panel + j * step);
     }
   }
-  /// Computes dx and the decrease of the variances, in the rows of a panel from i on.
+  /// Computes dx and the decrease of the variances for the rows of the panel that begins at row i.
   ALIDADE_KERNEL Solution Correct(const Update& u, int m, int i, const double* panel) {
     const SymmetricView p = Sized(u.p);
     Column dx{}, decrease{};
@@ -324,7 +330,7 @@ struct Arithmetic {
     }
     dx.Store(u.dx + i);
     decrease.Store(u.variance_decrease + i);
-    double defect = 0.0;  // NaN if a result is not finite
+    double defect = 0.0;  // becomes NaN if a result is not finite
     bool has_cancellation = false;
     ALIDADE_UNROLL for (int r = 0; r < kRows; ++r) {
       const double prior = p.data[std::ptrdiff_t{i + r} * (p.stride + 1)];
@@ -366,9 +372,9 @@ struct Arithmetic {
     return worst;
   }
 
-  /// Subtracts the part of columns [first, last) of W from a tile of P. The tile has kTile panels
-  /// of rows from i on and one panel of columns from j on. `scaled`: D^-1 times W of the panel at
-  /// j.
+  /// Subtracts from a tile of P the contribution of columns [first, last) of W. The tile has kTile
+  /// panels of rows from row i on, and one panel of columns from column j on. `scaled` is D^-1
+  /// times W of the panel at j.
   template <int kTile>
   ALIDADE_KERNEL void Tile(const Update& u, int first, int last, int i, int j,
                            const double* scaled) {
@@ -394,7 +400,7 @@ struct Arithmetic {
       ALIDADE_UNROLL for (int t = 0; t < kTile; ++t) sum[c][t].Store(p + c * stride + t * kRows);
     }
   }
-  /// Computes P' in blocks of rows and columns of W that fit into the L2 cache.
+  /// Computes P' block by block. The rows and columns of W of a block fit into the L2 cache.
   ALIDADE_KERNEL void Downdate(const Update& u) {
     constexpr int kDepth = 256, kHeight = kStates > 0 ? kRows : 24 * kTileHeight * kRows;
     const int n = Sized(u.p).size, m = Rows(u.m);
@@ -420,7 +426,7 @@ struct Arithmetic {
     }
   }
 
-  /// Propagates K rows, up to two, of a small state, in registers.
+  /// Propagates K rows of a small state in registers; K is 1 or 2.
   template <int K>
   ALIDADE_KERNEL bool PropagateFew(const SymmetricView& covariance, const Transition& step) {
     const SymmetricView p = Sized(covariance);
@@ -477,8 +483,8 @@ struct Arithmetic {
       for (; r < rows; ++r) AddRows<1>(r, inner, i, PaddedSize(k), a, b, c);
     }
   }
-  /// Computes c += a b for kBatch rows from r on and the columns from i on. The rows share the
-  /// loads of b.
+  /// Computes c += a b for kBatch rows from row r on, and the columns from column i on. The rows
+  /// use the same loads of b.
   template <int kBatch>
   ALIDADE_KERNEL void AddRows(int r, int inner, int i, int stride, const double* a, const double* b,
                               double* c) {
@@ -492,11 +498,11 @@ struct Arithmetic {
     }
     ALIDADE_UNROLL for (int t = 0; t < kBatch; ++t) sum[t].Store(destination + t * stride);
   }
-  /// Copies row `row` of P, PaddedSize(n) numbers.
+  /// Copies row `row` of P, which has PaddedSize(n) numbers.
   ALIDADE_KERNEL void CopyRow(const SymmetricView& p, int row, double* destination) {
     for (int i = 0; i < p.size; i += kRows) ColumnOf(p, row, i).Store(destination + i);
   }
-  /// Propagates any number of rows, in memory.
+  /// Propagates any number of rows. The intermediate matrices are in memory, not in registers.
   ALIDADE_KERNEL bool PropagateMany(const SymmetricView& covariance, const Transition& step) {
     const SymmetricView p = Sized(covariance);
     const int n = p.size, k = static_cast<int>(step.rows.size()), w = step.width;

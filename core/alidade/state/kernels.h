@@ -7,16 +7,16 @@
 #include "alidade/state/instruction_set.h"
 #include "alidade/state/jacobian_rows.h"
 
-/// Arithmetic of a Kalman filter on raw memory. kernels.cc contains each kernel once, for columns
-/// of a few rows. It is compiled for 1 to 8 states, with unrolled loops. For any number of states
-/// it is compiled for panels of vector registers, once for each instruction set. The results of the
-/// sets differ only by rounding.
+/// Arithmetic of a Kalman filter on raw memory. kernels.cc contains the source of each kernel once.
+/// It is compiled for 1 to 8 states with unrolled loops. For any number of states it is compiled
+/// once for each instruction set, and processes panels of vector registers. The results of the sets
+/// differ only by rounding.
 namespace alidade::internal {
 
 /// Returns the size of memory for n rows or columns, in whole cache lines.
 constexpr int PaddedSize(int n) { return (n + 7) & ~7; }
 
-/// View of a symmetric n x n matrix by columns, of which only the lower triangle is used. Its
+/// View of a symmetric n x n matrix, stored column by column. Only the lower triangle is used. The
 /// memory has PaddedSize(n) rows and columns. The lower triangle beyond n is zero.
 struct SymmetricView {
   double* data;
@@ -27,34 +27,36 @@ struct SymmetricView {
   }
 };
 
-/// Measurement of an update, linearised at the state.
+/// Measurement of an update, linearised about the state.
 struct MeasurementRows {
   JacobianRows h;
   const double* innovation;  ///< m
   const double* noise;       ///< R, m x m
   double* s;                 ///< m x m, output of Kernels::nis: S = H P H' + R
-  int column = 0;            ///< first column in the update
+  int column = 0;            ///< first column of this measurement in P H' of the update
 };
 
-/// Update of n states by m rows, in memory of the caller.
+/// Update of n states by m rows of measurements. The caller owns the memory.
 ///
 ///   S = H P H' + R = L D L'     W = P H' L^-T     dx = W D^-1 L^-1 r     K = W D^-1 L^-1
 ///   P' = P - W D^-1 W'
 ///
-/// P H', W and K are n x m in panels of Kernels::panel_rows rows, each panel by columns: see At().
+/// P H', W and K are n x m. They are stored in panels of Kernels::panel_rows rows, each panel
+/// column by column: see At().
 struct Update {
   SymmetricView p;
-  std::span<const MeasurementRows* const> measurements;  ///< in the order of their columns
+  /// Measurements, in the order of their columns.
+  std::span<const MeasurementRows* const> measurements;
   int m;
-  int capacity;  ///< of a panel, in columns
+  int capacity;  ///< number of columns for which a panel has memory
   int panel_rows;
-  double* w;                  ///< PaddedSize(n) x capacity: P H', then W
-  double* s;                  ///< PaddedSize(capacity) x capacity by columns: S, then L
+  double* w;                  ///< P H', later W; PaddedSize(n) x capacity
+  double* s;                  ///< S, later L, column-major; PaddedSize(capacity) x capacity
   double* inverse_d;          ///< capacity
-  double* y;                  ///< capacity: L^-1 r
+  double* y;                  ///< L^-1 r; size `capacity`
   double* dx;                 ///< PaddedSize(n)
-  double* variance_decrease;  ///< PaddedSize(n): the diagonal of W D^-1 W'
-  double* gain;               ///< K, of the size of w; null if K is not needed
+  double* variance_decrease;  ///< diagonal of W D^-1 W'; size PaddedSize(n)
+  double* gain;               ///< K, of the same size as w; null if K is not needed
 
   /// Returns element (i, j) of a matrix in panels.
   double& At(double* panels, int i, int j) const {
@@ -64,7 +66,7 @@ struct Update {
   }
 };
 
-/// Result of Kernels::solve, from best to worst.
+/// Outcome of Kernels::solve, from best to worst.
 enum class Solution {
   kOk,
   kCancellation,  ///< P - W D^-1 W' would lose nearly all digits of a variance
@@ -75,13 +77,13 @@ enum class Solution {
 /// Transition x' = F x + N v, v ~ N(0, I), C = Cov(F x, N v), of the k states in `rows`.
 struct Transition {
   std::span<const int> rows;
-  const double* f;      ///< F, k x k by rows
-  const double* noise;  ///< N, k x width by rows
+  const double* f;      ///< F, k x k, row-major
+  const double* noise;  ///< N, k x width, row-major
   int width;
-  const double* cross;  ///< C, k x k by rows; null: zero
-  double* memory;       ///< MemoryOf(n, k, width)
+  const double* cross;  ///< C, k x k, row-major; null means zero
+  double* memory;       ///< scratch memory of MemoryOf(n, k, width) numbers
 
-  /// Returns the size of `memory` for a step of k of n states.
+  /// Returns the size of `memory` for a step that changes k of n states.
   static std::size_t MemoryOf(int n, int k, int width) {
     return static_cast<std::size_t>(k) *
                static_cast<std::size_t>(2 * PaddedSize(n) + 2 * PaddedSize(k) + k) +
@@ -89,32 +91,33 @@ struct Transition {
   }
 };
 
-/// Kernels for an instruction set or a small number of states.
+/// Kernels for one instruction set, or for one small number of states.
 struct Kernels {
-  const char* name;  ///< of the instruction set: `baseline`, `AVX2`, `AVX-512`
+  const char* name;  ///< name of the instruction set: `baseline`, `AVX2`, `AVX-512`
   int panel_rows;
-  // The elements of an array are compiled for 1 row, 2 rows and any number of rows: see For().
-  /// Computes P H' of a measurement, in the columns of w from `measurement.column` on, and its S.
-  /// Returns the NIS, r' S^-1 r, or NaN if S is not finite and positive definite. Overwrites s,
-  /// inverse_d and y.
+  // The three kernels of an array are compiled for 1 row, 2 rows and any number of rows: see For().
+  /// Computes S and P H' of a measurement. Writes P H' to the columns of w from
+  /// `measurement.column` on. Returns the NIS, r' S^-1 r, or NaN if S is not finite and positive
+  /// definite. Overwrites s, inverse_d and y.
   double (*nis[3])(const Update& update, const MeasurementRows& measurement);
-  /// Computes all of an update except P', from the P H' of `nis`.
+  /// Computes the results of an update except P'. `nis` must have computed P H' of each
+  /// measurement.
   Solution (*solve[3])(const Update& update);
   /// Replaces P by P'.
   void (*downdate[3])(const Update& update);
-  /// Replaces P by the covariance of x'. Returns false and leaves P unchanged if it would not be
-  /// finite.
+  /// Replaces P by the covariance of x'. Returns false and leaves P unchanged if the new P would
+  /// not be finite.
   bool (*propagate)(const SymmetricView& p, const Transition& step);
 
-  /// Returns the element of an array for m rows.
+  /// Returns the kernel of an array for m rows.
   template <class Kernel>
   static Kernel For(Kernel const (&kernels)[3], int m) {
     return kernels[m <= 2 ? m - 1 : 2];
   }
 };
 
-/// Returns the unrolled kernels for 1 to 8 states with a stride of 8, else the vector kernels of
-/// BestInstructionSet().
+/// Returns the unrolled kernels if `p` has 1 to 8 states and a stride of 8. Otherwise returns the
+/// vector kernels of BestInstructionSet().
 const Kernels& KernelsFor(const SymmetricView& p);
 /// Returns the vector kernels of an instruction set, for any number of states.
 const Kernels& KernelsOf(InstructionSet set);

@@ -16,8 +16,8 @@ void SetIdentity(int size, double* j) {
   }
 }
 
-/// Sets j of a geometry to the identity, except the diagonal blocks of the parts that are not
-/// vectors. write(part, ambient offset, tangent offset, block) computes the block of a part.
+/// Sets j to the identity, except for the diagonal blocks of the parts that are not vectors.
+/// write(part, ambient offset, tangent offset, block) computes such a block.
 template <class Write>
 void FillByParts(const Geometry& geometry, double* j, const Write& write) {
   const int size = geometry.tangent;

@@ -14,7 +14,7 @@ namespace alidade {
 /// outside the library.
 inline constexpr double kUnitTolerance = 1e-3;
 
-/// Geometry of alidade/model/geometry.h, selected at run time, with its size.
+/// One of the geometries of alidade/model/geometry.h, selected at run time, with its size.
 class Geometry {
  public:
   int ambient = 1;
@@ -23,11 +23,11 @@ class Geometry {
 
   /// Constructs R^1.
   Geometry() : Geometry(ALIDADE_VECTOR) {}
-  /// Constructs the geometry with this number in the C table; not a product. Only a vector uses
-  /// `size`.
+  /// Constructs the geometry with this number in the C table, which must not be a product. `size`
+  /// applies only to a vector.
   explicit Geometry(std::uint32_t number, int size = 1);
-  /// Returns the geometry of a struct of geometry.h. `size` is the size of a vector with the size
-  /// kDynamic.
+  /// Returns the geometry of the struct G of geometry.h. `size` is the size of a vector whose size
+  /// is known only at run time (kDynamic).
   template <class G>
   static Geometry Of(int size = G::kAmbient) {
     return Geometry(G::kGeometry, size);
@@ -44,8 +44,8 @@ class Geometry {
   bool is_vector() const { return row_->number == ALIDADE_VECTOR; }
   bool is_product() const { return row_->number == ALIDADE_PRODUCT; }
   bool is_angle() const { return row_->number == ALIDADE_ANGLE; }
-  /// Returns true if the tangent basis rotates with the point, so that a covariance rotates with
-  /// it. For a product, returns true if that holds for a part.
+  /// Returns true if the basis of the tangent space rotates when the point moves, and a covariance
+  /// with it. For a product, returns true if this holds for any part.
   bool has_transport() const;
   /// Returns true if element `i` of a difference is an angle in rad.
   bool IsAngular(int i) const;
@@ -65,8 +65,8 @@ class Geometry {
     }
   }
 
-  /// Computes y = x (+) d; x and y may be the same array. The result lies on the manifold to
-  /// rounding.
+  /// Computes y = x (+) d; x and y may be the same array. The result lies on the manifold within
+  /// rounding errors.
   void Plus(const double* x, const double* d, double* y) const;
   /// Computes d = y (-) x.
   void Minus(const double* y, const double* x, double* d) const {
@@ -74,11 +74,13 @@ class Geometry {
     for (int i = 0; i < ambient; ++i) d[i] = y[i] - x[i];
   }
   /// Computes the matrix j (tangent x tangent, row-major) that transports a tangent vector at x
-  /// along the geodesic to the tangent space of y. It is the identity unless has_transport().
+  /// along the geodesic to the tangent space of y. The matrix is the identity unless
+  /// has_transport() is true.
   void Transport(const double* x, const double* y, double* j) const;
   /// Moves x to the nearest point of the manifold; wraps an angle.
   void Normalise(double* x) const;
-  /// Returns the neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
+  /// Returns the neutral element: zeros for a vector or an angle, (1, 0, 0, 0) for a quaternion,
+  /// (0, 0, 1) for a unit vector.
   std::vector<double> Identity() const;
 
   friend bool operator==(const Geometry& a, const Geometry& b) {
@@ -91,8 +93,8 @@ class Geometry {
   const GeometryRow* row_;  ///< entry in the table of the library, which outlives every plugin
 };
 
-/// Computes j = d(x (+) d)/dd (tangent x tangent, row-major), in the tangent space at x (+) d: the
-/// identity for vectors, for angles, and at d = 0.
+/// Computes j = d(x (+) d)/dd (tangent x tangent, row-major), in the tangent space at x (+) d. The
+/// matrix is the identity for vectors, for angles, and at d = 0.
 void PlusJacobian(const Geometry& geometry, const double* x, const double* d, double* j);
 /// Returns the distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and
 /// quaternions, the largest distance of a part for products.
@@ -104,12 +106,12 @@ void WrapAngles(const Geometry& geometry, double* x);
 /// `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);
 
-/// A named quantity with its geometry: a role, a measurement, a control input or a state block.
+/// Named quantity with its geometry: a role, a measurement, a control input or a state block.
 struct Space {
   std::string name;
   std::string unit;
   std::string doc;
-  std::vector<std::string> elements;  ///< names of the ambient elements; {""} for one element
+  std::vector<std::string> elements;  ///< names of the ambient elements; {""} for a scalar
   Geometry geometry;
   unsigned flags = 0;                   ///< ALIDADE_ROLE_*
   std::vector<std::string> parts = {};  ///< names of the parts of a product
@@ -119,7 +121,7 @@ struct Space {
   bool shared() const { return (flags & ALIDADE_ROLE_SHARED) != 0; }
 };
 
-/// Returns `name` or `name.element` for each ambient element: the columns of a value.
+/// Returns the column names of a value: `name` or `name.element` for each ambient element.
 std::vector<std::string> ColumnNames(const std::string& name, const Space& space);
 
 }  // namespace alidade

@@ -35,7 +35,7 @@ void AddProjection(const Covariance& p, const JacobianRows& h, double* s) {
   const Eigen::Map<const RowMajor> rows(h.data, m, width);
   for (Eigen::Index i = 0; i < m; ++i) {
     for (Eigen::Index c = 0; c < width; ++c) {
-      double sum = 0.0;  // an element of row i of H P
+      double sum = 0.0;  // element of row i of H P
       for (Eigen::Index d = 0; d < width; ++d) {
         const auto [low, high] = std::minmax(h.columns[static_cast<std::size_t>(c)],
                                              h.columns[static_cast<std::size_t>(d)]);

@@ -8,9 +8,10 @@
 /// Products of a Jacobian H (m x n) with a covariance P. They only read the lower triangle of P.
 namespace alidade {
 
-/// Computes pht = P H' (n x m, by columns) and s += H P H' (m x m). O(n m k) for k columns of H.
+/// Computes pht = P H' (n x m, column-major) and s += H P H' (m x m). The cost is O(n m k) if H has
+/// k columns.
 void Project(const Covariance& p, const JacobianRows& h, double* pht, double* s);
-/// Computes only s += H P H' (m x m). O(m k^2).
+/// Computes only s += H P H' (m x m). The cost is O(m k^2).
 void AddProjection(const Covariance& p, const JacobianRows& h, double* s);
 
 }  // namespace alidade

@@ -5,10 +5,11 @@
 #include <numeric>
 #include <span>
 
-/// Sign of quaternions: q and -q are the same rotation, of which one is written.
+/// Choice of the sign of a quaternion. q and -q represent the same rotation; outputs contain one of
+/// them.
 namespace alidade::internal {
 
-/// Replaces q by -q if that is nearer to `reference`. If `reference` is empty, makes the first
+/// Replaces q by -q if -q is nearer to `reference`. If `reference` is empty, makes the first
 /// non-zero element positive.
 inline void ChooseSign(std::span<const double> reference, std::span<double> q) {
   const auto first = std::ranges::find_if(q, [](double element) { return element != 0.0; });
@@ -17,7 +18,8 @@ inline void ChooseSign(std::span<const double> reference, std::span<double> q) {
                          : first == q.end() ? 0.0
                                             : *first;
   const double sign = product < 0.0 ? -1.0 : 1.0;
-  for (double& element : q) element = element == 0.0 ? 0.0 : sign * element;  // replaces -0 too
+  // Also replaces -0 by 0.
+  for (double& element : q) element = element == 0.0 ? 0.0 : sign * element;
 }
 
 }  // namespace alidade::internal

@@ -14,7 +14,8 @@
 namespace alidade {
 namespace {
 
-/// Returns the offset of `size` numbers in `values`, in a gap of that size or at the end.
+/// Reserves `size` numbers in `values`, in a gap of exactly that size or at the end. Returns their
+/// offset.
 int AllocateValues(std::vector<double>& values, std::vector<std::pair<int, int>>& gaps, int size) {
   const auto gap = std::ranges::find(gaps, size, &std::pair<int, int>::second);
   if (gap == gaps.end()) {
@@ -32,7 +33,8 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
                              BlockStatus status) {
   ALIDADE_EXPECTS(Find(name) < 0);
   if (removed_.empty()) {
-    Block new_block;  // constructed first, because the arguments may be references into blocks_
+    // Creates a complete block first, because the arguments may refer to elements of blocks_.
+    Block new_block;
     new_block.name = name;
     new_block.owner = owner;
     new_block.space = space;
@@ -40,7 +42,8 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
     blocks_.push_back(std::move(new_block));
     return static_cast<BlockId>(blocks_.size()) - 1;
   }
-  // A removed block with the same space has enough memory for the assignments below.
+  // The strings of a removed block with the same space have enough memory for the assignments
+  // below.
   const auto has_same_space = [&](BlockId id) { return (*this)[id].space.name == space.name; };
   auto position = std::ranges::find_if(removed_, has_same_space);
   if (position == removed_.end()) --position;
@@ -134,7 +137,7 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
   covariance_.SetRows(rows_, p, cross);
 }
 
-/// Computes rows_ and columns_, and returns the size of the blocks' tangents.
+/// Computes rows_ and columns_ of the blocks. Returns the total tangent size of the blocks.
 int State::FindRows(std::span<const BlockId> blocks) {
   rows_.clear();
   columns_.clear();
@@ -163,7 +166,7 @@ void State::Release(BlockId id) {
   FillGaps();
 }
 
-/// Moves the last block into a gap, as long as a gap is large enough.
+/// Moves the last block into a gap, and repeats this while a gap is large enough.
 void State::FillGaps() {
   for (;;) {
     const auto last_id = std::ranges::max_element(
@@ -198,7 +201,7 @@ bool State::Retract(const double* dx, std::vector<double>& new_values) const {
   return defect == 0.0;
 }
 
-/// Computes Retract block by block.
+/// Computes the result of Retract() block by block.
 bool State::RetractBlocks(const double* dx, std::vector<double>& new_values) const {
   std::ranges::copy(values_, new_values.begin());
   for (const BlockId id : covariance_blocks_) {

@@ -13,25 +13,26 @@
 
 namespace alidade {
 
-/// Index of a block in its layout. It stays valid when other blocks are added or removed.
+/// Index of a block in its layout. The index stays valid when other blocks are added or removed.
 using BlockId = int;
 
-/// Treatment of a block by the estimator.
+/// How the estimator treats a block.
 enum class BlockStatus {
-  kEstimated,  ///< updates correct it
-  kConsider,   ///< it has a covariance and correlations, but is never corrected (Schmidt)
-  kConstant,   ///< it is known exactly
+  kEstimated,  ///< updates correct the block
+  kConsider,   ///< the block has a covariance and correlations, but no update corrects it (Schmidt)
+  kConstant,   ///< the block is known exactly
 };
 
 /// Named part of the state.
 struct Block {
-  std::string name;   ///< `owner.block`, as in `target.depth`
-  std::string owner;  ///< entry of the config that defines it
+  std::string name;   ///< `owner.block`, such as `target.depth`
+  std::string owner;  ///< entry of the config that defines the block
   Space space;
   BlockStatus status = BlockStatus::kEstimated;
-  bool present = false;     ///< has a value; false while the block is not initialised
-  int value_offset = -1;    ///< in State::values(), if present or reserved
-  int tangent_offset = -1;  ///< in Covariance, if present or reserved, and not constant
+  bool present = false;   ///< whether the block has a value; false until it is initialised
+  int value_offset = -1;  ///< offset in State::values(); -1 unless present or reserved
+  /// Offset in Covariance; -1 if constant, or neither present nor reserved.
+  int tangent_offset = -1;
 
   const Geometry& geometry() const { return space.geometry; }
   bool has_covariance() const { return present && status != BlockStatus::kConstant; }
@@ -40,32 +41,34 @@ struct Block {
 /// Names, geometries and offsets of the blocks, without their values.
 class StateLayout {
  public:
-  /// Adds a block without a value. ContractViolation if the name is in use.
+  /// Adds a block without a value. Error: ContractViolation if another block has this name.
   BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
                   BlockStatus status = BlockStatus::kEstimated);
   const std::vector<Block>& blocks() const { return blocks_; }
   const Block& operator[](BlockId id) const { return blocks_[static_cast<std::size_t>(id)]; }
   Block& operator[](BlockId id) { return blocks_[static_cast<std::size_t>(id)]; }
-  /// Returns the block of that name, or -1.
+  /// Returns the block with this name, or -1.
   BlockId Find(std::string_view name) const;
-  /// Removes a block. A block that is declared later may reuse its id.
+  /// Removes a block. A block that is declared later may reuse the id.
   void Remove(BlockId id);
 
  private:
   std::vector<Block> blocks_;
-  std::vector<BlockId> removed_;  ///< reused by the next blocks
+  std::vector<BlockId> removed_;  ///< ids of removed blocks, which later blocks reuse
 };
 
-/// Estimate of a block: its ambient value and the standard deviations of its tangent.
+/// Estimate of a block: its ambient value, and the standard deviations of its tangent elements.
 struct BlockEstimate {
   Eigen::VectorXd value, sigma;
 };
 
-/// State: consistent layout, values and covariance of the blocks. Copyable.
+/// State of an estimator: the layout, values and covariance of its blocks, which always agree.
+/// Copyable.
 ///
-/// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing a block
-/// moves O(n) numbers. A removed block leaves a gap. The last block fills it if it is not larger;
-/// otherwise a later block may use it. Setting the value of a block does not move it.
+/// x is one buffer of ambient values, P the covariance in the tangent space. Adding or removing a
+/// block moves O(n) numbers. A removed block leaves a gap. The last block is moved into the gap if
+/// it fits; otherwise a block that is added later may use the gap. Setting the value of a block
+/// does not move the block in memory.
 class State {
  public:
   explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
@@ -77,41 +80,41 @@ class State {
   /// Returns the ambient value of a present block. The pointer is valid until a block is added or
   /// values() is replaced.
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
-  /// Returns the standard deviation of element i of a present block, in its tangent; 0 if the block
-  /// is constant.
+  /// Returns the standard deviation of tangent element i of a present block; 0 if the block is
+  /// constant.
   double sigma(BlockId id, int i = 0) const;
-  /// Returns the estimate of a block. ContractViolation if the block is not present.
+  /// Returns the estimate of a block. Error: ContractViolation if the block is not present.
   BlockEstimate Estimate(BlockId id) const;
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }
 
-  /// Declares a block of a dynamic state (a landmark, a clone).
+  /// Declares a block while the estimator runs, such as a landmark or a clone.
   BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
                   BlockStatus status = BlockStatus::kEstimated) {
     return layout_.Declare(name, owner, space, status);
   }
   /// Reserves the memory of a declared block's value, and zero rows of the covariance.
   void Reserve(BlockId id);
-  /// Sets the value and covariance of a declared block, uncorrelated with the other blocks. The
-  /// covariance is in the tangent; it is ignored for a constant block.
+  /// Sets the value and covariance of a declared block. Its correlations with other blocks become
+  /// zero. The covariance, in the tangent space, is ignored for a constant block.
   void Add(BlockId id, const double* value, const ConstMatrix& covariance);
   /// Initialises the declared blocks `ids` with y = g(x, n), one after the other. `sources` are the
-  /// blocks of x, disjoint from `ids`. With dy = J dx + J_n dn the covariance of y is
-  /// J P_xx J' + noise_covariance, and its correlation with all other blocks is J P_x. J is
-  /// row-major and has the columns of the sources' tangents side by side;
-  /// noise_covariance = J_n Cov(n) J_n'.
+  /// blocks of x, disjoint from `ids`. With dy = J dx + J_n dn the covariance of y is J P_xx J' +
+  /// noise_covariance, and its correlation with all other blocks is J P_x. J is row-major; its
+  /// columns are the tangent elements of the sources, in their order; noise_covariance = J_n Cov(n)
+  /// J_n'.
   void Initialise(std::span<const BlockId> ids, const double* values,
                   std::span<const BlockId> sources, const Eigen::Ref<const RowMajor>& jacobian,
                   const ConstMatrix& noise_covariance);
-  /// Removes a block. A block that is declared later may reuse its id. Values and covariance of the
+  /// Removes a block. A block that is declared later may reuse the id. Values and covariance of the
   /// other blocks do not change.
   void Remove(BlockId id);
-  /// Computes new_values: x_i (+) dx_i of all blocks with a covariance, unchanged values of the
-  /// others. dx is indexed like the covariance. The state does not change (see MoveTo). Returns
-  /// true if the new values are finite.
+  /// Computes new_values: x_i (+) dx_i for each block with a covariance, and the present value of
+  /// every other block. dx has the same indices as the covariance. The state does not change (see
+  /// MoveTo). Returns true if all new values are finite.
   bool Retract(const double* dx, std::vector<double>& new_values) const;
-  /// Sets all values, without moving them in memory. Transports P if the tangent basis of a block
-  /// changes with its value.
+  /// Sets all values, without moving them in memory. Transports P for each block whose tangent
+  /// basis changes with its value.
   void MoveTo(const std::vector<double>& values);
 
  private:
@@ -124,17 +127,20 @@ class State {
 
   StateLayout layout_;
   std::vector<double> values_;
-  std::vector<std::pair<int, int>> value_gaps_;  ///< (offset, size)
+  std::vector<std::pair<int, int>> value_gaps_;  ///< offset and size of each gap
   Covariance covariance_;
   std::vector<BlockId> covariance_blocks_;  ///< blocks with rows of P, ascending
-  bool is_flat_ = true;  ///< x (+) dx = x + dx: only vectors, with the same offsets in x and P
+  /// True if x (+) dx = x + dx: all blocks are vectors with equal offsets in x and P.
+  bool is_flat_ = true;
   Scratch<Workspace> memory_;
-  // Output of FindRows.
-  Scratch<std::vector<int>> rows_;     ///< of P
-  Scratch<std::vector<int>> columns_;  ///< of a Jacobian with a column for each tangent element
+  // Results of FindRows().
+  Scratch<std::vector<int>> rows_;  ///< rows of P
+  /// Columns of a Jacobian that has one for each tangent element.
+  Scratch<std::vector<int>> columns_;
 };
 
-/// Returns the Jacobian J (n x n, in `work`) of state.MoveTo(values): dx after it = J dx before it.
+/// Returns the Jacobian J of state.MoveTo(values), n x n, in `work`: an error dx before the move
+/// becomes J dx after it.
 Workspace::Matrix TransportTo(const State& state, const std::vector<double>& values,
                               Workspace& work);
 

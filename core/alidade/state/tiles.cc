@@ -8,7 +8,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Calls visit(first, size) for the tiles of [0, size).
+/// Calls visit(first, size) for each tile of [0, size).
 template <class Visitor>
 void ForEachTile(Eigen::Index size, const Visitor& visit) {
   for (Eigen::Index first = 0; first < size; first += kTile) {

@@ -9,7 +9,8 @@
 #include <new>
 #include <utility>
 
-// Vectors are only passed between inlined functions, never through a call.
+// g++ warns that the ABI for vector arguments differs. The warning does not apply, because only
+// inlined functions have such arguments.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace alidade::internal {
@@ -40,7 +41,8 @@ class Buffer {
 
 thread_local Buffer packed_left, packed_right;
 
-/// Loops over vectors of `kLanes` numbers. A product uses kVectors x kColumns registers.
+/// Loops over vectors of `kLanes` numbers. A product accumulates its sums in kVectors x kColumns
+/// registers.
 template <int kLanes, int kVectorsOfTile, int kColumnsOfTile>
 struct Loops {
   using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -62,7 +64,7 @@ struct Loops {
   }
 
   /// Computes sum += A B for the first kHeight vectors of a panel of A and kColumns columns of B.
-  /// The distance of two rows of B is `step`.
+  /// Adjacent rows of B are `step` numbers apart.
   template <int kHeight>
   [[gnu::always_inline]] static void Multiply(long depth, const double* a, const double* b,
                                               long step, Vector (&sum)[kColumns][kHeight]) {
@@ -78,7 +80,8 @@ struct Loops {
     }
   }
 
-  /// Copies A to adjacent panels of kRows rows, with zeros below its last row.
+  /// Copies A to adjacent panels of kRows rows. Fills the last panel with zeros below the last row
+  /// of A.
   [[gnu::always_inline]] static void PackLeft(long rows, long depth, const double* a,
                                               const Strided& steps, double* destination) {
     for (long i = 0; i < rows; i += kRows) {
@@ -100,8 +103,8 @@ struct Loops {
     }
   }
 
-  /// Copies sign B to adjacent panels of kColumns columns, with zeros to the right of its last
-  /// column.
+  /// Copies sign B to adjacent panels of kColumns columns. Fills the last panel with zeros to the
+  /// right of the last column of B.
   [[gnu::always_inline]] static void PackRight(long columns, long depth, const double* b,
                                                const Strided& steps, double sign,
                                                double* destination) {
@@ -121,9 +124,9 @@ struct Loops {
     }
   }
 
-  /// Computes C += sum for the `rows` and `columns` of a tile that are inside C. Unless `is_whole`,
-  /// only elements on or below the diagonal of C are changed. The diagonal begins `shift` rows
-  /// above the tile's first row.
+  /// Computes C += sum for the `rows` and `columns` of a tile that lie inside C. If `is_whole` is
+  /// false, changes only elements on or below the diagonal of C. The diagonal crosses the tile's
+  /// first column `shift` rows above the tile's first row.
   [[gnu::always_inline]] static void AddTile(const Tile& sum, long rows, long columns,
                                              bool is_whole, long shift, double* c, long ldc) {
     if (is_whole && rows == kRows && columns == kColumns) {
@@ -164,7 +167,8 @@ struct Loops {
           PackLeft(panel_rows, panel_depth, a.data + i * a.row_step + k * a.column_step, a, left);
           for (long q = 0; q < panel_columns; q += kColumns) {
             for (long p = 0; p < panel_rows; p += kRows) {
-              const long shift = i + p - (j + q);  // of the tile, below the diagonal of C
+              // Number of rows by which the tile's corner lies below the diagonal of C.
+              const long shift = i + p - (j + q);
               if (lower_only && shift + kRows <= 0) continue;
               Tile sum = {};
               Multiply(panel_depth, left + p * panel_depth, right + q * panel_depth, kColumns, sum);
@@ -178,8 +182,9 @@ struct Loops {
     }
   }
 
-  /// Subtracts a product from kCount columns `target` of a panel, in its first kHeight vectors. Its
-  /// factors are the columns [begin, end) of the panel and kCount rows of L, which begin at `l`.
+  /// Subtracts a product from kCount columns `target` of a panel, in the first kHeight vectors of
+  /// the panel. The factors are the columns [begin, end) of the panel and kCount rows of L, which
+  /// begin at `l`.
   template <int kHeight, int kCount>
   [[gnu::always_inline]] static void SubtractColumns(long begin, long end, const double* l,
                                                      long ldl, const double* panel,
@@ -207,8 +212,8 @@ struct Loops {
     }
   }
 
-  /// Multiplies kCount columns `target` of a panel, in its first kHeight vectors, by L^-T of size
-  /// kCount.
+  /// Multiplies kCount columns `target` of a panel by L^-T of size kCount, in the first kHeight
+  /// vectors of the panel.
   template <int kHeight, int kCount>
   [[gnu::always_inline]] static void DivideColumns(const double* l, long ldl, double* target) {
     Vector x[kCount][kHeight];
@@ -239,7 +244,7 @@ struct Loops {
   }
 
   /// Applies columns [k, k + kDepth) of L to columns [first, first + count) of a panel of B L^-T,
-  /// in its first kHeight vectors. The columns of the panel before `first` are final.
+  /// in the first kHeight vectors of the panel. The columns before `first` are already final.
   template <int kHeight>
   [[gnu::always_inline]] static void SolvePanel(long first, long count, long k, const double* l,
                                                 long ldl, double* panel) {
@@ -292,8 +297,8 @@ struct Loops {
     }
   }
 
-  /// Prevents the compiler from keeping stored values in registers for later loads. The preceding
-  /// loop would then lack registers (a quarter of the time of a factorisation).
+  /// Prevents the compiler from retaining stored values in registers for later loads. Otherwise the
+  /// preceding loop would lack registers, which costs a quarter of the time of a factorisation.
   [[gnu::always_inline]] static void FlushRegisters() {
 #if defined(__x86_64__)
     asm volatile("" ::: "memory");
@@ -335,7 +340,8 @@ struct Loops {
     for (long begin = 0; begin < m; begin += kRows) {
       const long rows = std::min<long>(kRows, m - begin), end = begin + rows;
       PackLeft(rows, end, s + begin, {nullptr, 1, lds}, panel);
-      for (long j = end; j < begin + kRows; ++j) {  // completes the last panel by identity
+      // Completes the last panel with rows of the identity.
+      for (long j = end; j < begin + kRows; ++j) {
         std::fill_n(panel + j * kRows, kRows, 0.0);
         panel[j - begin + j * kRows] = 1.0;
       }

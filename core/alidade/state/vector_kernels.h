@@ -3,9 +3,9 @@
 
 #include "alidade/state/instruction_set.h"
 
-/// Inner loops of large products and factors, compiled for each instruction set. The set is
-/// selected at run time, by the features of the processor. The results of the sets differ only by
-/// rounding.
+/// Inner loops of large products and factors, compiled for each instruction set. The program
+/// selects the set at run time, according to the features of the processor. The results of the sets
+/// differ only by rounding.
 namespace alidade::internal {
 
 /// Read-only matrix with element (i, j) at data[i * row_step + j * column_step].
@@ -16,14 +16,14 @@ struct Strided {
 
 /// Kernels of one instruction set.
 struct VectorKernels {
-  /// Computes C <- C + sign A B. C is rows x columns, by columns with leading dimension ldc; A is
-  /// rows x depth. `lower_only` restricts C to its lower triangle. C overlaps neither A nor B.
+  /// Computes C <- C + sign A B. C is rows x columns, column-major with leading dimension ldc. A is
+  /// rows x depth. `lower_only` restricts C to its lower triangle. C must not overlap A or B.
   void (*add_product)(long rows, long columns, long depth, const Strided& a, const Strided& b,
                       double* c, long ldc, double sign, bool lower_only);
-  /// Computes B <- B L^-T. B is rows x m, L is m x m lower triangular, both by columns.
+  /// Computes B <- B L^-T. B is rows x m. L is m x m and lower triangular. Both are column-major.
   void (*divide_by_transposed)(long rows, long m, const double* l, long ldl, double* b, long ldb);
-  /// Replaces the lower triangle of a symmetric S = L L', m x m by columns, by L. Returns false
-  /// unless S is finite and positive definite.
+  /// Replaces the lower triangle of a symmetric S = L L' by L. S is m x m and column-major. Returns
+  /// false unless S is finite and positive definite.
   bool (*factorise)(long m, double* s, long lds);
 };
 

@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-/// Allocator of whole cache lines.
+/// Allocator whose memory begins at a cache line.
 template <class T>
 struct CacheLines {
   using value_type = T;  // NOLINT(readability-identifier-naming): of an allocator
@@ -27,10 +27,10 @@ struct CacheLines {
   friend bool operator==(const CacheLines& /*a*/, const CacheLines& /*b*/) { return true; }
 };
 
-/// Numbers in whole cache lines.
+/// Numbers in memory that begins at a cache line.
 using AlignedNumbers = std::vector<double, CacheLines<double>>;
 
-/// Scratch memory: copying the owner does not copy it.
+/// Scratch memory. Copying the object that contains it does not copy the memory.
 template <class T>
 struct Scratch : T {
   Scratch() = default;
@@ -38,14 +38,14 @@ struct Scratch : T {
   Scratch& operator=(const Scratch& /*other*/) { return *this; }
 };
 
-/// Memory for the matrices of a step or an update, which later ones reuse. It allocates only if
-/// they need more or larger matrices than before.
+/// Memory for the matrices of a step or an update. Later steps and updates reuse the memory. It
+/// allocates only if they need more or larger matrices than before.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
 
-  /// Scope that releases at its end all memory that was taken in it.
+  /// Scope in which the memory is used. Its destructor releases all memory that was taken since its construction.
   class Use {
    public:
     explicit Use(Workspace& workspace) : workspace_(workspace), used_(workspace.used_) {}
@@ -73,7 +73,7 @@ class Workspace {
     return buffer.data();
   }
 
-  std::vector<Eigen::VectorXd> buffers_;  ///< the first used_ are in use
+  std::vector<Eigen::VectorXd> buffers_;  ///< buffers, of which the first used_ are in use
   std::size_t used_ = 0;
 };
 

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Rows `frame,feature,dim,value`, ordered by frame. A header line is optional.
+/// Reader of rows `frame,feature,dim,value`, ordered by frame. A header line is optional.
 ///
 /// Errors       kBadData with file, line and column; those of NumberRows.
 class FeatureRows {
@@ -22,20 +22,21 @@ class FeatureRows {
   static constexpr std::size_t kDims = 4;
   struct Feature {
     std::array<double, kDims> values{};
-    std::array<int, kDims> lines{};  ///< lines of the values; 0 if missing
+    std::array<int, kDims> lines{};  ///< line of each value; 0 if the value is missing
   };
 
   FeatureRows(const std::filesystem::path& path, const Place& place, const std::string& key);
 
-  /// Returns the next frame, or nullopt at the end.
+  /// Returns the number of the next frame, or nullopt at the end.
   std::optional<std::int64_t> next_frame() const;
   Place place() const { return {rows_.name(), rows_.line(), 0}; }
 
-  /// Reads the features of `frame` by id. Returns none unless `frame` is the next frame.
+  /// Reads the features of `frame`, and returns them by id. If `frame` is not the next frame,
+  /// returns an empty map.
   std::map<std::int64_t, Feature> ReadFrame(std::int64_t frame);
 
   /// Returns the first `size` values of a feature of `frame`, or nullopt if dim 2 or 3 is missing.
-  /// Fails without u or v.
+  /// Fails if u or v is missing.
   std::optional<std::vector<double>> Values(std::int64_t frame, std::int64_t id,
                                             const Feature& feature, std::size_t size) const;
 
@@ -50,7 +51,7 @@ class FeatureRows {
     int line = 0;
   };
 
-  /// Reads the next row into next_, which is empty at the end.
+  /// Reads the next row into next_. At the end next_ is empty.
   void Advance();
 
   NumberRows rows_;

@@ -52,9 +52,9 @@ class Tracks : public Source {
     auto pose = truth_ ? truth_->At(frame.timestamp, options_.tolerance) : std::nullopt;
     if (truth_ && options_.world == TracksOptions::kFirstCamera) {
       if (frames_ == 0 && !pose) {
-        tracks_->FailLine(
-            "frame " + std::to_string(frame_) + " has no true pose, but its camera is the world",
-            "a true pose within truth_tolerance_s, or world: file");
+        tracks_->FailLine("frame " + std::to_string(frame_) +
+                              " has no true pose, but its camera defines the world",
+                          "a true pose within truth_tolerance_s, or world: file");
       }
       if (frames_ == 0) {
         first_pose_ = *pose;
@@ -131,7 +131,8 @@ class Tracks : public Source {
     return has_frame;
   }
 
-  /// Appends the features of frame_ that are not excluded to `frame`, or skips them if it is null.
+  /// Appends to `frame` the features of frame_ that are not excluded. If `frame` is null, skips
+  /// them.
   void EmitTracks(Frame* frame) {
     const auto features = tracks_->ReadFrame(frame_);
     for (const auto& [id, feature] : features) {
@@ -140,7 +141,8 @@ class Tracks : public Source {
     }
   }
 
-  /// Appends the observations of frame_ that determine depth. It drops those of skipped frames.
+  /// Appends to `frame` the observations of frame_ that determine depth. Drops the observations of
+  /// skipped frames.
   void EmitKnown(Frame& frame) {
     for (auto next = known_->next_frame(); next && *next <= frame_; next = known_->next_frame()) {
       const auto features = known_->ReadFrame(*next);

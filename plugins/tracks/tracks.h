@@ -12,8 +12,8 @@ inline constexpr const char* kTracksKeys =
     "tracks.csv\n"
     "state_entry    state entry in the names of the truth; default cam";
 
-/// Creates a source of features that were tracked through images, from rows
-/// `frame,feature,dim,value`.
+/// Creates a source of features that another program has tracked through images. They are read from
+/// rows `frame,feature,dim,value`.
 ///
 ///   dim   value                            frames come in order; a frame's rows in any order
 ///   0, 1  u, v, px                         a header line is optional
@@ -30,9 +30,9 @@ inline constexpr const char* kTracksKeys =
 ///   odometry   6        vx vy vz wx wy wz the frame has a row
 ///   known      3        u, v, depth       known.csv has an observation
 ///
-/// A feature without u or v is an error. A feature is omitted if it lacks another value of
-/// `measures`, or if a frame before `features_from` has it. A frame is complete when the first row
-/// of the next frame, or the end, has been read.
+/// A feature without u or v is an error. A feature is omitted if another value of `measures` is
+/// missing, or if the feature occurs in a frame before `features_from`. A frame is complete when
+/// the first row of the next frame, or the end, has been read.
 ///
 /// Keys         kTracksKeys.
 /// Errors       kBadData with file, line and column of the first invalid row; kInputMissing; kIo if

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// Numbers, flags and choices in the config entry of source `tracks`.
+/// Numbers and choices in the config entry of source `tracks`.
 struct TracksOptions {
   enum Measures { kPixel, kStereo, kDepth };
   enum Odometry { kNone, kZeroOrderHold, kMean };
@@ -17,10 +17,10 @@ struct TracksOptions {
   Measures measures;
   double rate_hz;
   std::int64_t start_frame;    ///< first frame of the source
-  std::int64_t features_from;  ///< features of earlier frames are omitted
+  std::int64_t features_from;  ///< omits features that occur in an earlier frame
   std::int64_t max_frames;     ///< maximum number of frames
   Odometry odometry;
-  Timestamp tolerance;  ///< maximum time between a frame and its true pose
+  Timestamp tolerance;  ///< maximum time from a frame to its true pose
   World world;          ///< coordinate frame of the true poses
 
   explicit TracksOptions(Params& p)

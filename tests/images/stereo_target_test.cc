@@ -413,7 +413,7 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   expect({"--set", "source.left=nowhere"}, 66, "no such file or folder");
   expect({"--set", "source.target=[75, 45, 4, 90]"}, 78, "less than 8 px");
   expect({"--set", "source.target=[0, 0, 0, 0]"}, 78, "less than 8 px");
-  expect({"--set", "source.target=[200, 45, 90, 90]"}, 65, "the target is not on this image");
+  expect({"--set", "source.target=[200, 45, 90, 90]"}, 65, "the target is not inside this image");
   expect({"--set", "source.stereo=pair.yaml"}, 65, "not a calibration");
   expect({"--set", "source.warp=homography"}, 78, "camera.fx");
   expect({"--set", "source.start_frame=21"}, 78,

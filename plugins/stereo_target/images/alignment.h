@@ -14,13 +14,13 @@
 
 namespace alidade {
 
-/// Family of changes of a patch from image to image. Each one includes the previous ones.
+/// Family of changes of a patch from image to image. Each family includes the families before it.
 enum class Warp { kSimilarity, kAffine, kHomography };
 
 /// Returns the number of parameters of a small change of a warp.
 inline int ParameterCount(Warp kind) { return 4 + 2 * static_cast<int>(kind); }
 
-/// Returns the image point, px, of a point of the patch, px.
+/// Returns the point of the image, px, to which the warp maps a point of the patch, px.
 inline cv::Point2d Apply(const cv::Matx33d& warp, cv::Point2d point) {
   const cv::Vec3d image_point = warp * cv::Vec3d(point.x, point.y, 1.0);
   return {image_point[0] / image_point[2], image_point[1] / image_point[2]};
@@ -29,12 +29,12 @@ inline cv::Point2d Apply(const cv::Matx33d& warp, cv::Point2d point) {
 inline cv::Point2d Middle(const cv::Mat& patch) {
   return {0.5 * (patch.cols - 1), 0.5 * (patch.rows - 1)};
 }
-/// Returns half the longer side of a patch: the unit of length of small changes.
+/// Returns half the longer side of a patch, px. This is the unit of length of small changes.
 inline double HalfSide(const cv::Mat& patch) { return 0.5 * std::max(patch.cols, patch.rows); }
 
-/// Returns warp U (I + sum_i d_i E_i) U^-1: applies small changes d to the patch, in coordinates
-/// that are 0 in its middle and 1 at its edge. U converts them to pixels. E_0 to E_7 are size,
-/// turn, shift right, shift down, stretch, shear, and the two projective changes.
+/// Returns warp U (I + sum_i d_i E_i) U^-1: applies small changes d to the patch. Its coordinates
+/// are 0 in the middle of the patch and 1 at the edge. U converts these coordinates to pixels. E_0
+/// to E_7 are size, turn, shift right, shift down, stretch, shear, and the two projective changes.
 inline cv::Matx33d ApplyChange(const cv::Matx33d& warp, const cv::Mat& patch,
                                const Eigen::Ref<const Eigen::VectorXd>& d) {
   std::array<double, 8> values{};
@@ -49,7 +49,7 @@ inline cv::Matx33d ApplyChange(const cv::Matx33d& warp, const cv::Mat& patch,
   return changed * (1.0 / changed(2, 2));
 }
 
-/// Returns the nearest warp of the given kind at the middle of the patch.
+/// Returns the warp of the given kind that agrees best with `warp` at the middle of the patch.
 inline cv::Matx33d ReduceTo(const cv::Matx33d& warp, const cv::Mat& patch, Warp kind) {
   if (kind == Warp::kHomography) return warp;
   const cv::Point2d middle = Middle(patch), image_middle = Apply(warp, middle);
@@ -77,9 +77,10 @@ inline double AreaScaleAt(const cv::Matx33d& warp, cv::Point2d point) {
 struct Alignment {
   cv::Matx33d warp;            ///< pixels of the patch to pixels of the image
   double similarity;           ///< correlation of patch and image, in [-1, 1]
-  Eigen::MatrixXd covariance;  ///< of d in ApplyChange()
+  Eigen::MatrixXd covariance;  ///< covariance of d, see ApplyChange()
 
-  /// Returns the variance of a function of the warp: g C g', with its gradient g by differences.
+  /// Returns the variance of a function of the warp: g C g'. The gradient g is computed by
+  /// differences.
   double Variance(const cv::Mat& patch,
                   const std::function<double(const cv::Matx33d&)>& function) const {
     constexpr double kStep = 1e-5;
@@ -99,16 +100,16 @@ struct Alignment {
 ///   patch(x) = a (sampled(x; warp) + J d) + b + e,   J = d sampled / d d
 ///
 /// The equation is solved for the change d of the warp and the light (a, b) by weighted least
-/// squares, until d is small. (If a and b were on the patch's side, a = 0 would fit any flat area.)
-/// Huber's loss reduces the weight of pixels with a large e, such as those of objects in front
-/// of the target.
+/// squares, until d is small. (If a and b were applied to the patch, a = 0 would fit any uniform
+/// area.) Huber's loss reduces the weight of pixels with a large e, such as those of objects in
+/// front of the target.
 class PatchAlignment {
  public:
   PatchAlignment(const cv::Mat& patch, const cv::Mat& image, Warp kind)
       : patch_(patch), image_(image), count_(ParameterCount(kind)) {}
 
-  /// Returns false if it does not converge, if less than half of the patch is in the image, or if
-  /// the patch has no texture.
+  /// Aligns the patch, from the given `warp` on. Returns false if the alignment does not converge,
+  /// if less than half of the patch is in the image, or if the patch has no texture.
   bool Run(cv::Matx33d& warp) {
     constexpr int kMaxSteps = 40;
     constexpr double kSettled = 2e-3, kAlmostSettled = 5e-2, kMaxStep = 0.25;  // px, px, half sides
@@ -125,8 +126,8 @@ class PatchAlignment {
   }
 
   /// Returns the alignment after Run(), with the covariance C = s^2 c (a J' W J a)^-1. s^2 is the
-  /// variance of e, and c = (1 + q) / (1 - q) for the correlation q of neighbours in e, along rows
-  /// and along columns: correlated errors average out less.
+  /// variance of e. c accounts for correlated errors, which average out less: it is the product of
+  /// (1 + q) / (1 - q) for rows and columns, with the correlation q of neighbours in e.
   Alignment Result(const cv::Matx33d& warp) const {
     double squares = 0.0, weights = 0.0, along_rows = 0.0, along_columns = 0.0;
     for (int y = 1; y < patch_.rows - 1; ++y) {
@@ -151,7 +152,7 @@ class PatchAlignment {
   }
 
  private:
-  static constexpr float kOutside = -1e6F;  ///< grey beyond the image
+  static constexpr float kOutside = -1e6F;  ///< grey value that marks pixels outside the image
 
   bool IsUsable(int y, int x) const {
     return x > 0 && y > 0 && x < patch_.cols - 1 && y < patch_.rows - 1 &&
@@ -236,7 +237,7 @@ class PatchAlignment {
     return solution_.allFinite();
   }
 
-  /// Sets the spread to 1.4826 median |e|, with the light of the last solution.
+  /// Sets the spread to 1.4826 median |e|, with a and b of the last solution.
   void EstimateSpread() {
     errors_.clear();
     for (int y = 1; y < patch_.rows - 1; y += 2) {
@@ -272,17 +273,18 @@ class PatchAlignment {
   const cv::Mat& patch_;
   const cv::Mat& image_;
   int count_;
-  cv::Mat sampled_, right_, down_;  ///< image at the patch, and its gradient per patch pixel
-  Eigen::VectorXd solution_;        ///< a d, a, b
-  double spread_ = 1.0;             ///< standard deviation of e, grey
+  cv::Mat sampled_, right_, down_;  ///< image at the pixels of the patch; its gradient
+  Eigen::VectorXd solution_;        ///< a d, then a and b
+  double spread_ = 1.0;             ///< standard deviation of e, in grey levels
   Eigen::LDLT<Eigen::MatrixXd> solver_;
   std::vector<double> errors_;
 };
 
-/// Finds `patch` near its position by `warp` in `image`, both grey as float, to a fraction of a
-/// pixel. Brightness and contrast may change. If the alignment does not converge or the similarity
-/// is low, it is repeated from the alignment of the images at a quarter of their size, which
-/// converges from farther away. Returns nullopt if PatchAlignment::Run() fails in both.
+/// Finds `patch` in `image` to a fraction of a pixel, starting from `warp`. Both are grey as float.
+/// Brightness and contrast may change. If the alignment does not converge, or the similarity is
+/// low, patch and image are first aligned at a quarter of their size. This alignment converges from
+/// farther away; the full-size alignment is then repeated from its result. Returns nullopt if
+/// PatchAlignment::Run() fails for both starts.
 inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
                                       const cv::Matx33d& warp, Warp kind) {
   constexpr int kShrink = 4, kMinSide = 16;

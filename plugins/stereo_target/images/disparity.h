@@ -15,10 +15,10 @@ namespace alidade {
 /// Requirements for a disparity.
 struct DisparityOptions {
   double max_px;          ///< largest disparity of the search
-  double min_similarity;  ///< of the target in both images
-  double min_distinct;    ///< difference of the best and the next best correlation
-  double max_row_px;      ///< difference of the rows of the target in both images
-  double max_sigma_px;    ///< of the disparity
+  double min_similarity;  ///< minimum correlation of both images of the target
+  double min_distinct;    ///< minimum lead of the best over the next correlation
+  double max_row_px;      ///< maximum difference of the rows of the target
+  double max_sigma_px;    ///< maximum standard deviation of a disparity
 
   explicit DisparityOptions(Params& p)
       : max_px(p.NonNegative("disparity.max_px", "px",
@@ -42,10 +42,10 @@ struct Disparity {
   double value, variance;
 };
 
-/// Finds the target in `box` of the left image in the same rows of the right image. It correlates
-/// at each disparity, then aligns the target; the shear allows for a slanted target. `middle` is
-/// the point of the disparity. Returns nullopt without texture, without a match, with two matches,
-/// or if a part of the target is not visible.
+/// Finds the target, which is in `box` of the left image, in the same rows of the right image.
+/// Correlates both images at each disparity, then aligns the target. The alignment includes a
+/// shear, for a slanted target. The disparity is that of the point `middle`. Returns nullopt if the
+/// target has no texture, has no match or two matches, or is partly outside an image.
 inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat& right,
                                               const cv::Rect2d& box, cv::Point2d middle,
                                               const DisparityOptions& options) {
@@ -68,7 +68,7 @@ inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat
   cv::Point best_position;
   cv::minMaxLoc(scores, nullptr, &best, nullptr, &best_position);
   const auto score = [&](int x) { return double(scores.at<float>(0, x)); };
-  // The next best match is beyond the valleys on both sides of the best match.
+  // The next best match is searched for beyond the minima on both sides of the best match.
   int low = best_position.x, high = best_position.x;
   while (low > 0 && score(low - 1) < score(low)) --low;
   while (high + 1 < scores.cols && score(high + 1) < score(high)) ++high;

@@ -173,7 +173,7 @@ class ImageTarget : public Source {
     }
   }
 
-  /// Reads the next pair of images, from `start_frame` on.
+  /// Reads the next pair of images. Skips the pairs before `start_frame`.
   bool ReadPair() {
     do {
       if (!ReadOnePair()) return false;
@@ -194,12 +194,14 @@ class ImageTarget : public Source {
     }
     if (!right_) return true;
     if (!right_->Next(image_[1])) {
-      throw Error(ExitCode::kBadData, ErrorLine(right_->place(), {}, "the last right image",
-                                                "as many right images as left images"));
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(right_->place(), {}, "there is no right image after this one",
+                            "as many right images as left images"));
     }
     if (image_[0].size() != image_[1].size()) {
       throw Error(ExitCode::kBadData,
-                  ErrorLine(right_->place(), {}, "its size differs from that of the left image",
+                  ErrorLine(right_->place(), {},
+                            "the size of the right image differs from that of the left image",
                             "images of one size"));
     }
     return true;
@@ -208,14 +210,14 @@ class ImageTarget : public Source {
   void Measure(SourceFrame& frame) {
     std::optional<BoxRows::Corners> corners = std::exchange(target_corners_, std::nullopt);
     if (const auto row = boxes_ ? boxes_->At(left_->number()) : std::nullopt) {
-      if (!row->corners) return;  // marked as not visible
+      if (!row->corners) return;  // the table marks the target as not visible
       if (!corners) corners = row->corners;
     }
     if (corners && rectification_) {
       for (cv::Point2f& corner : *corners) corner = rectification_->Rectify(corner);
     }
     if (corners && !has_started_ && !IsInImage(*corners)) {
-      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not on this image",
+      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not inside this image",
                                                 "'target' or a row of 'boxes' inside the image"));
     }
     const auto tracked = tracker_->Track(image_[0], corners);
@@ -266,7 +268,7 @@ class ImageTarget : public Source {
   std::optional<BoxRows> boxes_;
   std::optional<ImageTimes> times_;
   std::optional<TruthRows> truth_;
-  std::optional<BoxRows::Corners> target_corners_;  ///< the config's `target`
+  std::optional<BoxRows::Corners> target_corners_;  ///< `target` of the config, until it is used
   std::optional<Rectification> rectification_;
   std::optional<TargetTracker> tracker_;
   cv::Mat image_[2];

@@ -10,20 +10,21 @@ namespace alidade {
 /// Creates a source that measures one target in the images of a stereo pair or of one camera.
 ///
 ///   stream          size  values       when
-///   disparity       1     d, px        both images show its texture: see FindDisparity()
+///   disparity       1     d, px        both images show the target: see FindDisparity()
 ///   inverse_scale   1     s            the target is tracked: see TargetTracker
 ///
 /// Each measurement has its own variance, unless `estimate_noise` is false:
 ///
 ///   of d            var(d) + sigma^2
-///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target in it
+///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target, px
 ///
-/// with sigma the config's sigma_systematic_px: errors of calibration, interpolation and the target
-/// itself that are not visible in the residuals. var() is the variance of the alignment. All errors
-/// of s since a template was recorded contain the error of that template, which no filter here
-/// models.
+/// sigma is sigma_systematic_px of the config. It covers errors of calibration, interpolation and
+/// the target itself that are not visible in the residuals. var() is the variance of the alignment.
+/// All values of s that are measured with one template share the error of this template. No filter
+/// here models this correlation.
 ///
-/// A target that is lost, hidden or black has no measurement; each image is searched for it.
+/// If the target is lost, hidden or black, there is no measurement. The target is then searched for
+/// in each image.
 ///
 /// Errors       those of ImageReader, TimestampRows, BoxRows, TruthRows, Rectification; kBadConfig.
 std::unique_ptr<Source> CreateImageTarget(const SourceArguments& arguments);

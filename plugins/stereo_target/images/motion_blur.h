@@ -9,13 +9,14 @@
 
 namespace alidade {
 
-/// Blur of a patch that moves at constant speed during the exposure: the mean along a segment,
+/// Blur of a patch that moves at constant velocity during the exposure. It is the mean along a
+/// segment,
 ///
 ///   blurred(x) = integral of patch(x + s L e) ds,   s in [-1/2, 1/2],   e = (cos angle, sin angle)
 ///
 /// with L = length * the longer side of the patch.
 struct MotionBlur {
-  double angle = 0.0;   ///< rad, from right to down in the patch
+  double angle = 0.0;   ///< rad; 0 is to the right, pi/2 down in the patch
   double length = 0.0;  ///< relative to the longer side of the patch; 0: sharp
 
   static constexpr double kMaxLength = 0.75;
@@ -34,14 +35,14 @@ struct MotionBlur {
     }
     return candidates;
   }
-  /// Returns this blur, and those with lengths halfway to the next candidates.
+  /// Returns this blur, and the blurs with lengths halfway to the next candidates.
   std::vector<MotionBlur> Neighbours() const {
     if (length == 0.0) return {*this};
     return {*this, {angle, length - 1.0 / 12.0}, {angle, length + 1.0 / 12.0}};
   }
 
-  /// Returns the blurred patch of `size` from the middle of `padded_patch`, float, which includes
-  /// Margin() around it.
+  /// Returns the blurred patch of `size`, float. `padded_patch` is the sharp patch with Margin() on
+  /// each side.
   cv::Mat Apply(const cv::Mat& padded_patch, cv::Size size) const {
     const cv::Rect inner((padded_patch.cols - size.width) / 2,
                          (padded_patch.rows - size.height) / 2, size.width, size.height);
@@ -53,9 +54,9 @@ struct MotionBlur {
     return blurred(inner).clone();
   }
 
-  /// Returns true if this blur fits a motion of the patch by `motion`, px of the patch, since the
-  /// previous image. The blur must be along the motion, and 0.4 to 1.4 times as long. It is shorter
-  /// for a short exposure, and longer if the motion accelerates.
+  /// Returns true if this blur fits the motion of the patch since the previous image: `motion`, px
+  /// of the patch. The blur must be along the motion, and 0.4 to 1.4 times as long as the motion. A
+  /// short exposure shortens the blur; an accelerating motion lengthens it.
   bool Explains(cv::Point2d motion, cv::Size size) const {
     constexpr double kMinAlignment = 0.8, kMinRatio = 0.4, kMaxRatio = 1.4;
     if (length == 0.0) return true;
@@ -67,8 +68,8 @@ struct MotionBlur {
   }
 
  private:
-  /// Returns the segment, drawn with weights that fall off linearly to the next pixels; its sum is
-  /// 1.
+  /// Returns the segment as a filter kernel with the sum 1. Each point of the segment is
+  /// distributed linearly over the nearest pixels.
   cv::Mat Kernel(double length_px) const {
     const int half = cvCeil(0.5 * length_px), side = 2 * half + 1, samples = 8 * side;
     cv::Mat kernel(side, side, CV_32F, cv::Scalar(0.0));

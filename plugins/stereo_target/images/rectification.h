@@ -15,8 +15,8 @@
 
 namespace alidade {
 
-/// Rectification of a calibrated pair: converts its images to those of two pinhole cameras side by
-/// side, whose rows agree (cv::stereoRectify).
+/// Rectification of a calibrated pair: converts the images of the pair to those of two pinhole
+/// cameras side by side (cv::stereoRectify). A point is then in the same row of both images.
 ///
 ///   entry of the file   shape       unit  meaning
 ///   M1, M2              3x3         px    camera matrix, left and right
@@ -76,22 +76,22 @@ class Rectification {
     size_ = size;
   }
 
-  /// Rectifies an image; `view` 0 is left, 1 is right.
+  /// Returns the rectified image. `view` is 0 for a left image, 1 for a right image.
   cv::Mat Rectify(const cv::Mat& image, int view) const {
     cv::Mat rectified;
     cv::remap(image, rectified, map_[view][0], map_[view][1], cv::INTER_LINEAR);
     return rectified;
   }
-  /// Returns the rectified pixel of a pixel of the original left image.
+  /// Returns the position in the rectified left image of a pixel of the original left image.
   cv::Point2f Rectify(cv::Point2f pixel) const {
     std::vector<cv::Point2f> rectified;
     cv::undistortPoints(std::vector<cv::Point2f>{pixel}, rectified, camera_.matrix,
                         camera_.distortion, camera_.rotation, camera_.projection);
     return rectified[0];
   }
-  /// Camera matrix of both rectified cameras.
+  /// Returns the camera matrix of both rectified cameras.
   const cv::Matx33d& intrinsics() const { return intrinsics_; }
-  /// Returns the calibration of the rectified pair, as Source::Calibration.
+  /// Returns the calibration of the rectified pair, in the form of Source::Calibration.
   Config Calibration(const std::string& origin) const {
     Config config = Config::FromText("calibration: {}", origin);
     const auto set = [&](const std::string& key, double value) {

@@ -11,12 +11,13 @@
 #include "motion_blur.h"
 #include "target_template.h"
 
-/// Search for a target that cannot be tracked: correlates its templates with the image at each
-/// position, both shrunk. Some position always correlates best, so the best one only counts if it
-/// is clearly better than all others.
+/// Search for a target that cannot be tracked. The templates of the target and the image are
+/// shrunk, and correlated at each position. Some position is always the best, so it only counts if
+/// its correlation is clearly larger than all others.
 namespace alidade {
 
-/// Target that was found: its outline in the size of a template there, and the blur that fits best.
+/// Target that was found: the outline of the template at the position of the match, and the blur
+/// that fits best.
 struct TargetMatch {
   Corners outline;
   MotionBlur blur;
@@ -25,11 +26,12 @@ struct TargetMatch {
 /// Maximum of the correlations.
 struct Peak {
   double score = -1.0;
-  double lead = 0.0;  ///< over positions at least half a template away
+  double lead = 0.0;  ///< over all positions half a template away or more
   cv::Point position;
 };
 
-/// Returns the peak of a template of `size` among the positions `allowed`, or all if it is empty.
+/// Returns the peak of `scores` for a template of `size`, among the positions `allowed`. If
+/// `allowed` is empty, all positions are allowed.
 inline Peak PeakOf(const cv::Mat& scores, cv::Size size, const cv::Mat& allowed = {}) {
   Peak peak;
   cv::minMaxLoc(scores, nullptr, &peak.score, nullptr, &peak.position, allowed);
@@ -44,9 +46,9 @@ inline Peak PeakOf(const cv::Mat& scores, cv::Size size, const cv::Mat& allowed 
 }
 
 constexpr double kMinLead = 0.1;
-constexpr double kMaxScore = 1.0 + 1e-3;  ///< a larger one is a rounding error of a uniform area
+constexpr double kMaxScore = 1.0 + 1e-3;  ///< larger scores are rounding errors in uniform areas
 
-/// Template, and the image about its expected position, both shrunk.
+/// Shrunk template, and the shrunk image about the expected position of the template.
 class LocalView {
  public:
   LocalView(const TargetTemplate& target_template, const cv::Mat& grey, const Corners& start)
@@ -67,8 +69,9 @@ class LocalView {
     cv::resize(template_.Blurred(blur), shrunk_template, small_, 0, 0, cv::INTER_AREA);
     return shrunk_template;
   }
-  /// Returns the search area if the target is `growth` times as large as at the start. The target
-  /// then has the size of ShrunkTemplate() in it, with the same margin on each side.
+  /// Returns the search area for a target that is `growth` times as large as at the start. In this
+  /// area the target has the size of ShrunkTemplate(). The area has a margin of this size on each
+  /// side.
   cv::Mat SearchArea(double growth) const {
     // From pixels of the shrunk patch to pixels of the patch, which grows about its middle.
     const double k = growth / shrink_, offset = 0.5 / shrink_ - 0.5;
@@ -81,7 +84,7 @@ class LocalView {
                         cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_CONSTANT, 128.0);
     return search_area;
   }
-  /// Returns the shift from the start for a position in SearchArea(), px of the patch.
+  /// Returns the shift, px of the patch, from the start to a position in SearchArea().
   cv::Point2d Shift(cv::Point position, double growth) const {
     return growth / shrink_ * (cv::Point2d(position) - cv::Point2d(small_.width, small_.height));
   }
@@ -90,8 +93,8 @@ class LocalView {
     return ApplyToCorners(to_image_ * cv::Matx33d(growth, 0, shift.x, 0, growth, shift.y, 0, 0, 1),
                           template_.corners());
   }
-  /// Returns the positions that a target with this blur can have reached from the outline
-  /// `previous`.
+  /// Returns the mask of the positions that a target with this blur can have reached from the
+  /// outline `previous`.
   cv::Mat AllowedPositions(const MotionBlur& blur, double growth, const Corners& previous) const {
     cv::Mat allowed(2 * small_.height + 1, 2 * small_.width + 1, CV_8U);
     const cv::Point2d start_offset = middle_ - Apply(to_image_.inv(), MiddleOf(previous));
@@ -114,10 +117,10 @@ class LocalView {
   cv::Mat smooth_;
 };
 
-/// Searches about `start`, by the size of the target to each side, for the target with about the
-/// same size and rotation, sharp or blurred. The blur must fit the motion from `previous`, the
-/// outline in the last image, because a blurred template has little texture and correlates with
-/// much.
+/// Searches for the target about `start`, up to the size of the target to each side. The target has
+/// about the same size and rotation, and is sharp or blurred. The blur must fit the motion from
+/// `previous`, the outline in the last image. Without this condition a blurred template, which has
+/// little texture, would match many areas.
 inline std::optional<TargetMatch> FindNearby(const std::vector<const TargetTemplate*>& templates,
                                              const cv::Mat& grey, const Corners& start,
                                              const Corners& previous) {
@@ -145,12 +148,12 @@ inline std::optional<TargetMatch> FindNearby(const std::vector<const TargetTempl
   return best.score >= kMinScore && best.lead >= kMinLead ? found : std::nullopt;
 }
 
-/// Searches the whole image for the target, upright, and half to twice as large as `last`.
+/// Searches the whole image for the upright target, at half to twice the size of `last`.
 inline std::optional<Corners> FindAnywhere(const std::vector<TargetTemplate>& templates,
                                            const cv::Mat& grey, const Corners& last,
                                            double min_score) {
   constexpr double kSide = 40.0, kGrowth = 2.0;         // px of the shrunk template
-  constexpr double kMinSide = 6.0, kMinVisible = 12.0;  // px, shrunk and in the image
+  constexpr double kMinSide = 6.0, kMinVisible = 12.0;  // px: shrunk; in the image
   std::optional<Corners> best;
   double best_score = min_score;
   for (const TargetTemplate& target_template : templates) {

@@ -11,12 +11,12 @@
 
 #include "alidade/io/number_rows.h"
 
-/// Tables next to the images of a target, which are read together with them.
+/// Readers of the tables next to the images of a target. These are read together with the images.
 namespace alidade {
 
-/// Boxes of the target: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the
-/// upper left, px. Frames count from 0 and increase. A row of `nan` marks the target as not
-/// visible. A header is optional.
+/// Reader of the boxes of the target: rows `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`,
+/// clockwise from the upper left, px. Frames count from 0 and increase. A row with `nan` values
+/// marks the target as not visible. A header is optional.
 class BoxRows {
  public:
   using Corners = std::array<cv::Point2f, 4>;
@@ -31,7 +31,8 @@ class BoxRows {
   struct Row {
     std::optional<Corners> corners;  ///< empty if the target is not visible
   };
-  /// Returns the row of `frame`, or nullopt without one. `frame` may not decrease between calls.
+  /// Returns the row of `frame`, or nullopt if the table has no such row. `frame` may not decrease
+  /// between calls.
   std::optional<Row> At(std::int64_t frame) {
     while (has_next_ && next_frame_ < frame) Advance();
     return has_next_ && next_frame_ == frame ? std::optional(Row{next_}) : std::nullopt;
@@ -96,8 +97,8 @@ class BoxRows {
   std::optional<Corners> next_;
 };
 
-/// True values under a header `t_s,NAME,...`. Each is a number, and times increase. An empty cell
-/// is an unknown value.
+/// Reader of true values under a header `t_s,NAME,...`. Each value is a number, and times increase.
+/// An empty cell marks an unknown value.
 class TruthRows {
  public:
   TruthRows(const std::filesystem::path& path, const Place& place, const std::string& key)
@@ -110,11 +111,11 @@ class TruthRows {
   }
 
   const std::vector<std::string>& names() const { return names_; }
-  /// Returns the values of the row nearest to `timestamp` if it is within `tolerance`. If two rows
-  /// are equally near, it uses the earlier one. An empty vector is an unknown value. `timestamp`
-  /// may not decrease between calls.
+  /// Returns the values of the row nearest to `timestamp`, if this row is within `tolerance`. If
+  /// two rows are equally near, the earlier one is used. An empty vector marks an unknown value.
+  /// `timestamp` may not decrease between calls.
   std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
-    // Floating-point numbers, because their difference does not overflow.
+    // The distance is a floating-point number, because a difference of integers could overflow.
     const auto distance = [timestamp](Timestamp candidate) {
       return 1e-9 * std::abs(static_cast<double>(timestamp) - static_cast<double>(candidate));
     };

@@ -15,7 +15,8 @@ namespace alidade {
 /// Quadrangle in an image or a patch, px, clockwise from the upper left.
 using Corners = std::array<cv::Point2f, 4>;
 
-/// Returns the warp from the unit square; its upper left corner is the first corner.
+/// Returns the warp from the unit square to `corners`. The upper left corner of the square becomes
+/// the first corner.
 inline cv::Matx33d FromUnit(const Corners& corners) {
   const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
   return cv::getPerspectiveTransform(unit.data(), corners.data());
@@ -41,8 +42,8 @@ inline cv::Point2f MiddleOf(const Corners& corners) {
 /// Appearance of a target in one image.
 class TargetTemplate {
  public:
-  /// `grey` is the image as float, `scale` the inverse scale in it, `variance` the relative
-  /// variance of `scale`.
+  /// `grey` is the image as float. `scale` is the inverse scale of the target in this image, and
+  /// `variance` is the relative variance of `scale`.
   TargetTemplate(const cv::Mat& grey, const Corners& outline, double scale, double variance)
       : scale_(scale), variance_(variance) {
     const double width =
@@ -59,20 +60,20 @@ class TargetTemplate {
     patch_ = Blurred({});
   }
 
-  const cv::Mat& patch() const { return patch_; }  ///< within the outline, grey as float
+  const cv::Mat& patch() const { return patch_; }  ///< image within the outline, grey as float
   cv::Mat Blurred(const MotionBlur& blur) const { return blur.Apply(padded_patch_, size_); }
-  /// Warp from the patch to the image from which it was taken.
+  /// Returns the warp from the patch to the image that contains the template.
   const cv::Matx33d& image_from_patch() const { return image_from_patch_; }
   double scale() const { return scale_; }        ///< inverse scale in that image
-  double variance() const { return variance_; }  ///< of scale, relative to its square
+  double variance() const { return variance_; }  ///< relative variance of scale
   Corners corners() const { return CornersOf(size_); }
   /// Returns the warp from the patch to an outline in an image.
   cv::Matx33d WarpTo(const Corners& outline) const {
     return cv::getPerspectiveTransform(corners().data(), outline.data());
   }
 
-  /// Returns the integral of |gradient|^2 / variance of the grey. It is smaller for a blurred
-  /// patch, and independent of light and size.
+  /// Returns the integral of |gradient|^2, divided by the variance of the grey values. Blur reduces
+  /// this number; light and size do not affect it.
   double Sharpness() const {
     cv::Mat right, down;
     cv::Sobel(patch_, right, CV_32F, 1, 0, 3, 0.125);

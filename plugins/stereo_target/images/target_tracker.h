@@ -22,9 +22,9 @@ namespace alidade {
 /// Options of the tracking of a target.
 struct TargetOptions {
   Warp warp;
-  double min_similarity;      ///< of the target and its template, for a measurement
-  double max_relative_sigma;  ///< relative sigma of the scale, for a measurement
-  double refresh_similarity;  ///< a lower one requires a new template
+  double min_similarity;      ///< minimum correlation of target and template
+  double max_relative_sigma;  ///< maximum relative sigma of the scale
+  double refresh_similarity;  ///< a lower correlation requires a new template
   double refresh_scale;       ///< a larger change of scale requires a new template
 
   explicit TargetOptions(Params& p)
@@ -49,37 +49,38 @@ struct TargetOptions {
                                {1.0, 1e3, true, false}, 1.7)) {}
 };
 
-/// Tracker of one target in the images of a camera, which measures its size.
+/// Tracker that measures the size of one target in the images of a camera.
 ///
-/// A grid of its points is tracked from the last image [Lucas1981], [Kalal2010], and a similarity
-/// is fitted to them. From there the target is aligned with a template, see Align(), so that errors
-/// do not accumulate from image to image. The first template is used as long as it fits well.
-/// Otherwise the tracker chooses, among it and templates recorded later, the template with the most
-/// precise size. Each template adds its own error.
+/// A grid of points of the target is tracked from the last image [Lucas1981], [Kalal2010], and a
+/// similarity is fitted to these points. Starting from the similarity, the target is aligned with a
+/// template, see Align(). Errors therefore do not accumulate from image to image. The first
+/// template is used as long as it fits well. Otherwise the tracker uses the template with the most
+/// precise size, among all that were recorded. Each template adds its own error.
 ///
-/// If no template fits, the target is searched for nearby, see FindNearby(), and aligned with the
-/// templates as the motion blurs them [Jin2005]. A blurred image determines the size less well,
-/// which is included in its variance; it provides neither a template nor a size for the next image.
-/// A target that is not found either is followed for some images. It is then lost, and the whole
-/// image is searched.
+/// If no template fits, the target is searched for nearby, see FindNearby(). It is then aligned
+/// with templates to which the blur of the motion was applied [Jin2005]. A blurred image determines
+/// the size less precisely, which its variance includes. It provides neither a template nor a size
+/// for the next image. If this search fails too, the target is only followed for some images. After
+/// that it is lost, and the whole image is searched.
 class TargetTracker {
  public:
   using Corners = alidade::Corners;
 
   /// Position and size of the target.
   struct TrackedTarget {
-    cv::Point2d middle;    ///< px, of the point that was the middle in the first image
+    cv::Point2d middle;    ///< px; the point that was the middle in the first image
     cv::Rect2d box;        ///< px, upright, around the whole target
-    double inverse_scale;  ///< size in the first image / size; for a plane depth / first depth
-    double variance;       ///< of inverse_scale
+    double inverse_scale;  ///< first size / size; for a plane, depth / first depth
+    double variance;       ///< variance of inverse_scale
   };
 
   /// `intrinsics` is the camera matrix, which a homography needs.
   TargetTracker(const TargetOptions& options, const std::optional<cv::Matx33d>& intrinsics)
       : options_(options), intrinsics_(intrinsics) {}
 
-  /// Measures the target in the next image. Returns nullopt if it cannot be measured. `corners` is
-  /// its known outline. The first image with `corners`, and texture inside, starts the tracking.
+  /// Measures the target in the next image. Returns nullopt if the target cannot be measured.
+  /// `corners` is the outline of the target, if it is known. Tracking starts with the first image
+  /// with known `corners` and texture inside them.
   std::optional<TrackedTarget> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
     std::optional<TrackedTarget> tracked;
     image.convertTo(grey_, CV_32F);
@@ -100,24 +101,24 @@ class TargetTracker {
     return tracked;
   }
 
-  /// Returns the outline in the last image, also if the target was followed but not measured, or
-  /// nullopt if it is lost.
+  /// Returns the outline in the last image, also if the target was followed but not measured.
+  /// Returns nullopt if the target is lost.
   std::optional<Corners> outline() const {
     if (is_lost_ || templates_.empty()) return std::nullopt;
     return outline_;
   }
 
  private:
-  static constexpr std::size_t kTemplates = 6;  ///< maximum number
-  static constexpr int kMaxUnmeasured = 10;     ///< images without a measurement
-  static constexpr double kBoxGrowth = 2.0;     ///< maximum change of the area of a given box
+  static constexpr std::size_t kTemplates = 6;  ///< maximum number of templates
+  static constexpr int kMaxUnmeasured = 10;     ///< images without a measurement before a loss
+  static constexpr double kBoxGrowth = 2.0;     ///< maximum factor of area, relative to a given box
 
   /// Target that was aligned with a template.
   struct Fit {
     TrackedTarget tracked;
     Corners outline;
-    std::size_t index;      ///< of the template
-    double max_similarity;  ///< of all templates
+    std::size_t index;      ///< index of the template
+    double max_similarity;  ///< largest similarity of all templates
     bool is_blurred;
 
     double relative_variance() const {
@@ -125,7 +126,7 @@ class TargetTracker {
     }
   };
 
-  /// Removes the rim, which mixes with the background of the target, and would bias the size.
+  /// Removes the rim of the target. The rim mixes with the background, which would bias the size.
   static Corners Inset(const Corners& corners) {
     constexpr float kRim = 0.04F;
     constexpr float kFarRim = 1.0F - kRim;
@@ -142,8 +143,9 @@ class TargetTracker {
     outline_ = outline;
   }
 
-  /// Measures the target from its followed position or, if it cannot be followed, from the last
-  /// one. The target is lost if it is neither there nor nearby.
+  /// Measures the target, starting from the position to which it was followed. If it cannot be
+  /// followed, starts from the last position. The target is lost if it is neither found nor
+  /// followed, or after kMaxUnmeasured images without a measurement.
   std::optional<TrackedTarget> FollowAndMeasure(const cv::Mat& image) {
     constexpr double kGrowth = 1.2, kNearbyGrowth = 1.5;
     const std::optional<Corners> followed = Follow(image);
@@ -161,7 +163,8 @@ class TargetTracker {
     return Accept(fit);
   }
 
-  /// Searches the whole image. A match must correlate more than at the expected position.
+  /// Searches the whole image. A match must have a higher similarity than one at an expected
+  /// position.
   std::optional<TrackedTarget> SearchAndMeasure() {
     const auto guess = FindAnywhere(templates_, grey_, outline_, options_.min_similarity);
     if (!guess) return std::nullopt;
@@ -170,8 +173,8 @@ class TargetTracker {
     return Accept(fit);
   }
 
-  /// Measures the target from `guess`, with the template that has the most precise size, or with
-  /// the first template if it fits well. The area changes at most by the factor `growth`.
+  /// Measures the target, starting from `guess`. Uses the first template if it fits well, else the
+  /// template with the most precise size. The area may change by at most the factor `growth`.
   std::optional<Fit> Measure(const Corners& guess, double min_similarity, double growth,
                              const MotionBlur& blur = {}) const {
     std::optional<Fit> best;
@@ -195,7 +198,8 @@ class TargetTracker {
     return best;
   }
 
-  /// Aligns with this blur or one of about its length, whichever is most similar.
+  /// Aligns the template with this blur and with blurs of similar lengths. Returns the alignment
+  /// with the highest similarity.
   std::optional<Alignment> AlignBlurred(const TargetTemplate& target_template,
                                         const cv::Matx33d& start, const MotionBlur& blur) const {
     std::optional<Alignment> best;
@@ -207,7 +211,8 @@ class TargetTracker {
     return best;
   }
 
-  /// Continues the tracking from a fit. Only the position of a blurred target is used.
+  /// Continues the tracking from a fit. If the target is blurred, only the position of the fit is
+  /// used.
   std::optional<TrackedTarget> Accept(const std::optional<Fit>& fit) {
     if (!fit) return std::nullopt;
     if (fit->is_blurred) {
@@ -237,12 +242,13 @@ class TargetTracker {
             total_scale * total_scale * relative};
   }
 
-  /// Returns the size of the target when the template was recorded / its size under `warp`. For a
-  /// plane under a homography it is the depth Z of its middle x under `warp` / its depth Z0 then:
+  /// Returns the quotient of two sizes of the target: in the image of the template, and under
+  /// `warp`. For a plane under a homography, returns Z / Z0. Z0 is the depth of the middle x in the
+  /// image of the template, Z is the depth under `warp`:
   ///
   ///   H = s (R + t n' / d) maps x, with third element 1, to s Z / Z0 times its image
   ///
-  /// with the middle singular value s of H [Ma2004].
+  /// s is the middle singular value of H [Ma2004].
   double InverseScale(const TargetTemplate& target_template, const cv::Matx33d& warp) const {
     const cv::Point2d middle = Middle(target_template.patch());
     if (options_.warp != Warp::kHomography) {
@@ -259,7 +265,7 @@ class TargetTracker {
   }
 
   /// Records a new template if no template has fitted well for some images, or if the target is
-  /// much larger or smaller than in the current template. A blurred template is not used.
+  /// much larger or smaller than in the current template. Does not record a blurred target.
   void Refresh(const Fit& fit) {
     constexpr int kMisfits = 3;
     constexpr double kSharp = 0.4;
@@ -270,15 +276,15 @@ class TargetTracker {
     if (!other_size && misfits_ < kMisfits) return;
     const cv::Rect2d image_area(0.0, 0.0, grey_.cols, grey_.rows);
     if ((fit.tracked.box & image_area).area() < fit.tracked.box.area())
-      return;  // a part is not visible
+      return;  // a part of the target is outside the image
     TargetTemplate new_template(grey_, fit.outline, fit.tracked.inverse_scale,
                                 fit.relative_variance());
     if (new_template.Sharpness() < kSharp * current.Sharpness()) return;
     AddTemplate(std::move(new_template), fit.outline);
   }
 
-  /// Returns true if the outline is not inverted, about as large as guessed, and its middle is in
-  /// the image.
+  /// Returns true if the outline is plausible: not inverted, about as large as `guess`, and with
+  /// its middle in the image.
   static bool IsSane(const Corners& outline, const Corners& guess, double growth, cv::Size size) {
     const double area_ratio = AreaOf(outline) / AreaOf(guess);
     const std::vector<cv::Point2f> polygon(outline.begin(), outline.end());
@@ -288,9 +294,9 @@ class TargetTracker {
            cv::Rect2f({0.0F, 0.0F}, cv::Size2f(size)).contains(middle);
   }
 
-  /// Follows a grid of points from the last image. It uses the better half of them, by the error
-  /// when they are followed back [Kalal2010], and the similarity with the most inliers. Returns
-  /// nullopt if too few agree.
+  /// Follows a grid of points from the last image and back. Uses the half of the points with the
+  /// smaller errors of return [Kalal2010], and the similarity with the most inliers. Returns
+  /// nullopt if too few points agree with the similarity.
   std::optional<Corners> Follow(const cv::Mat& image) const {
     constexpr int kGrid = 12, kMinPoints = 8, kWindow = 15, kLevels = 4;
     constexpr double kMaxReturnError = 2.0, kMaxResidual = 1.5;  // px
@@ -336,11 +342,11 @@ class TargetTracker {
   TargetOptions options_;
   std::optional<cv::Matx33d> intrinsics_;
   std::vector<TargetTemplate> templates_;
-  std::size_t last_ = 0;  ///< template that fitted the last image
-  int misfits_ = 0;       ///< images in which no template fitted well
+  std::size_t last_ = 0;  ///< index of the template that fitted last
+  int misfits_ = 0;       ///< successive images in which no template fitted well
   int unmeasured_ = 0;    ///< images since the last measurement
   bool is_lost_ = false;
-  Corners outline_{};   ///< of the target
+  Corners outline_{};   ///< outline of the target in the last image
   cv::Mat grey_;        ///< current image, as float
   cv::Mat last_image_;  ///< the last image
 };

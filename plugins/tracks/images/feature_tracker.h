@@ -18,7 +18,7 @@
 
 namespace alidade {
 
-/// Position at which a filter expects a feature in an image: a Gaussian, px.
+/// Position at which a filter expects a feature in an image: a Gaussian with the covariance s.
 struct ExpectedPoint {
   cv::Point2f position;
   cv::Matx22d s;  ///< px^2
@@ -34,12 +34,12 @@ struct ExpectedPoint {
   }
 };
 
-/// Tracker of corners from image to image. It finds new corners [Shi1994] if a cell of the grid has
-/// fewer than its share. Each feature is aligned with its patch at the first detection
-/// (FoundPatch), starting from
+/// Tracker of corners from image to image. It finds new corners [Shi1994] in grid cells that
+/// contain fewer than their share of all features. Each feature is aligned with its patch at the
+/// first detection (FoundPatch), starting from
 ///
-///   its expected position  if its ellipse is small and it is found there [Davison2007]
-///   optical flow           else (PyramidFlow), started at its expected or last position
+///   its expected position  if its 3.7-sigma ellipse is small, and it is found there [Davison2007]
+///   optical flow           otherwise (PyramidFlow), started at its expected or last position
 ///
 /// A feature is lost in these cases:
 ///   - Its patch leaves the image, or no longer looks as it did at the first detection.
@@ -47,36 +47,38 @@ struct ExpectedPoint {
 ///   - Its ellipse is not small, and tracking backward does not return to its last position
 ///     [Kalal2010].
 ///   - It is outside its ellipse. This case is ignored if it applies to more than half of the
-///     features that were found, because then the filter is wrong.
+///     expected features that were found, because the filter is then wrong.
 /// If less than a quarter of the features is found, all expectations are ignored. If more than
-/// three quarters are lost at once, all are lost. A feature keeps its id as long as it is tracked,
-/// and ids are not reused.
+/// three quarters of the features are lost at once, all features are lost. A feature keeps its id
+/// as long as it is tracked. Ids are not reused.
 ///
-/// If features are missing, each image is searched for corners in as many rows of cells as they
-/// fill.
+/// If features are missing, each image is searched for new corners, in as many rows of cells as the
+/// missing features fill.
 class FeatureTracker {
  public:
   struct Feature {
     std::int64_t id;
     cv::Point2f position;  ///< px; the centre of the upper left pixel is (0, 0)
-    FoundPatch patch;      ///< patch about it
+    FoundPatch patch;      ///< patch about the position
   };
-  /// Expected position of each feature, in their order, if it is known. Empty if none is known.
+  /// Expected positions in the order of the features; nullopt for a feature without an expectation.
+  /// The list is empty if no feature has one.
   using Expectations = std::vector<std::optional<ExpectedPoint>>;
 
   explicit FeatureTracker(const TrackerOptions& options)
       : options_(options), flow_(options.window_px, options.levels), finder_(options) {}
 
-  /// Adds points that are tracked from the next image on, besides corners. They get the first ids.
+  /// Adds points that are tracked from the next image on, besides corners. The points get the first
+  /// ids.
   void Add(const std::vector<cv::Point2f>& points) { added_points_ = points; }
-  /// Minimum distance of a tracked point from the rim of an image, px.
+  /// Returns the minimum distance of a tracked point from the rim of an image, px.
   int margin() const { return options_.margin(); }
   int window_px() const { return options_.window_px; }
-  /// Features of the last image, by id.
+  /// Returns the features of the last image, ordered by id.
   const std::vector<Feature>& features() const { return features_; }
 
-  /// Tracks the features in the next image, and returns them by id. All images have the same size,
-  /// 8 bit grey.
+  /// Tracks the features in the next image, and returns them ordered by id. All images are 8-bit
+  /// grey and have the same size.
   const std::vector<Feature>& Track(const cv::Mat& image, const Expectations& expected = {}) {
     flow_.SetNextImage(image);
     if (!features_.empty()) TrackFeatures(image, expected);
@@ -105,7 +107,7 @@ class FeatureTracker {
     RemoveLost(image.size());
   }
 
-  /// Returns true if feature i is expected within a small ellipse.
+  /// Returns true if feature i has an expected position with a small ellipse.
   bool HasSmallEllipse(std::size_t i) const {
     return expected_[i] && 4.0 * kMaxSigmas * expected_[i]->LargestSigma() <= options_.window_px;
   }
@@ -114,7 +116,7 @@ class FeatureTracker {
     return feature.patch.Align(image, static_cast<float>(options_.least_similarity), position);
   }
 
-  /// Tracks the features that are not found yet by optical flow.
+  /// Tracks by optical flow the features that have not been found yet.
   void TrackByFlow(const cv::Mat& image) {
     remaining_.clear();
     flow_start_.clear();
@@ -188,12 +190,12 @@ class FeatureTracker {
       feature.position = position;
       std::swap(features_[kept_count++], feature);
     }
-    // In an unrelated image, some features are found at similar patches.
+    // In an unrelated image a few features are still found, at patches that look similar.
     if (4 * kept_count < features_.size()) kept_count = 0;
     features_.resize(kept_count);
   }
 
-  /// Adds the strongest corners of each cell that has fewer features than its share.
+  /// Adds the strongest corners of each cell that contains fewer features than its share.
   void Refill(const cv::Mat& image) {
     is_occupied_.create(image.size(), CV_8UC1);
     is_occupied_.setTo(0);
@@ -230,7 +232,7 @@ class FeatureTracker {
     }
   }
 
-  /// Size of an ellipse that contains all but a thousandth of a Gaussian: chi2(2) = 13.8.
+  /// Size, in sigmas, of an ellipse that contains 99.9 % of a Gaussian: chi2(2) = 13.8.
   static constexpr double kMaxSigmas = 3.717;
 
   TrackerOptions options_;
@@ -242,7 +244,7 @@ class FeatureTracker {
 
   // Buffers.
   Expectations expected_;
-  std::vector<cv::Point2f> positions_;  ///< of each feature; valid if is_found_
+  std::vector<cv::Point2f> positions_;  ///< position of each feature; valid if is_found_
   std::vector<unsigned char> is_found_;
   std::vector<std::size_t> remaining_;
   std::vector<cv::Point2f> flow_start_, flow_end_, flow_return_;

@@ -12,16 +12,16 @@
 
 namespace alidade {
 
-/// Patch about a feature at its first detection. The feature is aligned with it in each image, so
-/// that errors do not accumulate from image to image. Everything that does not depend on the image
-/// is prepared once: the inverse compositional algorithm [Baker2004],
+/// Patch about a feature at its first detection. In each image the feature is aligned with this
+/// patch. Errors therefore do not accumulate from image to image. The inverse compositional
+/// algorithm [Baker2004] computes only once all that does not depend on the image:
 ///
 ///   e(x) = a sampled(A x + t) + b - patch(x),   d = (J' J)^-1 J' e,   (A, t) <- (A, t) (I + D)^-1
 ///
-/// with x relative to the middle of the patch, in units of half its side. J is the derivative of
-/// the patch with respect to the six numbers of D, without the part that a change of light
-/// explains. a and b give `sampled` the mean and the variance of the patch. J is orthogonal to 1
-/// and to the patch, so J' e = a J' sampled.
+/// x is relative to the middle of the patch, in units of half its side. J is the derivative of the
+/// patch with respect to the six numbers of D, without the part that a change of light explains.
+/// With a and b, `sampled` gets the mean and the variance of the patch. J is orthogonal to 1 and to
+/// the patch. Therefore J' e = a J' sampled.
 class FoundPatch {
  public:
   FoundPatch() = default;
@@ -53,7 +53,7 @@ class FoundPatch {
     jacobian_.rowwise() -= jacobian_.colwise().mean().eval();
     jacobian_ -= unit * (unit.transpose() * jacobian_).eval();
     const Matrix6 normal = jacobian_.transpose() * jacobian_;
-    // If the texture does not determine a change, such as the rotation of a disc, the change is 0.
+    // Keeps a change near 0 if the texture does not determine it, such as the rotation of a disc.
     constexpr float kWeak = 1e-3F;
     const Matrix6 damped = normal + kWeak * normal.trace() / 6.0F * Matrix6::Identity();
     inverse_ = damped.ldlt().solve(Matrix6::Identity());
@@ -64,8 +64,8 @@ class FoundPatch {
   }
 
   /// Moves `position`, px, to the position of the patch in `image`, 8 bit grey, and stores the
-  /// shape of the patch there. Returns false without a change if the alignment does not converge,
-  /// leaves the image, or has a correlation below `least_similarity`.
+  /// shape of the patch in this image. If the alignment does not converge, leaves the image, or has
+  /// a correlation below `least_similarity`, returns false and changes nothing.
   bool Align(const cv::Mat& image, float least_similarity, cv::Point2f& position) {
     constexpr int kMaxIterations = 15;
     constexpr float kSettled = 4e-3F;  // px; each step is at most a tenth of the previous one
@@ -91,17 +91,18 @@ class FoundPatch {
     return false;
   }
 
-  /// Returns the correlation with the image after the last alignment, in [-1, 1].
+  /// Returns the correlation of the patch with the image after the last alignment, in [-1, 1].
   float Similarity() const { return gain_ * sampled_.dot(patch_) / (length_ * length_); }
 
-  /// Returns the covariance of the position of the last alignment, px^2, from the residuals e. They
-  /// move the position by t = sum k e. Nearby residuals are correlated, so
+  /// Returns the covariance of the position after the last alignment, px^2. It follows from the
+  /// residuals e, which move the position by t = sum k e. Nearby residuals are correlated.
+  /// Therefore
   ///
   ///   C = A (sum over cells of (sum k e) (sum k e)') A',   k = [(J' J)^-1 J']_t
   ///
-  /// with cells of a fifth of the side: consistent for any correlation of e within a cell
-  /// [Liang1986]. A patch across a depth edge, whose parts move separately, has a large covariance.
-  /// The covariance is zero before the first alignment.
+  /// The side of a cell is a fifth of that of the patch. C is consistent for any correlation of e
+  /// within a cell [Liang1986]. A patch across a depth edge, whose parts move separately, has a
+  /// large covariance. The covariance is zero before the first alignment.
   Eigen::Matrix2f Covariance() const {
     constexpr int kCells = 5;
     Eigen::Matrix2f sum = Eigen::Matrix2f::Zero();
@@ -127,10 +128,10 @@ class FoundPatch {
   using Matrix6 = Eigen::Matrix<float, 6, 6>;
   using Vector6 = Eigen::Matrix<float, 6, 1>;
 
-  /// Samples the image at `centre` into `sampled_`, and sets `gain_`, which scales it to the
-  /// variance of the patch. Returns false outside the image.
+  /// Samples the image about `centre` into `sampled_`. Sets `gain_`, which scales `sampled_` to the
+  /// variance of the patch. Returns false if a part of the patch is outside the image.
   bool Sample(const cv::Mat& image, const Eigen::Matrix2f& shape, const Eigen::Vector2f& centre) {
-    // Rounding can move the rim slightly outwards.
+    // The margin of 0.01 px allows for rounding, which can move the rim slightly outwards.
     const Eigen::Vector2f reach = shape.cwiseAbs().rowwise().sum().array() + 0.01F;
     if (!(centre[0] - reach[0] >= 0.0F && centre[1] - reach[1] >= 0.0F &&
           centre[0] + reach[0] < static_cast<float>(image.cols - 1) &&
@@ -151,12 +152,13 @@ class FoundPatch {
     return true;
   }
 
-  /// Samples a row by bilinear interpolation. Loops that the compiler can vectorise are separate.
+  /// Samples a row by bilinear interpolation. The work is split into loops, so that the compiler
+  /// can vectorise those without memory access by index.
   void SampleRow(const cv::Mat& image, Eigen::Vector2f start, Eigen::Vector2f step,
                  float* destination) const {
     float right[kMaxSide], down[kMaxSide];
     int offset[kMaxSide];
-    std::uint16_t upper[kMaxSide], lower[kMaxSide];  // two pixels each
+    std::uint16_t upper[kMaxSide], lower[kMaxSide];  // two neighbouring pixels in each number
     const auto stride = static_cast<int>(image.step[0]);
     for (int x = 0; x < side_; ++x) {
       const float u = start[0] + static_cast<float>(x) * step[0];
@@ -185,16 +187,15 @@ class FoundPatch {
 
   static constexpr int kMaxSide = 101;
   int side_ = 0;
-  Eigen::VectorXf patch_;  ///< with mean 0
-  float length_ = 0.0F;    ///< of patch_
+  Eigen::VectorXf patch_;  ///< grey values minus their mean
+  float length_ = 0.0F;    ///< length of patch_
   Eigen::Matrix<float, Eigen::Dynamic, 6> jacobian_;
-  Matrix6 inverse_ = Matrix6::Zero();                  ///< of J' J
+  Matrix6 inverse_ = Matrix6::Zero();                  ///< inverse of J' J
   Eigen::Matrix<float, Eigen::Dynamic, 2> influence_;  ///< k
-  Eigen::Matrix2f shape_ =
-      Eigen::Matrix2f::Zero();  ///< from units of half the side to px of the image
-  Eigen::VectorXf sampled_;     ///< in the last image
-  float gain_ = 0.0F;           ///< a
-  float mean_ = 0.0F;           ///< of sampled_
+  Eigen::Matrix2f shape_ = Eigen::Matrix2f::Zero();    ///< A: from units of half the side to px
+  Eigen::VectorXf sampled_;  ///< image values at the patch, from the last alignment
+  float gain_ = 0.0F;        ///< a
+  float mean_ = 0.0F;        ///< mean of sampled_
 };
 
 }  // namespace alidade

@@ -70,7 +70,7 @@ class ImageTracks : public Source {
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
     if (images_->size() <= 0)
-      return max_frames_ > 0 ? max_frames_ : -1;  // a camera, or a video without a size
+      return max_frames_ > 0 ? max_frames_ : -1;  // number unknown: a camera, or a video without it
     const std::int64_t remaining = start_.Remaining(images_->size());
     return max_frames_ > 0 ? std::min(max_frames_, remaining) : remaining;
   }
@@ -120,22 +120,23 @@ class ImageTracks : public Source {
   }
 
  private:
-  /// Half the interval between two of TUM's poses, 100 per second.
+  /// Half the interval between two poses of the TUM data sets, which have 100 poses per second.
   static constexpr Timestamp kTumTolerance = 5'000'000;
 
-  /// Checks that the first image has the size of the camera, and room for a feature.
+  /// Checks that the first image has the size that the camera requires, and is large enough for a
+  /// feature.
   void CheckSize() const {
     camera_.Check(image_.size(), place());
     const int min_side = 2 * tracker_.margin() + 1;
     if (std::min(image_.cols, image_.rows) >= min_side) return;
     throw Error(ExitCode::kBadData,
                 ErrorLine(place(), {},
-                          SizeText(image_.size()) + ", smaller than the tracked patch, " +
-                              std::to_string(tracker_.window_px()) + " px, and its rim",
+                          SizeText(image_.size()) + ", smaller than a tracked patch of " +
+                              std::to_string(tracker_.window_px()) + " px with its rim",
                           std::to_string(min_side) + " px or more, or a smaller source.window_px"));
   }
 
-  /// Returns the position at which the guiding filter expects each feature.
+  /// Returns the positions at which the filter `guide` expects the features.
   FeatureTracker::Expectations ExpectedAt(Timestamp timestamp) const {
     if (guide_ == nullptr) return {};
     std::vector<std::int64_t> ids;
@@ -154,7 +155,7 @@ class ImageTracks : public Source {
   std::vector<double> CovarianceOf(const FeatureTracker::Feature& feature) const {
     const double systematic = systematic_px_ * systematic_px_;
     const Eigen::Matrix2d c = feature.patch.Covariance().cast<double>();
-    const double cross = 0.5 * (c(0, 1) + c(1, 0));  // the two differ by rounding
+    const double cross = 0.5 * (c(0, 1) + c(1, 0));  // c(0, 1) and c(1, 0) differ by rounding
     return {c(0, 0) + systematic, cross, cross, c(1, 1) + systematic};
   }
 
@@ -164,7 +165,7 @@ class ImageTracks : public Source {
     int line;
   };
 
-  /// Reads the table `u,v,depth_m` of points. A header is optional.
+  /// Reads the table of known points, `u,v,depth_m`. A header is optional.
   void ReadKnown(const std::filesystem::path& file, const Node& key) {
     NumberRows rows(file, key.place(), key.path());
     known_file_ = rows.name();
@@ -205,7 +206,7 @@ class ImageTracks : public Source {
     const std::filesystem::path path = folder / key.Text();
     images_.emplace(path, names, key);
     const std::filesystem::path image_folder = images_->is_video() ? path.parent_path() : path;
-    // Layouts of data sets have these files in the parent folder of the images.
+    // In the layouts of data sets, these files are in the parent folder of the folder of images.
     std::error_code ignored;
     const std::filesystem::path parent_folder =
         images_->is_video()

@@ -8,27 +8,27 @@
 
 namespace alidade {
 
-/// Optical flow of points from one image to the next, by pyramids of patches [Lucas1981], to a
-/// fraction of a pixel. The pyramid of an image is built once, when it is first needed.
+/// Optical flow of points from one image to the next [Lucas1981], to a fraction of a pixel. It uses
+/// pyramids of the images. The pyramid of an image is built once, when it is first used.
 class PyramidFlow {
  public:
   /// `window_px` is the side of a patch, `levels` the number of levels above the image itself.
   PyramidFlow(int window_px, int levels) : window_(window_px, window_px), levels_(levels) {}
 
-  /// Sets the next image, 8 bit grey. The previous next image becomes the last image.
+  /// Sets the next image, 8-bit grey. The image that was set before becomes the last image.
   void SetNextImage(const cv::Mat& image) {
     std::swap(last_, next_);
     image.copyTo(next_.image);
     next_.is_built = false;
   }
 
-  /// Moves the points `end` from their expected to their approximate positions in the next image.
-  /// `start` are the same points in the last image. It uses only the levels above the image itself
-  /// if there are any. `found` is 0 for lost points.
+  /// Finds the approximate positions in the next image of the points `start` of the last image.
+  /// `end` contains the expected positions, and receives the results. The image itself is only used
+  /// if its pyramid has no levels above it. `found` is 0 for points that are not found.
   void TrackForward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
                     std::vector<unsigned char>& found) {
     const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);
-    const int skipped = last.size() > 1 ? 1 : 0;  // a small image has no levels above it
+    const int skipped = last.size() > 1 ? 1 : 0;  // a small image has no level above it
     const float scale = skipped > 0 ? 0.5F : 1.0F;
     scaled_start_.clear();
     for (const cv::Point2f& point : start) scaled_start_.push_back(scale * point);
@@ -40,8 +40,9 @@ class PyramidFlow {
     for (cv::Point2f& point : end) point /= scale;
   }
 
-  /// Moves `end`, points of the last image, to the positions there of the points `start` of the
-  /// next image. The expected positions must be near, because no pyramid is used.
+  /// Finds the positions in the last image of the points `start` of the next image. `end` contains
+  /// the expected positions, and receives the results. The expected positions must be close,
+  /// because no pyramid is used.
   void TrackBackward(const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end,
                      std::vector<unsigned char>& found) {
     cv::calcOpticalFlowPyrLK(Build(next_), Build(last_), start, end, found, error_, window_, 0,
@@ -55,8 +56,8 @@ class PyramidFlow {
     bool is_built = false;
   };
 
-  /// Builds the pyramid without derivatives: reading them from memory takes longer than computing
-  /// them.
+  /// Builds the pyramid without derivatives, because it takes longer to read them from memory than
+  /// to compute them.
   const std::vector<cv::Mat>& Build(Pyramid& pyramid) {
     if (!pyramid.is_built) {
       cv::buildOpticalFlowPyramid(pyramid.image, pyramid.levels, window_, levels_, false);

@@ -15,11 +15,11 @@ struct TrackerOptions {
   double quality;              ///< minimum response of a corner, relative to the strongest one
   int corner_px;               ///< side of the patch for the response of a corner
   int window_px;               ///< side of the tracked patch
-  int levels;                  ///< of the pyramid, above the image itself
+  int levels;                  ///< levels of the pyramid, without the image itself
   double forward_backward_px;  ///< maximum error of tracking forward and backward
   double least_similarity;     ///< minimum correlation with the patch of the first detection
 
-  /// Minimum distance of a tracked point from the rim of an image, px.
+  /// Returns the minimum distance of a tracked point from the rim of an image, px.
   int margin() const { return window_px / 2 + 1; }
 
   explicit TrackerOptions(Params& p)

@@ -98,7 +98,7 @@ TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
     EXPECT_NEAR(frames[1].truth[1][i], turned[i], 1e-15);
   }
   ExpectError(ExitCode::kBadData,
-              "DIR/tracks.csv:3: frame 0 has no true pose, but its camera is the world; "
+              "DIR/tracks.csv:3: frame 0 has no true pose, but its camera defines the world; "
               "expected a true pose within truth_tolerance_s, or world: file",
               [&] { Frames("rate_hz: 10, world: first_camera"); });
 }

@@ -68,7 +68,7 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   for (const char* words :
        {"added 'full_information'", "RMSD target.depth [mm]",
         "Online: estimates that use only past data", "Smoothed: estimates that also use later data",
-        "At the end, when all have the same data",
+        "At the end, when all estimators have the same data",
         "linearisation, ekf compared with full_information", "smoothing, ekf compared with rts",
         "rejected measurements, batch_accepted compared with batch",
         "of 227 measurements were not used", "rmse target.depth [mm]", "CPU time [us/frame]",
@@ -307,7 +307,8 @@ TEST_F(CompareCli, TellsOfRejectionRecovery) {
   for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
   Write("table.csv", text);
   const std::string words =
-      "'ekf' recovered from rejections: its step to a batch or smoother includes the cost";
+      "'ekf' recovered from rejections: the steps to a batch or smoother include the cost of the "
+      "recovery";
   const Outcome compared =
       Call({"compare", "table.yaml", "-o", "out", "--set",
             "estimators.ekf={type: ekf, gate: 0.99, rejection_recovery: {after: 2}}"});
@@ -428,7 +429,8 @@ TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
       Call({"compare", "config.yaml", "--runs", "5", "--first-seed", "11", "--jobs", "1",
             "--budget", "0.01", "--set", "source.duration_s=2", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
-  const std::string words = "the budget of 0.01 s sufficed for 1 of 5 runs; not run: seeds from 12";
+  const std::string words =
+      "the budget of 0.01 s sufficed for 1 of 5 runs; not run: seed 12 and later seeds";
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   const Config json = Json("out/compare.json");
   EXPECT_EQ(json.root().At("runs").Number(), 1);

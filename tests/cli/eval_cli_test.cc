@@ -160,7 +160,8 @@ TEST_F(EvalCli, SwappedFilesAreToldOf) {
   const Outcome swapped = Call({"eval", "mono.tum", "truth.tum", "-as"});
   EXPECT_EQ(swapped.code, 0);
   EXPECT_EQ(swapped.err,
-            "warning: truth.tum: is named like ground truth, but is compared with mono.tum; "
+            "warning: truth.tum: is named like ground truth, but is used as the estimate; the "
+            "reference is mono.tum; "
             "expected REF first, then EST\n");
 }
 
@@ -245,7 +246,8 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   json.emplace_back("--json");
   const Outcome table = Call(markdown);
   EXPECT_EQ(table.code, 65);
-  EXPECT_EQ(table.err, "error: two.tum: 2 poses to align; expected 3 or more\n");
+  EXPECT_EQ(table.err,
+            "error: two.tum: 2 poses are too few for an alignment; expected 3 or more\n");
   EXPECT_TRUE(Contains(table.out, "| two | failed | - | - | - | - | - | - | - |\n")) << table.out;
   EXPECT_TRUE(Contains(table.out, "| mono | se3 | 1.000000 | 31 of 31 |")) << table.out;
   EXPECT_TRUE(
@@ -258,7 +260,7 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   const Node evaluations = parsed.root().At("evaluations");
   EXPECT_EQ(evaluations.Items()[0].At("estimate").Text(), "two");
   EXPECT_EQ(evaluations.Items()[0].At("error").Text(),
-            "two.tum: 2 poses to align; expected 3 or more");
+            "two.tum: 2 poses are too few for an alignment; expected 3 or more");
   EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
   EXPECT_FALSE(evaluations.Items()[1].Find("error"));
   // If the only estimate cannot be evaluated, the program prints no table.

@@ -125,10 +125,9 @@ TEST(CompareRuns, TellsOfRejectionRecoveryOfTheFilter) {
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
   run.estimators[0].had_rejection_recovery = true;
-  EXPECT_EQ(
-      CompareRuns({run}, {}).notes,
-      std::vector<std::string>{"'ekf' recovered from rejections: its step to a batch or smoother "
-                               "includes the cost"});
+  EXPECT_EQ(CompareRuns({run}, {}).notes,
+            std::vector<std::string>{"'ekf' recovered from rejections: the steps to a batch or "
+                                     "smoother include the cost of the recovery"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {

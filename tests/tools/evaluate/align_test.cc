@@ -104,9 +104,10 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
         FAIL() << off;
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ExitCode::kBadData);
-        EXPECT_STREQ(error.what(),
-                     "curve.tum: no scale: its positions are not correlated with those of "
-                     "curve.tum; expected poses of the same trajectory, or --align");
+        EXPECT_STREQ(
+            error.what(),
+            "curve.tum: the scale is undetermined: the positions are not correlated with those of "
+            "curve.tum; expected poses of the same trajectory, or --align");
       }
     }
     const Evaluation e = Evaluate(reference, estimate, {});
@@ -164,9 +165,9 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
     EXPECT_STREQ(
         error.what(),
-        "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
-        "compared with 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
-        "is added to the estimate's timestamps, or --t-max-diff");
+        "curve.tum: no pose is within 0.001 s of a pose of curve.tum: 0.000000 s to 2.000000 s "
+        "compared with 10.000000 s to 13.000000 s; expected timestamps of the same clock; or "
+        "--t-offset, which is added to the timestamps of the estimate; or a larger --t-max-diff");
   }
 }
 
@@ -198,12 +199,12 @@ TEST(Associate, RefusesAnOffsetThatNoTimestampHolds) {
   };
   EXPECT_EQ(
       refusal(two, one, kOffset),
-      "curve.tum --t-offset: 9000000000.000000 s added to its timestamps is beyond 292 years; "
+      "curve.tum --t-offset: 9000000000.000000 s added to the timestamps is beyond 292 years; "
       "expected the "
       "time between the two clocks");
   EXPECT_EQ(
       refusal(one, two, -kOffset),
-      "curve.tum --t-offset: -9000000000.000000 s added to its timestamps is beyond 292 years; "
+      "curve.tum --t-offset: -9000000000.000000 s added to the timestamps is beyond 292 years; "
       "expected the "
       "time between the two clocks");
 }
@@ -233,10 +234,12 @@ TEST(Associate, WithoutTimestampsByRow) {
   timed.name = "timed.txt";
   five.name = "five.txt";
   EXPECT_EQ(refusal(timed, five),
-            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "five.txt: 5 poses without timestamps, but timed.txt has 4 poses; expected a row for "
+            "each row "
             "of the reference, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
   EXPECT_EQ(refusal(five, timed),
-            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "five.txt: 5 poses without timestamps, but timed.txt has 4 poses; expected a row for "
+            "each row "
             "of the estimate, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
 }
 

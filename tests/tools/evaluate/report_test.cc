@@ -79,12 +79,12 @@ TEST(EvaluationReport, NamesAreQuotedWhereTheFormAsksForIt) {
 TEST(EvaluationReport, NeesNamesItsQuantityItsDofAndItsPoses) {
   Evaluation evaluation = Moved(Alignment::kNone, "a");
   evaluation.position_nees = Nees{2, 1.5, 1.0};
-  EXPECT_NE(
-      EvaluationText({evaluation})
-          .find("NEES position (3 dof) 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"
-                "This NEES is marginal: it is of each quantity alone. nees.mean in run.json is "
-                "joint, over all states of a model.\n"),
-      std::string::npos)
+  EXPECT_NE(EvaluationText({evaluation})
+                .find("NEES position (3 dof) 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"
+                      "This NEES is marginal: position and orientation are evaluated separately. "
+                      "nees.mean in "
+                      "run.json is the joint NEES of all states of a model.\n"),
+            std::string::npos)
       << EvaluationText({evaluation});
   EXPECT_NE(EvaluationMarkdown({evaluation}).find(" | NEES position (3 dof) | NEES orientation |"),
             std::string::npos)

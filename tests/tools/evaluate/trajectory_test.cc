@@ -106,7 +106,7 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
       std::string::npos)
       << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");
-  EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the one before"),
+  EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the previous time"),
             std::string::npos);
 }
 
@@ -234,10 +234,10 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
 
 TEST_F(TrajectoryFiles, TimestampsOutOfOrderAreSortedAndToldOf) {
   const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
-  EXPECT_EQ(
-      WarningsOf(text),
-      "poses.txt:3 t: goes back: 2.000000 s; expected poses in the order of their timestamps; "
-      "they are sorted\n");
+  EXPECT_EQ(WarningsOf(text),
+            "poses.txt:3 t: is earlier than the previous timestamp: 2.000000 s; expected poses in "
+            "the order of their timestamps; "
+            "they are sorted\n");
   const Trajectory t = Read(text);
   EXPECT_EQ(t.positions.row(0), Eigen::RowVector4d(1, 2, 3, 4));
   EXPECT_TRUE(std::ranges::is_sorted(t.timestamps));
@@ -251,22 +251,23 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).timestamps.size(), 4u);
   // Sorting keeps the order of poses with equal timestamps.
-  EXPECT_EQ(
-      WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
-      "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their timestamps; "
-      "they are sorted\n"
-      "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
-      "poses are kept\n");
+  EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
+            "poses.txt:2 t: is earlier than the previous timestamp: 1.000000 s; expected poses in "
+            "the order of their timestamps; "
+            "they are sorted\n"
+            "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
+            "poses are kept\n");
   EXPECT_EQ(Read("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").positions.row(0),
             Eigen::RowVector3d(1, 2, 9));
 }
 
 TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
-  EXPECT_EQ(WarningsOf("0 0 0 0 1 0 0 0\n1 1 2 3 0.8 0.6 0 0\n"),
-            "poses.txt:1 qx: the first pose is the identity if its quaternion is written w first; "
-            "expected qx qy qz qw, as in TUM\n");
+  EXPECT_EQ(
+      WarningsOf("0 0 0 0 1 0 0 0\n1 1 2 3 0.8 0.6 0 0\n"),
+      "poses.txt:1 qx: the first pose is the identity if the quaternion is read with w first; "
+      "expected qx qy qz qw, as in TUM\n");
   EXPECT_EQ(WarningsOf("0,0,0,0,0,0,0,1\n"),
-            "poses.txt:1 qw: the first pose is the identity if its quaternion is written w last; "
+            "poses.txt:1 qw: the first pose is the identity if the quaternion is read with w last; "
             "expected qw qx qy qz, as in EuRoC\n");
   EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
   // a rotation of 180 degrees at another position

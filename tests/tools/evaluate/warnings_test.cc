@@ -108,12 +108,13 @@ TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
   for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(1.5);
   const std::string warnings = WarningsOf(Curve(60), estimate);
   // 1.5 rad, up to the oscillating error
-  EXPECT_TRUE(warnings.starts_with("estimate.tum: all orientations are turned by the same 85."))
+  EXPECT_TRUE(
+      warnings.starts_with("estimate.tum: all orientations differ by the same rotation of 85."))
       << warnings;
   EXPECT_TRUE(
       warnings.ends_with("deg: probably another body frame; "
-                         "expected poses of the same body; the positions may also be "
-                         "of another point\n"))
+                         "expected poses of the same body frame; the positions may also be "
+                         "those of another point\n"))
       << warnings;
 }
 
@@ -137,20 +138,20 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   }
   swapped.first_line = 7;
   std::string warnings = WarningsOf(Curve(60), swapped);
-  EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations fit to 0.")) << warnings;
-  EXPECT_NE(warnings.find(" deg if quaternions are read w first, but to "), std::string::npos);
+  EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations agree to 0.")) << warnings;
+  EXPECT_NE(warnings.find(" deg if quaternions are read with w first, and to "), std::string::npos);
   EXPECT_TRUE(warnings.ends_with(" deg as read; expected qx qy qz qw\n")) << warnings;
   // The same for the reference.
   swapped.name = "reference.tum";
   warnings = WarningsOf(swapped, Curve(60));
-  EXPECT_TRUE(warnings.starts_with("reference.tum:7: the orientations fit to 0.")) << warnings;
+  EXPECT_TRUE(warnings.starts_with("reference.tum:7: the orientations agree to 0.")) << warnings;
   // The result of reading a EuRoC file with w last.
   for (Eigen::Quaterniond& q : estimate.orientations) {
     q = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
   }
   estimate.format = TrajectoryFormat::kEuroc;
   warnings = WarningsOf(Curve(60), estimate);
-  EXPECT_NE(warnings.find("are read w last, but to "), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("are read with w last, and to "), std::string::npos) << warnings;
   EXPECT_TRUE(warnings.ends_with("expected qw qx qy qz\n")) << warnings;
 }
 
@@ -173,11 +174,13 @@ TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheirNames) {
     Trajectory reference = Curve(60), estimate = Estimate(Curve(60));
     reference.name = c.reference;
     estimate.name = c.estimate;
-    EXPECT_EQ(WarningsOf(reference, estimate),
-              c.swapped ? std::string(c.estimate) +
-                              ": is named like ground truth, but is compared with " + c.reference +
-                              "; expected REF first, then EST\n"
-                        : "");
+    EXPECT_EQ(
+        WarningsOf(reference, estimate),
+        c.swapped
+            ? std::string(c.estimate) +
+                  ": is named like ground truth, but is used as the estimate; the reference is " +
+                  c.reference + "; expected REF first, then EST\n"
+            : "");
   }
 }
 

@@ -12,14 +12,14 @@ namespace alidade::internal {
 /// Wall-clock budget of a series of runs. Several threads may use it at the same time.
 class RunBudget {
  public:
-  /// Starts the clock. nullopt: no limit.
+  /// Starts the clock. If `limit_s` is nullopt, the budget is unlimited.
   explicit RunBudget(std::optional<double> limit_s) : limit_s_(limit_s) {}
 
   double elapsed_s() const;
   /// Records the duration of a finished run.
   void RecordRun(double run_s);
-  /// Reports whether a further run, as long as the longest one so far, would exceed the limit.
-  /// False until the first run is recorded.
+  /// Returns true if another run would exceed the limit. Assumes that it takes as long as the
+  /// longest recorded run. Returns false until the first run is recorded.
   bool is_spent() const;
 
  private:
@@ -30,15 +30,15 @@ class RunBudget {
 
 /// CPU time of each estimator over all frames, predicted from the first frames.
 struct PredictedCpuTime {
-  std::vector<double> cpu_s;  ///< by estimator
-  std::int64_t frames = 0;    ///< number of frames that were measured
+  std::vector<double> cpu_s;  ///< CPU time of each estimator
+  std::int64_t frames = 0;    ///< number of frames whose CPU time was measured
   std::int64_t total_frames = 0;
 };
 
 /// Predicts the CPU time from the first ten frames. The experiment cannot be used afterwards. The
-/// prediction assumes that the cost of one solve of all data is proportional to the number of
-/// frames N, and that of a solve at every frame to N^2. Returns nullopt if the source does not
-/// report N or the run failed.
+/// cost of one solve of all data is assumed to be proportional to N, the number of frames. The cost
+/// of a solve at every frame is assumed to be proportional to N^2. Returns nullopt if the source does
+/// not report N, or if the run failed.
 std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment);
 
 }  // namespace alidade::internal

@@ -24,7 +24,8 @@ using internal::SmoothsAllData;
 
 namespace {
 
-/// Returns the name of the folder of a run without its parent folders; "" if it has no folder.
+/// Returns the name of the folder of a run without the parent folders. Returns "" if the run has no
+/// folder.
 std::string FolderName(const ComparedRun& run) {
   if (run.folder.empty()) return "";
   return (std::filesystem::absolute(run.folder) / ".")
@@ -34,8 +35,9 @@ std::string FolderName(const ComparedRun& run) {
       .string();
 }
 
-/// Moves the estimators out of the runs. If there are several runs, each name is prefixed by the
-/// folder of its run: by the name of the folder if that is unique, else by its path.
+/// Moves the estimators out of the runs. If there are several runs, the folder of the run is prefixed
+/// to the name of each estimator. The prefix is the name of the folder if it is unique, otherwise
+/// the path.
 std::vector<Candidate> ExtractCandidates(std::vector<ComparedRun>& runs) {
   std::vector<Candidate> candidates;
   for (ComparedRun& run : runs) {
@@ -51,7 +53,7 @@ std::vector<Candidate> ExtractCandidates(std::vector<ComparedRun>& runs) {
   return candidates;
 }
 
-/// Returns the first candidate that an option names. Error: kUsage.
+/// Returns the first candidate with the name that an option specifies. Error: kUsage.
 const Candidate& FindNamed(const std::string& name, const std::vector<Candidate>& candidates,
                            const char* option) {
   for (const Candidate& candidate : candidates) {
@@ -61,8 +63,8 @@ const Candidate& FindNamed(const std::string& name, const std::vector<Candidate>
                          internal::NamesOf(candidates));
 }
 
-/// Returns the first usable candidate that satisfies the predicate; without a usable one, the first
-/// that satisfies it; null if none does.
+/// Returns the first usable candidate that satisfies the predicate. If all that satisfy it are
+/// unusable, returns the first of these. Returns null if no candidate satisfies the predicate.
 const Candidate* FindFirst(const std::vector<Candidate>& candidates,
                            const std::function<bool(const Candidate&)>& predicate) {
   const Candidate* first = nullptr;
@@ -74,10 +76,10 @@ const Candidate* FindFirst(const std::vector<Candidate>& candidates,
   return first;
 }
 
-/// Finds the batch that is the reference of `estimator`: of all data if `smoothed`, else of the
-/// data up to each frame. A batch of all measurements has priority over a batch of the measurements
-/// that a filter accepted. If no batch of the same problem is usable, a usable one with the same
-/// sensors but other overrides (for example a robust loss) is returned.
+/// Finds the batch that is the reference of `estimator`: the batch of all data if `smoothed`,
+/// otherwise the batch of the data up to each frame. A batch of all measurements has priority over a
+/// batch of the measurements that a filter accepted. If no batch of the same problem is usable, a
+/// usable batch with the same sensors but other overrides (for example a robust loss) is returned.
 const Candidate* FindBatch(const Candidate& estimator, const std::vector<Candidate>& candidates,
                            bool smoothed) {
   const auto has_same_sensors = [&](const Candidate& candidate) {
@@ -112,8 +114,8 @@ bool HasErrors(const Candidate& candidate) {
                              [](const auto& metric) { return metric.first.starts_with("rmse:"); });
 }
 
-/// Reports whether errors are relative to truth. Error: kUsage if the options require truth and no
-/// run has such errors.
+/// Returns true if errors are relative to truth. Error: kUsage if the options require truth, but no
+/// run has errors relative to truth.
 bool UsesTruth(const std::vector<Candidate>& candidates, const CompareOptions& options) {
   const bool is_required = options.reference == "truth";
   if (!options.reference.empty() && !is_required) return false;
@@ -125,10 +127,10 @@ bool UsesTruth(const std::vector<Candidate>& candidates, const CompareOptions& o
   return truth;
 }
 
-/// The references of a candidate; null if there is no reference.
+/// References of a candidate. A pointer is null if there is no such reference.
 struct References {
-  const Candidate* along = nullptr;  ///< of the estimates along the run
-  const Candidate* final = nullptr;  ///< of the last estimate, for which all use the same data
+  const Candidate* along = nullptr;  ///< reference of the estimates over the run
+  const Candidate* final = nullptr;  ///< reference of the last estimate
 };
 
 References FindReferences(const Candidate& estimator, const std::vector<Candidate>& candidates,
@@ -150,7 +152,7 @@ References FindReferences(const Candidate& estimator, const std::vector<Candidat
           smoothed != nullptr ? smoothed : full_information};
 }
 
-/// Returns the reason for which the comparison with the reference is withheld, or "".
+/// Returns the reason why the comparison with the reference is withheld, or "".
 std::string WithheldReason(const std::vector<Candidate>& candidates,
                            const std::vector<References>& references, bool truth) {
   const bool has_measurements = std::ranges::any_of(
@@ -172,7 +174,7 @@ std::string WithheldReason(const std::vector<Candidate>& candidates,
   return has_reference ? "" : "no reference: no truth, no batch and no smoother of all data";
 }
 
-/// Returns notes on the estimators that have no reference although others have one.
+/// Returns notes on the estimators without a reference if other estimators have a reference.
 std::vector<std::string> NotesOnMissingReferences(const std::vector<Candidate>& candidates,
                                                   const std::vector<References>& references) {
   bool has_final = false, has_online = false;
@@ -184,10 +186,10 @@ std::vector<std::string> NotesOnMissingReferences(const std::vector<Candidate>& 
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const std::string note = "'" + candidates[i].name + "' has no reference";
     if (has_final && references[i].final == nullptr) {
-      notes.push_back(note + ": no batch uses its sensors");
+      notes.push_back(note + ": no batch uses the same sensors");
     } else if (has_online && references[i].along == nullptr) {
-      notes.push_back(note + " along the run: no full-information filter has its sensors and " +
-                      "overrides");
+      notes.push_back(note + " over the run: no full-information filter has the same sensors " +
+                      "and overrides");
     }
   }
   return notes;
@@ -203,7 +205,7 @@ void AddAll(const std::map<std::string, double>& source, const std::string& kind
   for (const auto& [key, value] : source) values[kind + key] = SingleValue(value);
 }
 
-/// Adds the ratios of the metrics of a section that have one.
+/// Adds the ratios to the reference. Only some metrics of a section have a ratio.
 void AddRatios(const Candidate& estimator, const Candidate& reference, MetricSection section,
                std::map<std::string, Ratio>& ratios) {
   for (const auto& [text, value] : estimator.result.metrics) {
@@ -216,7 +218,7 @@ void AddRatios(const Candidate& estimator, const Candidate& reference, MetricSec
   }
 }
 
-/// Adds the distance from `reference` along the run. If the scale is unobservable, it also adds the
+/// Adds the distance from `reference` over the run. If the scale is unobservable, it also adds the
 /// distance of the aligned trajectories.
 void AddRmsd(const Candidate& estimator, const Candidate& reference, ComparedEstimator& compared) {
   const Distance distance = internal::DistanceBetween(estimator.series, reference.series);
@@ -238,14 +240,14 @@ void AddFinal(const Candidate& estimator, const Candidate& reference, ComparedEs
   }
 }
 
-/// Reports whether a metric of a run does not depend on truth.
+/// Returns true if a metric can be computed without truth.
 bool NeedsNoTruth(const std::string& key) {
   const MetricInfo* const metric = FindMetric(MetricKey::Parse(key).name);
   return metric != nullptr && !metric->needs_truth;
 }
 
-/// Adds the CPU time for each frame. The work of a batch of all data during the frames is the
-/// filter from which it starts.
+/// Adds the mean CPU time for a frame. For a batch of all data, the time of the filter from which the
+/// batch starts is a separate value.
 void AddCpuTime(const Candidate& estimator, ComparedEstimator& compared) {
   const internal::CpuTime& cpu = estimator.cpu;
   const auto frames = static_cast<double>(estimator.run->frames);
@@ -300,7 +302,7 @@ ComparedEstimator Compare(const Candidate& estimator, const References& referenc
   return compared;
 }
 
-/// Returns the filter whose error is decomposed; null if there is no filter. Error: kUsage.
+/// Returns the filter whose error is decomposed. Returns null if there is no filter. Error: kUsage.
 const Candidate* FindFilter(const std::vector<Candidate>& candidates,
                             const CompareOptions& options) {
   const auto is_filter = [](const Candidate& candidate) {
@@ -336,12 +338,13 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
     const Candidate* const along = references[i].along;
     if (along == nullptr) continue;
     if (!along->series.joint && along->is_usable()) {
-      notes.insert("'" + along->name +
-                   "' has no covariance.bin: RMSD in sigmas ignores its correlations");
+      notes.insert(
+          "'" + along->name +
+          "' has no covariance.bin: RMSD in sigmas ignores the correlations of the errors");
     }
     if (!truth && along->result.smoothed && !candidates[i].result.smoothed) {
       notes.insert("'" + along->name +
-                   "' uses later data: a filter, which has no later data, lags behind it");
+                   "' also uses later data, so the estimates of a filter lag behind");
     }
   }
   for (const Candidate& candidate : candidates) {
@@ -404,7 +407,8 @@ Comparison internal::CompareRuns(std::vector<ComparedRun> runs, const CompareOpt
     if (filter->had_rejection_recovery) {
       comparison.notes.push_back(
           "'" + filter->name +
-          "' recovered from rejections: its step to a batch or smoother includes the cost");
+          "' recovered from rejections: the steps to a batch or smoother include the cost of the "
+          "recovery");
     }
   }
   return comparison;

@@ -10,13 +10,13 @@
 
 namespace alidade::internal {
 
-/// Reports whether both estimators use the same sensors.
+/// Returns true if both estimators use the same sensors.
 bool HaveSameSensors(const EstimatorResult& a, const EstimatorResult& b);
-/// Reports whether both estimators use the same models and sensors.
+/// Returns true if both estimators use the same models and sensors.
 bool HaveSameProblem(const EstimatorResult& a, const EstimatorResult& b);
 
-/// Reports whether every estimate uses all data. A sliding window uses only the later data within
-/// the window.
+/// Returns true if every estimate uses all data. For a sliding window it is false: an estimate uses
+/// later data only within the window.
 inline bool SmoothsAllData(const EstimatorResult& result) {
   return result.smoothed && result.kind != EstimatorKind::kSlidingWindow;
 }
@@ -24,22 +24,22 @@ inline bool SmoothsAllData(const EstimatorResult& result) {
 /// Refuses the value `name` of an option, with the reason `message`. Error: kUsage.
 [[noreturn]] void RefuseOption(const char* option, const std::string& message,
                                const std::string& name, const std::vector<std::string>& choices);
-/// Refuses a `--filter` that is not in `filters`. `is_estimator`: an estimator has that name.
-/// Error: kUsage.
+/// Refuses a value of `--filter` that is not in `filters`. `is_estimator` is true if `name` is the
+/// name of an estimator. Error: kUsage.
 [[noreturn]] void RefuseFilter(const std::string& name, bool is_estimator,
                                const std::vector<std::string>& filters);
 
-/// Computes the distances over the landmarks that both maps contain, in m: `map`, the RMS
-/// difference of their positions, and `map.sim3`, the RMS difference after the similarity that
-/// minimises it [Umeyama1991].
+/// Computes the distances in m over the landmarks that both maps contain. `map` is the RMS difference
+/// of the positions. `map.sim3` is the RMS difference after alignment by the similarity that
+/// minimises this difference [Umeyama1991].
 std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
                                                   const EstimatorResult& reference);
 
 /// Compares the estimators of runs over the same data. Error: kUsage.
 Comparison CompareRuns(std::vector<ComparedRun> runs, const CompareOptions& options);
 
-/// Computes the steps from `filter` to the batch of all data. A step for which an estimator is
-/// missing contains the reason instead of values.
+/// Computes the steps from `filter` to the batch of all data. If an estimator of a step is missing,
+/// the step contains the reason instead of values.
 std::vector<DecompositionStep> Decompose(const Candidate& filter,
                                          const std::vector<Candidate>& candidates, bool with_truth);
 

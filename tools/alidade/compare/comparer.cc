@@ -111,7 +111,7 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     RunComparer comparer(experiment, true);
     RunOptions observed = original;
     observed.observers.push_back(&comparer);
-    observed.stop = stopped;  // a started run is finished, because the budget allows for it
+    observed.stop = stopped;  // a run that has started is finished, because the budget includes it
     const double start_s = budget.elapsed_s();
     RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);
     budget.RecordRun(budget.elapsed_s() - start_s);
@@ -136,8 +136,9 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     seeds.comparison.notes.push_back(
         "the budget of " + internal::RoundedText(*options.budget_s, 3) + " s sufficed for " +
         std::to_string(finished) + " of " + std::to_string(seeds.sweep.runs) +
-        " runs; not run: seeds from " +
-        std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(finished)));
+        " runs; not run: seed " +
+        std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(finished)) +
+        " and later seeds");
   }
   return seeds;
 }

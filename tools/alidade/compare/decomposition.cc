@@ -8,12 +8,13 @@
 namespace alidade::internal {
 namespace {
 
-/// The estimators between which the steps are computed; null if one is missing.
+/// Estimators between which the steps are computed. A pointer is null if the estimator is missing.
 struct StepEstimators {
   const Candidate* full_information = nullptr;  ///< the full-information filter
-  const Candidate* smoother = nullptr;          ///< with the models and linearisation of the filter
-  const Candidate* accepted = nullptr;          ///< the batch of the accepted measurements
-  const Candidate* all_data = nullptr;          ///< the batch of all data
+  const Candidate* smoother =
+      nullptr;  ///< smoother with the models and linearisation of the filter
+  const Candidate* accepted = nullptr;  ///< the batch of the accepted measurements
+  const Candidate* all_data = nullptr;  ///< the batch of all data
 };
 
 StepEstimators FindStepEstimators(const Candidate& filter,
@@ -34,7 +35,7 @@ StepEstimators FindStepEstimators(const Candidate& filter,
     if (!candidate.is_batch()) continue;
     if (result.smoothed) select(by_filter ? found.accepted : found.all_data, candidate);
     // A full-information filter of the accepted measurements is preferred, because another step
-    // covers the rejected ones.
+    // covers the rejected measurements.
     const bool is_better = by_filter && candidate.is_usable() &&
                            found.full_information != nullptr &&
                            found.full_information->result.accepted_by.empty();
@@ -44,7 +45,7 @@ StepEstimators FindStepEstimators(const Candidate& filter,
   return found;
 }
 
-/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`; at the end, BLOCK of
+/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`. If `at_end`, the subject is BLOCK of
 /// `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step does not compare the metric.
 std::string SubjectOf(const std::string& metric, bool at_end) {
   if (at_end && metric == "map.rmse") return "map";
@@ -67,8 +68,8 @@ void AddErrors(const EstimatorResult& start, const EstimatorResult& end, Decompo
   }
 }
 
-/// Computes the step between two estimators. `missing_reason` is the reason for a withheld step if
-/// an estimator is null.
+/// Computes the step between two estimators. If an estimator is null, the step is withheld with the
+/// reason `missing_reason`.
 DecompositionStep ComputeStep(DecompositionKind kind, const Candidate* start, const Candidate* end,
                               bool with_truth, const char* missing_reason, bool at_end = false) {
   DecompositionStep step;

@@ -12,16 +12,16 @@
 namespace alidade::internal {
 namespace {
 
-/// A block of both series with its offsets in their rows.
+/// Block that both series contain, with the offsets of its elements in the rows.
 struct SharedBlock {
   const SeriesBlock* block;
-  int offset;                    ///< of its ambient elements
-  int reference_offset;          ///< of its ambient elements in the reference
-  int reference_tangent_offset;  ///< of its tangent elements in the reference
+  int offset;                    ///< offset of the ambient elements in the series
+  int reference_offset;          ///< offset of the ambient elements in the reference
+  int reference_tangent_offset;  ///< offset of the tangent elements in the reference
   bool reference_is_constant;
 };
 
-/// Finds the blocks of both series, except those that are constant in both.
+/// Finds the blocks that both series contain, except blocks that are constant in both.
 std::vector<SharedBlock> FindSharedBlocks(const Series& series, const Series& reference) {
   std::vector<SharedBlock> shared;
   int offset = 0;
@@ -40,7 +40,7 @@ std::vector<SharedBlock> FindSharedBlocks(const Series& series, const Series& re
   return shared;
 }
 
-/// Returns the pairs of rows with equal timestamps, in the order of time.
+/// Returns the pairs of rows with equal timestamps, in the order of the timestamps.
 std::vector<std::pair<std::size_t, std::size_t>> SharedRows(const Series& a, const Series& b) {
   std::vector<std::pair<std::size_t, std::size_t>> rows;
   for (std::size_t i = 0, j = 0; i < a.timestamps.size() && j < b.timestamps.size();) {
@@ -59,12 +59,12 @@ const double* RowOf(const Series& series, std::size_t row, int offset) {
   return series.values.data() + row * static_cast<std::size_t>(series.ambient()) + offset;
 }
 
-/// The blocks of one owner with a joint covariance in the reference.
+/// Blocks of one owner, which have a joint covariance in the reference.
 struct OwnerBlocks {
   std::string owner;
   std::vector<const SharedBlock*> blocks;
-  double sum = 0.0;        ///< of d' P_ref^-1 d / dof
-  double last = -1.0;      ///< its square root at the last timestamp; -1: P_ref is singular
+  double sum = 0.0;    ///< sum of d' P_ref^-1 d / dof
+  double last = -1.0;  ///< sqrt(d' P_ref^-1 d / dof) at the last timestamp; -1: P_ref is singular
   std::int64_t count = 0;  ///< number of timestamps in the sum
 };
 

@@ -10,22 +10,23 @@
 
 namespace alidade::internal {
 
-/// Distance of the estimates of one series from those of a reference, over their common timestamps,
-/// with d = x (-) x_ref in the tangent space at the reference.
+/// Distance between the estimates of a series and of a reference at the common timestamps. The
+/// difference is d = x (-) x_ref, in the tangent space at the reference.
 struct Distance {
-  std::map<std::string, double> rms;    ///< by block: sqrt(mean |d|^2)
-  std::map<std::string, double> final;  ///< by block: |d| at the last timestamp
-  /// By owner: sqrt(mean d' P_ref^-1 d / dof), in standard deviations of the reference. Timestamps
-  /// with a singular P_ref are skipped.
+  std::map<std::string, double> rms;    ///< sqrt(mean |d|^2) of each block
+  std::map<std::string, double> final;  ///< |d| of each block at the last timestamp
+  /// sqrt(mean d' P_ref^-1 d / dof) of each owner, in standard deviations of the reference.
+  /// Timestamps with a singular P_ref are skipped.
   std::map<std::string, double> sigmas;
-  std::map<std::string, double> final_sigmas;  ///< by owner, at the last timestamp
+  std::map<std::string, double> final_sigmas;  ///< value of each owner at the last timestamp
 };
 
-/// Computes the distance of two series. Blocks correspond if their name and geometry are equal.
+/// Computes the distance between two series. Two blocks correspond if they have the same name and
+/// geometry.
 Distance DistanceBetween(const Series& series, const Series& reference);
 
-/// Aligns the trajectories of a vector block of three elements in two series. Returns nullopt if
-/// there is no such block, or the points do not determine a similarity.
+/// Aligns the trajectories of a block in two series. Returns nullopt if the block is not a vector of
+/// three elements, or if the points do not determine a similarity.
 std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
                                                const std::string& block);
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 
-/// Removes the odd rows of a table with that number of columns.
+/// Removes the rows with an odd index from a table with `columns` columns.
 void RemoveOddRowsOf(std::size_t columns, std::vector<double>& cells) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {

@@ -12,28 +12,29 @@
 
 namespace alidade::internal {
 
-/// Records the errors of one estimator during a run. For an online estimator it also records the
-/// CramerRaoBound, which no online estimator can fall below. In a long run it retains every n-th
-/// timestamp, n a power of two, so that the memory is bounded.
+/// Recorder of the errors of one estimator during a run. For an online estimator it also records the
+/// CramerRaoBound, a lower bound of the mean square error of any online estimator. In a long run it
+/// retains only every n-th timestamp, n a power of two, to limit the memory.
 class ErrorRecorder {
  public:
   static constexpr std::size_t kMaxTimestamps = 2048;
 
   ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment);
   void Add(const SourceFrame& frame, const State& state);
-  /// Returns the recorded errors with the mean ratios to the bound. Called once, after the run.
+  /// Returns the recorded errors and the mean ratios to the bound. Call this function once, after the
+  /// run.
   ErrorSeries Finish();
 
  private:
-  /// A block with truth and its error at the current timestamp.
+  /// Block with a truth, and the error of the block at the current timestamp.
   struct TrackedBlock {
     BlockId id;
     std::size_t truth, owner;
     double truth_variance;
     Eigen::VectorXd error = {};
     bool has_error = false;
-    double bound = 0.0;            ///< tr P of the bound
-    double sum_by_bound = 0.0;     ///< sum of |e|^2 / tr P over the timestamps that have both
+    double bound = 0.0;            ///< tr P, P the bound of the block
+    double sum_by_bound = 0.0;     ///< sum of |e|^2 / tr P over the timestamps with both values
     std::int64_t bound_count = 0;  ///< number of these timestamps
   };
 

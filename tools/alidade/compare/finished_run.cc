@@ -34,7 +34,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
                                                  "the folder of a finished run"));
 }
 
-/// Refuses a folder, a device, and a pipe, which would block the program.
+/// Refuses a folder, a device and a pipe. Reading from a pipe could block the program.
 void RequireFile(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) FailOpen(file);
@@ -62,7 +62,7 @@ std::string TextOf(const JsonNode& map, const char* key) {
   return node ? node->Text() : "";
 }
 
-/// Parses the cells of a row without quotes. An empty cell is NaN.
+/// Parses the cells of a row. The row does not contain quotes. An empty cell becomes NaN.
 std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int line) {
   std::vector<double> numbers;
   for (std::size_t begin = 0; begin <= row.size();) {
@@ -88,13 +88,13 @@ Timestamp TimestampOf(std::string_view row, const fs::path& file, int line) {
   return cell::ParseTimestamp(text, value, 9);
 }
 
-/// Places of the cells in a row of estimates.csv, in the order of the series.
+/// Column indices of the values and sigmas in estimates.csv, in the order of the series.
 struct EstimateCells {
   std::size_t columns = 0;
   std::vector<std::size_t> values, sigmas;
 };
 
-/// Finds the cells of the blocks by `columns.json`.
+/// Finds the columns of the blocks with the help of `columns.json`.
 EstimateCells FindCells(const JsonNode& columns, const std::vector<SeriesBlock>& blocks,
                         const fs::path& file) {
   EstimateCells cells;
@@ -122,8 +122,8 @@ void AppendRow(Series& series, const EstimateCells& cells, const std::vector<dou
   for (const std::size_t cell : cells.sigmas) series.covariances.push_back(row[cell] * row[cell]);
 }
 
-/// Reads estimates.csv. Returns the number of rows with cells that are not finite; empty cells,
-/// which represent missing values, do not count.
+/// Reads estimates.csv. Returns the number of rows that contain a value that is not finite. An empty
+/// cell, which represents a missing value, does not count.
 std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std::int64_t rows,
                            Series& series) {
   std::int64_t not_finite = 0;
@@ -137,7 +137,7 @@ std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std
     if (stream.eof()) FailFile(file, number, "the last line is incomplete");
     series.timestamps.push_back(TimestampOf(line, file, number));
     AppendRow(series, cells, row);
-    not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
+    not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // the row contains nan or inf
   }
   if (std::ssize(series.timestamps) != rows) {
     FailFile(file, 0,
@@ -147,7 +147,8 @@ std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std
   return not_finite;
 }
 
-/// Reads P and replaces its diagonal by it, if the file exists and P is not too large.
+/// Reads the joint covariances P if the file exists and P is not too large. They replace the
+/// variances of the series.
 void ReadCovariances(const fs::path& file, Series& series) {
   if (series.tangent() > Series::kMaxJoint || !fs::exists(file)) return;
   series.joint = true;
@@ -166,7 +167,7 @@ Geometry GeometryOf(const JsonNode& block) {
   std::vector<Geometry> geometries;
   std::vector<std::string> names;
   for (const GeometryRow* row : detail::kGeometryRows) {
-    if (row->number == ALIDADE_PRODUCT) continue;  // of measurements alone
+    if (row->number == ALIDADE_PRODUCT) continue;  // only a measurement can be a product
     geometries.emplace_back(row->number, size);
     names.emplace_back(row->name);
   }
@@ -213,7 +214,7 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   return result;
 }
 
-/// Reads the landmarks of the final state, without those that were removed earlier.
+/// Reads the landmarks of the final state. Skips landmarks that were removed before.
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   constexpr const char* kAxes[] = {"x", "y", "z"};
   RequireFile(file);

@@ -11,37 +11,37 @@
 #include "alidade/experiment/run.h"
 #include "alidade/record/estimate_series.h"
 
-/// The data of runs that a comparison uses, from memory or from run folders.
+/// Data of runs for a comparison. The data are from memory or from run folders.
 namespace alidade::internal {
 
 struct ComparedRun;
 
 /// An estimator of a comparison.
 struct Candidate {
-  std::string name;                  ///< its name in the comparison
+  std::string name;                  ///< name in the comparison
   const ComparedRun* run = nullptr;  ///< the run that contains it
-  EstimatorResult result;            ///< without events
+  EstimatorResult result;            ///< result of the estimator, without events
   Series series;
-  CpuTime cpu;                          ///< zero if unknown
-  ErrorSeries errors;                   ///< of a run over seeds; else empty
+  CpuTime cpu;         ///< zero if unknown
+  ErrorSeries errors;  ///< errors, if the run is one of several seeds; otherwise empty
   std::int64_t not_finite_rows = 0;     ///< rows of estimates.csv with a value that is not finite
-  bool had_rejection_recovery = false;  ///< it reported the event `rejection_recovery`
+  bool had_rejection_recovery = false;  ///< true: the event `rejection_recovery` occurred
 
   bool is_batch() const { return result.kind == EstimatorKind::kBatch; }
-  /// Reports whether it can be a reference: it did not fail and has estimates.
+  /// Returns true if the estimator can be a reference: it did not fail and has estimates.
   bool is_usable() const { return !result.failed && !series.timestamps.empty(); }
-  /// Returns the number of measurements that it received.
+  /// Returns the number of measurements that the estimator received.
   std::int64_t measurements() const;
-  /// Returns the number of measurements that it used.
+  /// Returns the number of measurements that the estimator used.
   std::int64_t used() const;
 };
 
 /// A run with its estimators.
 struct ComparedRun {
-  std::filesystem::path folder;  ///< "": it has no folder
+  std::filesystem::path folder;  ///< "": the run has no folder
   RunStatus status = RunStatus::kOk;
   std::string reason;
-  std::string reference = "truth";  ///< the reference of its metrics
+  std::string reference = "truth";  ///< reference of the metrics
   std::string measurements_sha256, truth_sha256;
   std::int64_t frames = 0;
   std::vector<Candidate> estimators;
@@ -51,9 +51,9 @@ struct ComparedRun {
 /// the files do not match.
 ComparedRun ReadRun(const std::filesystem::path& folder);
 
-/// Refuses runs with different measurements, by their hashes. Returns notes on other differences:
-/// of their truth, or of the settings that all their estimators share. Errors: kBadData with both
-/// folders, both hashes and the first timestamp that differs.
+/// Refuses runs whose measurements have different hashes. Returns notes on other differences between
+/// the runs: different truths, or different settings that concern all estimators. Error: kBadData
+/// with both folders, both hashes and the first timestamp that differs.
 std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs);
 
 }  // namespace alidade::internal

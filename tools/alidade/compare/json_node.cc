@@ -74,7 +74,7 @@ bool JsonNode::Flag() const {
 }
 
 std::int64_t JsonNode::Count(std::int64_t maximum) const {
-  // The parser stores a whole number of 0 or more as unsigned; a program may store it as signed.
+  // The parser stores a non-negative integer as unsigned. A program may store it as signed.
   const bool is_count = json_->is_number_unsigned() ||
                         (json_->is_number_integer() && json_->get<std::int64_t>() >= 0);
   if (!is_count || json_->get<std::uint64_t>() > static_cast<std::uint64_t>(maximum)) {

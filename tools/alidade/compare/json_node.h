@@ -11,9 +11,9 @@
 
 namespace alidade::internal {
 
-/// A value of a JSON file with its file name and key path for messages; the counterpart of Node. It
-/// refers to the parsed value, which must outlive it. Errors: kBadData with the file, the key path
-/// and the expected value.
+/// Value in a JSON file, with the file name and the key path for messages; the counterpart of Node.
+/// The parsed JSON value must outlive the JsonNode. Errors: kBadData with the file, the key path and
+/// the expected value.
 class JsonNode {
  public:
   JsonNode(const Json& json, std::string file) : json_(&json), file_(std::move(file)) {}
@@ -28,7 +28,7 @@ class JsonNode {
   bool Flag() const;
   /// Returns a whole number from 0 to `maximum`.
   std::int64_t Count(std::int64_t maximum = INT64_MAX) const;
-  /// Returns a number; NaN for null, which represents a number that is not finite.
+  /// Returns a number. Returns NaN for null, which represents a number that is not finite.
   double Number() const;
   /// Returns the index of the text in `choices`.
   std::size_t Choice(const std::vector<std::string>& choices) const;

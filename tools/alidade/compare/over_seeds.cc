@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/// Computes quantiles of sum(a_i) / sum(b_i) over samples of the n pairs, drawn with replacement.
+/// Computes quantiles of sum(a_i) / sum(b_i) over random samples. A sample consists of n pairs
+/// (a_i, b_i), which are drawn with replacement.
 Interval Bootstrap(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr int kSamples = 5000;
   constexpr std::uint64_t kSeed = 1;
@@ -35,10 +36,10 @@ Interval Bootstrap(const std::vector<double>& a, const std::vector<double>& b) {
 
 /// Errors and NEES of the runs at one timestamp.
 struct TimestampStatistics {
-  std::vector<std::vector<double>> errors;  ///< |e|, by block
-  std::vector<double> bounds;               ///< sums of tr P, by block
-  std::vector<double> nees, dofs;           ///< sums, by owner
-  std::vector<std::int64_t> runs;           ///< number of runs with a NEES, by owner
+  std::vector<std::vector<double>> errors;  ///< |e| of each block and run
+  std::vector<double> bounds;               ///< sum of tr P of each block
+  std::vector<double> nees, dofs;           ///< sums of each owner
+  std::vector<std::int64_t> runs;           ///< number of runs with a NEES of each owner
   std::int64_t count = 0;                   ///< number of runs
   std::int64_t bound_count = 0;             ///< number of runs with a bound
 };
@@ -70,7 +71,8 @@ void AddRun(const ErrorSeries& run, std::map<Timestamp, TimestampStatistics>& by
   }
 }
 
-/// Appends the statistics of the errors at one timestamp; NaN for fewer than two errors.
+/// Appends the statistics of the errors at one timestamp. Appends NaN if there are fewer than two
+/// errors.
 void AppendError(std::vector<double>& errors, OverTime::Error& destination) {
   const bool is_known = errors.size() > 1;
   double sum = 0.0;
@@ -82,8 +84,8 @@ void AppendError(std::vector<double>& errors, OverTime::Error& destination) {
   destination.high.push_back(is_known ? Quantile(errors, 0.84) : kUnknown);
 }
 
-/// Appends the average NEES at one timestamp; NaN for fewer than two runs. `nees` and `dof` are
-/// sums over the runs.
+/// Appends the average NEES at one timestamp. Appends NaN if there are fewer than two runs. `nees`
+/// and `dof` are sums over the runs.
 void AppendNees(double nees, double dof, std::int64_t runs, OverTime::AverageNees& destination) {
   const bool is_known = runs > 1;
   const Interval bounds = is_known ? ConsistencyBounds(dof, 1.0) : Interval{kUnknown, kUnknown};

@@ -18,12 +18,12 @@ namespace {
 
 constexpr const char* kOrigin = "alidade compare";
 
-/// An estimator that a comparison adds if the config lacks it.
+/// Estimator that a comparison adds if the config does not contain it.
 struct Variant {
   const char* name;
   EstimatorKind kind;
-  bool full_information;          ///< it is the full-information filter
-  bool accepted;                  ///< it uses the measurements that the filter accepted
+  bool full_information;          ///< true: the estimator is the full-information filter
+  bool accepted;                  ///< true: uses only the measurements that the filter accepted
   std::vector<const char*> keys;  ///< keys that are copied from the entry of the filter
   const char* description;
 };
@@ -58,8 +58,9 @@ const std::vector<Variant>& Variants() {
   return variants;
 }
 
-/// Reports whether `spec` serves as the variant. A full-information filter of all data also serves
-/// as that of the accepted measurements; another row reports the difference between these two.
+/// Returns true if `spec` can serve as the variant. A full-information filter of all data can also
+/// serve as the full-information filter of the accepted measurements. Another step of the
+/// decomposition covers the rejected measurements.
 bool Matches(const Variant& variant, const EstimatorSpec& spec, const EstimatorSpec& filter,
              int filter_index) {
   const bool full_information = spec.kind == EstimatorKind::kBatch && !spec.estimator->offline();
@@ -71,7 +72,7 @@ bool Matches(const Variant& variant, const EstimatorSpec& spec, const EstimatorS
   return variant.full_information || !variant.accepted;
 }
 
-/// Returns a name that no estimator has, derived from `name`.
+/// Returns `name`, or `name` with a number appended if an estimator already has this name.
 std::string UniqueName(const std::string& name, const std::vector<EstimatorSpec>& estimators) {
   const std::vector<std::string> names = internal::NamesOf(estimators);
   std::string unique = name;
@@ -81,8 +82,8 @@ std::string UniqueName(const std::string& name, const std::vector<EstimatorSpec>
   return unique;
 }
 
-/// Returns the first estimator type of that kind, first from core, then from plugins; "" if not
-/// found.
+/// Returns the first estimator type of a kind. Searches the core, then the plugins. Returns "" if
+/// there is no such type.
 std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
   for (const internal::EstimatorType& type : internal::EstimatorTypes()) {
     if (type.kind == kind) return type.name;
@@ -93,7 +94,7 @@ std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
   return "";
 }
 
-/// Returns the config with the entry of the variant.
+/// Returns a copy of the config to which the entry of the variant is added.
 Config WithVariant(const Config& config, const Variant& variant, const std::string& type,
                    const std::string& name, const std::string& filter) {
   Config extended = config.Copy();
@@ -119,7 +120,8 @@ std::string ReasonOf(const Error& error) {
   return separator == reason.npos ? reason : reason.substr(separator + 2);
 }
 
-/// Adds the variant. If that is impossible, adds its description to `left_out`, by the reason.
+/// Adds the variant to the experiment. If that fails, adds the description of the variant to
+/// `left_out` under the reason.
 void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperiment& compared,
                 std::map<std::string, std::vector<std::string>>& left_out) {
   const std::string name = UniqueName(variant.name, compared.experiment.estimators);
@@ -154,8 +156,8 @@ void CheckReference(const Experiment& experiment, const std::string& name) {
       names);
 }
 
-/// Returns the index of the filter whose error is decomposed; -1 if there is no filter. Error:
-/// kUsage.
+/// Returns the index of the filter whose error is decomposed. Returns -1 if there is no filter.
+/// Error: kUsage.
 int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
@@ -169,12 +171,13 @@ int FindFilter(const Experiment& experiment, const std::string& name) {
   internal::RefuseFilter(name, is_estimator, filters);
 }
 
-/// Builds the experiment and adds the missing variants, except those in `excluded`, which maps
-/// names to reasons.
+/// Builds the experiment and adds the missing variants, except those in `excluded`. The keys of
+/// `excluded` are names, the values are reasons.
 ComparedExperiment Build(const Config& config, const PluginHost& host,
                          const CompareOptions& options,
                          const std::map<std::string, std::string>& excluded) {
-  // The run computes errors relative to truth; the comparison handles any other reference itself.
+  // The run computes errors relative to truth. The comparison computes differences from any other
+  // reference.
   Config base = config.Copy();
   if (base.root().is_map() && base.root().Find("reference")) {
     base.Set("reference", "truth", kOrigin);
@@ -202,8 +205,9 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
     const bool may_be_long = !options.budget_s || options.over_seeds;
     if (variant.full_information && filter_spec.problem.landmarks && may_be_long) {
       left_out
-          ["with landmarks, a solve at every frame takes long; for a single run, --budget SECONDS "
-           "adds it if time suffices, or the config can contain it"]
+          ["with landmarks, a solve at every frame takes long; add the estimator to the config, "
+           "or, "
+           "for a single run, use --budget SECONDS"]
               .emplace_back(variant.description);
       continue;
     }
@@ -216,15 +220,15 @@ ComparedExperiment Build(const Config& config, const PluginHost& host,
   return compared;
 }
 
-/// Returns the added estimators that exceed the budget, with the reason. Sets `note` to a note on
-/// the prediction.
+/// Returns the added estimators that exceed the budget, each with the reason. Sets `note` to a
+/// description of the prediction.
 std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared, double budget_s,
                                                     std::string& note) {
   std::map<std::string, std::string> beyond;
   const std::optional<internal::PredictedCpuTime> prediction =
       internal::PredictCpuTime(compared.experiment);
   if (!prediction) {
-    note = "the CPU time cannot be predicted: the budget excludes no estimator";
+    note = "the CPU time cannot be predicted, so the budget does not exclude an estimator";
     return beyond;
   }
   const auto seconds = [](double s) { return internal::RoundedText(s, 2) + " s"; };
@@ -239,8 +243,8 @@ std::map<std::string, std::string> FindBeyondBudget(ComparedExperiment& compared
     if (sum_s + prediction->cpu_s[e] <= budget_s) {
       sum_s += prediction->cpu_s[e];
     } else {
-      beyond[name] =
-          "it may take " + seconds(prediction->cpu_s[e]) + ", the budget is " + seconds(budget_s);
+      beyond[name] = "the predicted CPU time is " + seconds(prediction->cpu_s[e]) +
+                     ", the budget is " + seconds(budget_s);
     }
   }
   note = "predicted from " + std::to_string(prediction->frames) + " of " +
@@ -257,8 +261,8 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
   if (options.over_seeds || !options.budget_s || compared.added.empty()) return compared;
   std::string note;
   const auto beyond = FindBeyondBudget(compared, *options.budget_s, note);
-  compared =
-      Build(config, host, options, beyond);  // again, because the prediction has read the source
+  compared = Build(config, host, options,
+                   beyond);  // build again, because the prediction has read the source
   compared.notes.push_back(note);
   if (!beyond.empty()) {
     compared.beyond_budget = "the budget of " + internal::RoundedText(*options.budget_s, 2) +

@@ -24,7 +24,7 @@ using internal::TableRow;
 
 namespace {
 
-/// Selection of the rows of one metric, or of its ratios to the reference.
+/// Selection of the rows of one metric, or of the ratios of this metric to the reference.
 struct RowKind {
   std::string metric, label;
   bool is_ratio = false;
@@ -38,7 +38,7 @@ struct Column {
   std::map<std::string, Ratio> ratios = {};
 };
 
-/// Returns a number in the format of the other rows.
+/// Formats a number as in the other rows.
 std::string CellOf(double value) {
   RunResult result;
   result.estimators.resize(1);
@@ -46,11 +46,12 @@ std::string CellOf(double value) {
   return RowsOf(result, "value", "")[0].cells[0];
 }
 
-/// With fewer runs, an interval contains the ratio with less than its nominal probability. By the t
-/// distribution, the 95 % interval of three runs would be 2.7 times as wide, and of ten 1.2 times.
+/// With fewer runs, an interval contains the ratio with less than the nominal probability. By the t
+/// distribution, the 95 % interval would be 2.7 times as wide for three runs, and 1.2 times as wide
+/// for ten runs.
 constexpr std::int64_t kFewRuns = 10;
 
-/// Returns a ratio with its interval: `1.0110 [0.9930, 1.0302] undecided`.
+/// Formats a ratio with the interval, as in `1.0110 [0.9930, 1.0302] undecided`.
 std::string RatioText(const Ratio& ratio) {
   const auto text = [](double value) { return internal::FixedText(value, value < 10.0 ? 4 : 1); };
   if (!ratio.interval || ratio.error == ratio.reference_error) return CellOf(ratio.value());
@@ -82,8 +83,8 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
   return sorted_rows;
 }
 
-/// Returns rows with the mean, and over several runs [p05, p95]. Formats these as three columns of
-/// one table, so that all numbers of a row have the same unit.
+/// Returns rows with the mean, and for several runs with [p05, p95]. The three numbers are formatted
+/// as columns of one table, so all numbers of a row have the same unit.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
   RunResult result;
@@ -120,7 +121,8 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// Adds the references of the columns to a table: to its title if they are equal, else as a row.
+/// Adds the references of the columns to a table. If all references are equal, their name is added to
+/// the title, otherwise a row is added.
 void AppendReferences(const std::vector<std::string>& references, Section& section) {
   std::set<std::string> distinct(references.begin(), references.end());
   distinct.erase("");
@@ -134,8 +136,8 @@ void AppendReferences(const std::vector<std::string>& references, Section& secti
   }
 }
 
-/// Returns the table of estimators, with their references. If some runs lack the reference, it also
-/// has a row with the number of runs with a reference.
+/// Returns the table of estimators with their references. If the reference is missing in some runs, a
+/// row reports the number of runs with a reference.
 Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
                 const std::string& title, std::string ComparedEstimator::*reference,
                 std::int64_t ComparedEstimator::*reference_runs,
@@ -162,7 +164,7 @@ Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
   return section;
 }
 
-/// Returns the rows of a section. The short form has errors if truth is known, else differences.
+/// Returns the rows of a section. The main rows are errors if truth is known, otherwise differences.
 std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section, ReportRows rows) {
   const bool has_cpu_time = std::ranges::any_of(
       comparison.estimators,
@@ -187,7 +189,7 @@ std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section
   return kinds;
 }
 
-/// Returns rows with the share of timestamps at which the average NEES over the runs is within its
+/// Returns rows with the share of timestamps at which the average NEES over the runs is within the
 /// bounds.
 std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& estimators) {
   std::set<std::string> owners;
@@ -206,7 +208,8 @@ std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& esti
   return rows;
 }
 
-/// Returns the section with the values over the run, of the online or of the smoothed estimators.
+/// Returns the section with the values over the run, either of the online estimators or of the
+/// smoothed estimators.
 Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows rows) {
   std::vector<ComparedEstimator> estimators;
   TableRow diverged{"diverged", {}}, used{"runs used", {}};
@@ -233,12 +236,12 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
 
 Section FinalSection(const Comparison& comparison, ReportRows rows) {
   return TableOf(comparison.estimators, comparison.runs > 1,
-                 "At the end, when all have the same data", &ComparedEstimator::final_reference,
-                 &ComparedEstimator::final_reference_runs,
+                 "At the end, when all estimators have the same data",
+                 &ComparedEstimator::final_reference, &ComparedEstimator::final_reference_runs,
                  KindsOf(comparison, MetricSection::kFinal, rows));
 }
 
-/// Returns the values whose keys start with `kind`, with `new_kind` instead.
+/// Returns the values whose keys start with `kind`. In the keys, `new_kind` replaces `kind`.
 std::map<std::string, Spread> WithKind(const std::map<std::string, Spread>& values,
                                        const std::string& kind, const std::string& new_kind) {
   std::map<std::string, Spread> found;
@@ -248,7 +251,8 @@ std::map<std::string, Spread> WithKind(const std::map<std::string, Spread>& valu
   return found;
 }
 
-/// Returns the distances in sigmas in descending order: `0.06 (target)`. Sets `largest`.
+/// Formats the distances in sigmas in descending order, as in `0.06 (target)`. Sets `largest` to the
+/// largest distance.
 std::string DistancesText(const DecompositionStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
   const std::string kind = "rmsd.sigmas:";
@@ -264,7 +268,7 @@ std::string DistancesText(const DecompositionStep& step, double& largest) {
   return internal::Join(parts);
 }
 
-/// Returns the meaning of a step of the decomposition.
+/// Describes the meaning of a step of the decomposition.
 std::string MeaningOf(DecompositionKind kind) {
   switch (kind) {
     case DecompositionKind::kLinearisation:
@@ -278,7 +282,7 @@ std::string MeaningOf(DecompositionKind kind) {
   return "gain from the measurements that the gate and other checks of the filter rejected";
 }
 
-/// Returns the distance between the estimators of a step, or "" if it is unknown.
+/// Describes the distance between the estimators of a step. Returns "" if the distance is unknown.
 std::string DistanceLine(const DecompositionStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
@@ -421,7 +425,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   return sections;
 }
 
-/// Returns the values, and the ratios with the keys `ratio.KEY`.
+/// Returns the values and the ratios. A ratio has the key `ratio.KEY`.
 internal::Json JsonOf(const std::map<std::string, Spread>& values,
                       const std::map<std::string, Ratio>& ratios, bool several) {
   internal::Json json = internal::Json::object();
@@ -445,7 +449,7 @@ internal::Json JsonOf(const std::map<std::string, Spread>& values,
   return json;
 }
 
-/// Returns the numbers; null for a number that is not finite.
+/// Returns an array of the numbers. A number that is not finite becomes null.
 internal::Json JsonOf(const std::vector<double>& values) {
   internal::Json json = internal::Json::array();
   for (const double value : values) {

@@ -13,11 +13,11 @@ namespace fs = std::filesystem;
 
 /// Consecutive rows of measurements.csv with equal timestamps.
 struct TimestampRows {
-  std::string t_s;                ///< "": the end of the file
+  std::string t_s;                ///< timestamp as in the file; "": the end of the file
   std::vector<std::string> rows;  ///< sorted by stream name, the order in which they are hashed
 };
 
-/// Reader of a measurements.csv that groups its rows by timestamp.
+/// Reader of measurements.csv that groups the rows by timestamp.
 class MeasurementsFile {
  public:
   explicit MeasurementsFile(const fs::path& folder) : stream_(folder / "measurements.csv") {
@@ -55,7 +55,7 @@ std::string TimestampOf(const TimestampRows& rows) {
   return rows.t_s.empty() ? "the end of the file" : "t = " + rows.t_s + " s";
 }
 
-/// Describes the first difference of the measurements.csv of `folder` from that of `reference`.
+/// Describes the first difference between the files measurements.csv of `folder` and `reference`.
 std::string FirstDifference(const fs::path& folder, const fs::path& reference) {
   MeasurementsFile file(folder), reference_file(reference);
   if (!file.is_open() || !reference_file.is_open()) return "measurements.csv cannot be read";
@@ -72,7 +72,7 @@ std::string FirstDifference(const fs::path& folder, const fs::path& reference) {
   }
 }
 
-/// Collects every scalar at or below a node by its path.
+/// Adds the path and the text of each scalar in the tree below `node` to `values`.
 void Flatten(const Node& node, std::map<std::string, std::string>& values) {
   if (node.is_map()) {
     for (const auto& [key, value] : node.Entries()) Flatten(value, values);
@@ -92,7 +92,7 @@ std::map<std::string, std::string> SharedSettings(const fs::path& folder) {
   return values;
 }
 
-/// Lists up to three settings that differ between two runs; "" if no setting differs.
+/// Lists up to three settings that differ between two runs. Returns "" if no setting differs.
 std::string DifferingSettings(const fs::path& a, const fs::path& b) {
   constexpr std::size_t kShown = 3;
   const std::map<std::string, std::string> first = SharedSettings(a);
@@ -139,7 +139,7 @@ std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
     const std::string settings = DifferingSettings(first.folder, run.folder);
     if (!settings.empty()) {
       notes.push_back("the settings of " + folders + " differ: " + settings +
-                      ": the estimator is not the only difference");
+                      "; the estimators are therefore not the only difference");
     }
   }
   return notes;

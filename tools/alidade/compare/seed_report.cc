@@ -17,7 +17,7 @@ std::string TitleOf(const Config& config) {
   return title ? title->Text() : fs::path(config.name()).stem().string();
 }
 
-/// Returns an svg file as an element of a page, without its XML prolog.
+/// Returns the svg element of an svg file, without the XML prolog.
 std::string SvgOf(const fs::path& file) {
   const std::string svg = internal::ReadFile(file, [](ExitCode, int) {});
   const std::size_t start = svg.find("<svg");

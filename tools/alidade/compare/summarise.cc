@@ -60,7 +60,7 @@ bool Diverged(const Comparison& comparison, const std::string& name) {
   return found != comparison.estimators.end() && found->diverged > 0;
 }
 
-/// Appends `name` if it is not empty and not in the list yet.
+/// Appends `name` to the list, unless it is empty or already in the list.
 void AddName(const std::string& name, std::vector<std::string>& names) {
   if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
 }
@@ -99,8 +99,8 @@ std::string RunCountText(std::int64_t count, std::int64_t total) {
   return std::to_string(count) + " of " + std::to_string(total) + " runs";
 }
 
-/// Summarises a step. Uses the runs in which the filter did not diverge and the step is between the
-/// same two estimators.
+/// Summarises a step. Uses only runs in which the filter did not diverge and in which the step is
+/// between the same two estimators.
 DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
   const DecompositionStep* first_known = &comparisons.front().decomposition.at(s);
   for (const Comparison& comparison : comparisons) {
@@ -128,7 +128,7 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
   ALIDADE_EXPECTS(!comparisons.empty());
   Comparison summary = comparisons.front();
   summary.runs = std::ssize(comparisons);
-  summary.status = RunStatus::kOk;  // the entries of the estimators report failures in single runs
+  summary.status = RunStatus::kOk;  // the entries of the estimators report failures of single runs
   if (summary.runs > 1) summary.measurements_sha256.clear();
   summary.notes.clear();
   std::int64_t withheld_runs = 0;

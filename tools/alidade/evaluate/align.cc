@@ -17,7 +17,8 @@ using internal::Umeyama;
   throw Error(ExitCode::kBadData, ErrorLine({name}, {}, problem, expected));
 }
 
-/// Finds the rotation R about z that maximises sum p_ref' R p_est of centred points [Zhang2018].
+/// Finds the rotation R about z that maximises the sum of p_ref' R p_est over the points, after
+/// their means are subtracted [Zhang2018]. Returns the rotation and the translation.
 Similarity AlignYaw(const Eigen::Matrix3Xd& estimate_points,
                     const Eigen::Matrix3Xd& reference_points) {
   const Eigen::Vector3d estimate_mean = estimate_points.rowwise().mean(),
@@ -67,7 +68,7 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
   const Eigen::Matrix3Xd estimate_points = estimate.positions.leftCols(used);
   const Eigen::Matrix3Xd reference_points = reference.positions.leftCols(used);
   if (used < 3) {
-    Fail(estimate.name, std::to_string(used) + " poses to align", "3 or more");
+    Fail(estimate.name, std::to_string(used) + " poses are too few for an alignment", "3 or more");
   }
   if (alignment == Alignment::kYaw) return AlignYaw(estimate_points, reference_points);
   if (alignment == Alignment::kSe3) return Umeyama(estimate_points, reference_points, false);
@@ -80,7 +81,8 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
            "all poses are at one point", "a trajectory that determines a scale");
     }
     Fail(estimate.name,
-         "no scale: its positions are not correlated with those of " + reference.name,
+         "the scale is undetermined: the positions are not correlated with those of " +
+             reference.name,
          "poses of the same trajectory, or --align");
   }
   Similarity transformation = *similarity;

@@ -15,19 +15,20 @@ namespace {
   throw Error(ExitCode::kBadData, ErrorLine({name}, {}, problem, expected));
 }
 
-/// Returns the nearest double, which equals the result of reading decimal seconds.
+/// Returns the double that is nearest to the timestamp in seconds. Parsing the decimal text of the
+/// timestamp yields the same double.
 double DoubleSeconds(Timestamp timestamp) {
   return static_cast<double>(static_cast<long double>(timestamp) / 1e9L);
 }
 
-/// Returns |a - b| of doubles; the resolution is 0.2 us for a clock that counts from 1970. If a
-/// timestamp lies midway between two others, rounding decides, as in evo, to obtain the same
-/// results.
+/// Returns |a - b|, computed with doubles as in evo. The resolution is 0.2 us for a clock that counts
+/// from 1970. If a timestamp lies midway between two others, the same one is nearer as in evo.
 double TimeDistance(Timestamp a, Timestamp b) {
   return std::abs(DoubleSeconds(a) - DoubleSeconds(b));
 }
 
-/// Returns the index of the nearest timestamp; the first of several equally near ones.
+/// Returns the index of the timestamp nearest to `time`. If several are equally near, the first one
+/// is used.
 int NearestIndex(const std::vector<Timestamp>& timestamps, Timestamp time) {
   auto nearest = std::lower_bound(timestamps.begin(), timestamps.end(), time);
   const auto previous_is_nearer = [&] {
@@ -50,8 +51,8 @@ Matches MatchByRow(const Trajectory& reference, const Trajectory& estimate) {
   const Trajectory& untimed = reference_is_untimed ? reference : estimate;
   const Trajectory& counterpart = reference_is_untimed ? estimate : reference;
   FailMatching(untimed.name,
-               std::to_string(untimed.size()) + " poses for " + std::to_string(counterpart.size()) +
-                   " of " + counterpart.name + ", and no timestamps",
+               std::to_string(untimed.size()) + " poses without timestamps, but " +
+                   counterpart.name + " has " + std::to_string(counterpart.size()) + " poses",
                std::string("a row for each row of the ") +
                    (reference_is_untimed ? "estimate" : "reference") +
                    ", or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
@@ -74,18 +75,18 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   }
   if (!both_timed) {
     FailMatching((reference.has_timestamps() ? estimate : reference).name,
-                 "poses without timestamps",
+                 "the poses have no timestamps",
                  "a times.txt in the same folder, because the other trajectory has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
   const std::vector<Timestamp>& shorter = (estimate_longer ? reference : estimate).timestamps;
   const std::vector<Timestamp>& longer = (estimate_longer ? estimate : reference).timestamps;
-  const Timestamp shift = estimate_longer ? -offset : offset;  // of the shorter trajectory
+  const Timestamp shift = estimate_longer ? -offset : offset;  // offset of the shorter trajectory
   for (const Timestamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
                                               internal::SecondsText(offset) +
-                                                  " added to its timestamps is beyond 292 years",
+                                                  " added to the timestamps is beyond 292 years",
                                               "the time between the two clocks"));
   }
   Matches matches;
@@ -101,12 +102,13 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
     longer_matches.push_back(nearest);
   }
   if (!matches.estimate.empty()) return matches;
-  FailMatching(estimate.name,
-               "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
-                   reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
-                   " compared with " + Span(reference),
-               "the same clock; or --t-offset, which is added to the estimate's timestamps, or "
-               "--t-max-diff");
+  FailMatching(
+      estimate.name,
+      "no pose is within " + internal::NumberText(Seconds(max_diff)) + " s of a pose of " +
+          reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
+          " compared with " + Span(reference),
+      "timestamps of the same clock; or --t-offset, which is added to the timestamps of the "
+      "estimate; or a larger --t-max-diff");
 }
 
 }  // namespace alidade

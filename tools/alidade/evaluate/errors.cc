@@ -22,7 +22,7 @@ const Eigen::Quaterniond& Orientation(const Trajectory& trajectory, int i) {
   return trajectory.orientations[static_cast<std::size_t>(i)];
 }
 
-/// Error pose: length of its translation and angle of its rotation.
+/// Error pose: the length of the translation and the angle of the rotation.
 struct ErrorPose {
   double translation, angle;
 };
@@ -44,7 +44,7 @@ double ErrorOf(PoseRelation relation, const ErrorPose& e) {
   return e.translation;
 }
 
-/// Returns p_j in the frame of pose i.
+/// Returns the position of pose j in the frame of pose i.
 Eigen::Vector3d RelativePosition(const Trajectory& t, int i, int j) {
   return Orientation(t, i).conjugate() * (t.positions.col(j) - t.positions.col(i));
 }
@@ -57,8 +57,8 @@ ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate,
           AngleOf(relative_rotation(reference).conjugate() * relative_rotation(estimate))};
 }
 
-/// Computes the distance of each pose from the first: frames, metres along the trajectory, rad for
-/// both units of angle, and ns for seconds, because these are exact.
+/// Computes the distance of each pose from the first pose: frames, metres along the trajectory, rad for
+/// both units of angle, or ns. For the unit of seconds the distance is in ns, which are exact.
 std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
   std::vector<double> progress = {0.0};
   for (int i = 1; i < t.size(); ++i) {
@@ -79,7 +79,7 @@ using Pairs = std::vector<std::pair<int, int>>;
 
 Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaUnit unit) {
   Pairs pairs;
-  int begin = unit == DeltaUnit::kMetres ? -1 : 0;  // -1: the first pair is dropped
+  int begin = unit == DeltaUnit::kMetres ? -1 : 0;  // -1: skip the first interval
   double begin_progress = 0.0;
   for (std::size_t j = 1; j < progress.size(); ++j) {
     if (!(progress[j] - begin_progress >= delta)) continue;
@@ -90,7 +90,7 @@ Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaU
   return pairs;
 }
 
-/// Returns pairs of each pose and the pose nearest to delta after it.
+/// Returns a pair for each pose i: j is the later pose whose distance from i is nearest to delta.
 Pairs AllPairs(const std::vector<double>& progress, double delta, double tolerance) {
   Pairs pairs;
   for (std::size_t i = 0; i + 1 < progress.size(); ++i) {
@@ -107,10 +107,10 @@ Pairs AllPairs(const std::vector<double>& progress, double delta, double toleran
   return pairs;
 }
 
-/// Returns all pairs of poses whose relative rotation is delta. Error: kBadData if there are too
-/// many.
+/// Returns all pairs of poses whose relative rotation is within the tolerance of delta. Error:
+/// kBadData if there are too many pairs.
 Pairs AllAnglePairs(const Trajectory& t, double delta, double tolerance) {
-  constexpr std::size_t kMaxPairs = 10'000'000;  // at rest there are n (n - 1) / 2 pairs
+  constexpr std::size_t kMaxPairs = 10'000'000;  // a body at rest could yield n (n - 1) / 2 pairs
   Pairs pairs;
   for (int i = 0; i < t.size(); ++i) {
     for (int j = i + 1; j < t.size(); ++j) {

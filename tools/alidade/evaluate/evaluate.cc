@@ -14,7 +14,8 @@
 namespace alidade {
 namespace {
 
-/// Returns the axes with positive variance in at least one pose; a planar pose has fewer than 3.
+/// Returns the axes with a positive variance in at least one pose. A planar pose has fewer than 3 such
+/// axes.
 std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {
@@ -24,7 +25,7 @@ std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) 
   return axes;
 }
 
-/// Computes NEES of the columns of `errors` with their covariances.
+/// Computes the NEES. Column i of `errors` belongs to covariance i.
 Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
   const std::vector<int> axes = UncertainAxes(covariances);
   Nees nees;
@@ -45,7 +46,7 @@ Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& 
   return nees;
 }
 
-/// Computes d = q_true (-) q of each pose, in the body, rad.
+/// Computes d = q_true (-) q of each pose, in the body frame, rad.
 Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory& estimate) {
   Eigen::Matrix3Xd errors(3, estimate.size());
   for (int i = 0; i < estimate.size(); ++i) {
@@ -132,7 +133,7 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
   if (evaluation.estimate.size() < 2) return evaluation;
   try {
     evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
-  } catch (const Error& error) {  // the other results remain valid
+  } catch (const Error& error) {  // the other results are still valid
     evaluation.warnings.emplace_back(error.what());
     return evaluation;
   }

@@ -15,12 +15,13 @@ namespace {
 struct SensorSums {
   std::int64_t measurements = 0, inside = 0, products = 0;
   double nis = 0.0;
-  /// Sums over elements r / s of consecutive measurements a, b: a b, a^2, b^2.
+  /// Sums of a b, a^2 and b^2 over the elements r / s of consecutive measurements a and b.
   double product = 0.0, before2 = 0.0, after2 = 0.0;
-  std::map<std::string, std::vector<double>> last;  ///< last r / s, by landmark
+  std::map<std::string, std::vector<double>>
+      last;  ///< r / s of the last measurement of each landmark
 };
 
-/// Indices of the columns of `NAME/innovations.csv` that are read.
+/// Indices of the used columns of `NAME/innovations.csv`.
 struct Columns {
   std::size_t sensor, landmark, outcome, dof, nis, s0, r0;
 };
@@ -50,7 +51,7 @@ void AddRow(const NumberRows& rows, const Columns& columns, std::map<std::int64_
   if (dof < 1) rows.FailCell(columns.dof, "dof", "is not a positive number", "1 or more");
   const std::size_t max_dof = rows.size() - std::min(rows.size(), std::max(columns.s0, columns.r0));
   if (static_cast<std::uint64_t>(dof) > max_dof)
-    rows.FailLine("too few columns for dof", "dof columns of s and of r");
+    rows.FailLine("there are too few columns for the value of dof", "dof columns of s and of r");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);

@@ -22,9 +22,9 @@ using internal::Json;
 using internal::NumberText;
 using internal::RoundedText;
 
-constexpr int kDecimals = 6;  // as in evo
+constexpr int kDecimals = 6;  // number of decimals in evo
 
-/// Statistics with evo's names, in its order.
+/// Statistics with the names and in the order of evo.
 constexpr std::pair<const char*, double ErrorStatistics::*> kStatistics[] = {
     {"rmse", &ErrorStatistics::rmse},     {"mean", &ErrorStatistics::mean},
     {"median", &ErrorStatistics::median}, {"std", &ErrorStatistics::std},
@@ -70,7 +70,7 @@ std::string NeesText(const char* name, const Nees& nees, int poses) {
          " poses\n";
 }
 
-/// Returns all statistics of one evaluation, in a row for each relation.
+/// Returns a table of all statistics of one evaluation, with a row for each relation.
 std::string StatisticsTable(const Evaluation& evaluation) {
   std::vector<std::string> names;
   for (const auto& [name, member] : kStatistics) names.emplace_back(name);
@@ -99,8 +99,8 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   }
   if (!text.empty()) {
     text +=
-        "This NEES is marginal: it is of each quantity alone. nees.mean in run.json is joint, over "
-        "all states of a model.\n";
+        "This NEES is marginal: position and orientation are evaluated separately. nees.mean in "
+        "run.json is the joint NEES of all states of a model.\n";
   }
   if (!evaluation.nees_withheld.empty()) {
     text += "NEES withheld: " + evaluation.nees_withheld + '\n';
@@ -148,7 +148,7 @@ std::string DetailText(const Evaluation& evaluation) {
   return consistency.empty() ? text : text + '\n' + consistency;
 }
 
-/// Returns `NEES position (3 dof)`, with all occurring numbers of dof.
+/// Returns a column header such as `NEES position (3 dof)`, with all numbers of dof that occur.
 std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
                        const std::vector<Evaluation>& evaluations) {
   std::set<int> dofs;
@@ -161,7 +161,7 @@ std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
   return texts.empty() ? header : header + " (" + internal::Join(texts, " or ") + " dof)";
 }
 
-/// Returns a table with a row for each evaluation.
+/// Returns the summary table with a row for each evaluation.
 internal::Table SummaryTable(const std::vector<Evaluation>& evaluations) {
   internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
   for (const char* kind : {"ATE", "RPE"}) {

@@ -6,11 +6,13 @@
 
 #include "alidade/evaluate/evaluate.h"
 
-/// Reports of evaluations. Each report includes the alignment and its scale, the number of matched
-/// and possible poses, and the time tolerance. An evaluation with an error has the row `failed`.
+/// Reports of evaluations. Each report includes the alignment, the scale of the alignment, the number
+/// of matched and possible poses, and the time tolerance. An evaluation with an error has the entry
+/// `failed`.
 namespace alidade {
 
-/// Returns a text for a terminal: all statistics of one evaluation, or one column for each of many.
+/// Returns a text for a terminal. For one evaluation it contains all statistics, for several
+/// evaluations a table with a column for each.
 std::string EvaluationText(const std::vector<Evaluation>& evaluations);
 
 /// Returns a Markdown table with a row for each evaluation.
@@ -19,7 +21,7 @@ std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations);
 /// Returns a LaTeX `tabular` with a row for each evaluation.
 std::string EvaluationLatex(const std::vector<Evaluation>& evaluations);
 
-/// Returns all results as JSON (docs/eval.md); missing results are omitted.
+/// Returns all results as JSON (docs/eval.md). Missing results are omitted.
 std::string EvaluationJson(const std::vector<Evaluation>& evaluations);
 
 }  // namespace alidade

@@ -41,7 +41,7 @@ struct TimeUnit {
   double seconds() const { return std::pow(10.0, static_cast<double>(digits) - 9.0); }
 };
 
-/// Returns the lower median; 0 if there are no values.
+/// Returns the lower median. Returns 0 if there are no values.
 double Median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto median = values.begin() + (std::ssize(values) - 1) / 2;
@@ -49,12 +49,13 @@ double Median(std::vector<double> values) {
   return *median;
 }
 
-/// Determines the unit of timestamps from the medians of their values t and differences d. It is
-/// the first of s, ms, us and ns that is plausible for a clock that counts from 1970, or else for a
-/// clock that counts from its own start:
+/// Determines the unit of timestamps from the median t of their values and the median d of their
+/// differences. The unit is the first of s, ms, us and ns that is plausible for a clock that counts
+/// from 1970. If there is none, it is the first that is plausible for a clock that counts from any
+/// start:
 ///
 ///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
-///   from its start           t < 9.2e9 s,   d < 1000 s in s, else d < 2 s
+///   from any start           t < 9.2e9 s,   d < 1000 s for the unit s, otherwise d < 2 s
 TimeUnit UnitOf(const std::vector<double>& timestamps) {
   constexpr TimeUnit kUnits[] = {{"s", 9}, {"ms", 6}, {"us", 3}, {"ns", 0}};
   std::vector<double> sizes, steps;
@@ -144,8 +145,8 @@ class TrajectoryReader {
     trajectory_.position_covariances.push_back(Covariance(upper + 6, "position"));
   }
 
-  /// Converts a row-wise upper triangle to a symmetric matrix. Its numbers may be rounded to six
-  /// digits: only an eigenvalue that is more negative than that is an error.
+  /// Converts a row-wise upper triangle to a symmetric matrix. The numbers may be rounded to six
+  /// digits. A negative eigenvalue is an error only if it exceeds this rounding error.
   Eigen::Matrix3d Covariance(const double* upper, const char* quantity) const {
     constexpr double kRounding = 1e-5;
     Eigen::Matrix3d matrix;
@@ -213,20 +214,20 @@ class TrajectoryReader {
     }
   }
 
-  /// Warns if a trajectory starts at the origin, but is at the identity only in the other order of
-  /// quaternions.
+  /// Warns if the trajectory starts at the origin, and the first orientation is the identity only in
+  /// the other order of quaternions.
   void CheckFirstQuaternion() {
     if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
     const Trajectory reordered = trajectory_.Select({0}).WithOtherQuaternionOrder();
     if (reordered.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
     const bool w_first = trajectory_.format == Format::kEuroc;
     Warn(lines_.front(), w_first ? "qw" : "qx",
-         std::string("the first pose is the identity if its quaternion is written w ") +
+         std::string("the first pose is the identity if the quaternion is read with w ") +
              (w_first ? "last" : "first"),
          w_first ? "qw qx qy qz, as in EuRoC" : "qx qy qz qw, as in TUM");
   }
 
-  /// Sorts the poses. Poses with equal timestamps stay in the order of the file.
+  /// Sorts the poses by timestamp. Poses with equal timestamps keep the order of the file.
   Trajectory Sorted() {
     const std::vector<Timestamp>& timestamps = trajectory_.timestamps;
     std::vector<int> order(timestamps.size());
@@ -236,7 +237,8 @@ class TrajectoryReader {
     const bool is_sorted = first_unsorted == order.end();
     if (!is_sorted) {
       Warn(At(lines_, *first_unsorted), "t",
-           "goes back: " + internal::SecondsText(At(timestamps, *first_unsorted)),
+           "is earlier than the previous timestamp: " +
+               internal::SecondsText(At(timestamps, *first_unsorted)),
            "poses in the order of their timestamps; they are sorted");
       std::stable_sort(order.begin(), order.end(), earlier);
     }
@@ -275,12 +277,12 @@ class TrajectoryReader {
   std::vector<std::string> timestamp_texts_;  ///< texts of the TUM timestamps
 };
 
-/// Returns the name of the file with the times of a single KITTI file.
+/// Returns the name of the file with the times of one particular KITTI file.
 std::filesystem::path DedicatedTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
 
-/// Finds the timestamp file in the folder of a KITTI file; empty if it does not exist.
+/// Finds the timestamp file in the folder of a KITTI file. Returns an empty path if it does not exist.
 std::filesystem::path FindTimes(const std::filesystem::path& file) {
   for (const std::filesystem::path& name :
        {DedicatedTimes(file), std::filesystem::path("times.txt")}) {
@@ -298,7 +300,7 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
     trajectory.timestamps.push_back(rows.Time(0, "t"));
     const std::size_t n = trajectory.timestamps.size();
     if (n > 1 && trajectory.timestamps[n - 2] >= trajectory.timestamps[n - 1]) {
-      rows.FailCell(0, "t", "is not after the one before", "times that increase");
+      rows.FailCell(0, "t", "is not after the previous time", "times that increase");
     }
   }
   if (std::ssize(trajectory.timestamps) == trajectory.size()) return;

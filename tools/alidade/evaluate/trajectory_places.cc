@@ -28,13 +28,13 @@ bool IsFolder(const fs::path& path) {
   throw Error(ExitCode::kInputMissing, ErrorLine({folder.string()}, {}, problem, expected));
 }
 
-/// Returns the name of a folder: slam for `runs/slam/`.
+/// Returns the name of a folder, as in `slam` for `runs/slam/`.
 std::string NameOf(const fs::path& folder) {
   return folder.filename().empty() ? folder.parent_path().filename().string()
                                    : folder.filename().string();
 }
 
-/// Finds the trajectory in the folder of an estimator; an empty path if it does not exist.
+/// Finds the trajectory in the folder of an estimator. Returns an empty path if it does not exist.
 TrajectoryFile EstimatorTrajectory(const fs::path& folder) {
   for (const char* name : {kWithCovariance, kTrajectory}) {
     if (!IsFile(folder / name)) continue;

@@ -19,14 +19,14 @@ using internal::EigenOf;
 using internal::EigenvaluesOf;
 using internal::RoundedText;
 
-constexpr int kMinPoses = 10;             ///< fewer do not determine frames and scale
-constexpr double kMinMatches = 0.5;       ///< share of the possible matches
-constexpr double kMaxTimeOffset = 0.5;    ///< median difference, as a share of the tolerance
-constexpr double kMaxScaleError = 0.1;    ///< deviation of the scale from 1
-constexpr double kMinLength = 0.5;        ///< share of the reference's length
+constexpr int kMinPoses = 10;             ///< number of poses that determine frames and scale
+constexpr double kMinMatches = 0.5;       ///< minimum share of matched poses
+constexpr double kMaxTimeOffset = 0.5;    ///< median time difference / tolerance
+constexpr double kMaxScaleError = 0.1;    ///< relative deviation of the scale from 1
+constexpr double kMinLength = 0.5;        ///< matched length / length of the reference
 constexpr double kMaxErrorRatio = 10.0;   ///< error without alignment / error with alignment
-constexpr double kMinBodyTurnDeg = 10.0;  ///< larger turns are not an error of an estimate
-constexpr double kMaxRemainder = 0.25;    ///< share of the error that an explanation may leave
+constexpr double kMinBodyTurnDeg = 10.0;  ///< a larger common turn is not an estimation error
+constexpr double kMaxRemainder = 0.25;    ///< error after an explanation / error before it
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
@@ -53,8 +53,8 @@ bool IsNamedLikeTruth(const std::string& file) {
   return false;
 }
 
-/// Difference between the orientations of two trajectories in the same world: a common turn of the
-/// body, ref = est Exp(d), and the rms deviation of the poses from it.
+/// Difference between the orientations of two trajectories in the same world: a common turn d of the
+/// body, ref = est Exp(d), and the rms deviation of the poses from this turn.
 struct BodyTurn {
   double turn_deg, spread_deg;
 };
@@ -77,7 +77,7 @@ BodyTurn BodyTurnOf(const Trajectory& reference, const Trajectory& estimate) {
           kDegrees * std::sqrt(sum / static_cast<double>(turns.size()))};
 }
 
-/// Returns true if the positions determine a rotation, that is if they are not nearly collinear.
+/// Returns true if the positions determine a rotation, that is, if they are not nearly collinear.
 bool SpansAPlane(const Eigen::Matrix3Xd& points) {
   constexpr double kThin = 1e-3;
   const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
@@ -120,13 +120,15 @@ class WarningCollector {
     warnings_.push_back(ErrorLine({whole_estimate_.name}, {}, problem, remedy));
   }
 
-  /// Detects a swap of reference and estimate. Numbers of poses cannot show it: the truth may have
-  /// the lower rate.
+  /// Detects a swap of reference and estimate by names and covariances. The numbers of poses cannot
+  /// reveal a swap, because the truth may have a lower rate than the estimate.
   void CheckOrder() {
     const Trajectory &reference = whole_reference_, &estimate = whole_estimate_;
     const char* const remedy = "REF first, then EST";
     if (IsNamedLikeTruth(estimate.name) && !IsNamedLikeTruth(reference.name)) {
-      Warn("is named like ground truth, but is compared with " + reference.name, remedy);
+      Warn("is named like ground truth, but is used as the estimate; the reference is " +
+               reference.name,
+           remedy);
     } else if (reference.has_covariances() && !estimate.has_covariances()) {
       warnings_.push_back(ErrorLine(
           {reference.name}, {},
@@ -217,21 +219,22 @@ class WarningCollector {
         reordered_spread_deg < kMaxRemainder * original.spread_deg) {
       const Trajectory& wrong = estimate_is_wrong ? whole_estimate_ : whole_reference_;
       const bool w_first = wrong.format == TrajectoryFormat::kEuroc;
-      warnings_.push_back(ErrorLine(
-          {wrong.name, wrong.first_line, 0}, {},
-          "the orientations fit to " + internal::FixedText(reordered_spread_deg, 1) +
-              " deg if quaternions are read w " + (w_first ? "last, but to " : "first, but to ") +
-              internal::FixedText(original.spread_deg, 1) + " deg as read",
-          w_first ? "qw qx qy qz" : "qx qy qz qw"));
+      warnings_.push_back(
+          ErrorLine({wrong.name, wrong.first_line, 0}, {},
+                    "the orientations agree to " + internal::FixedText(reordered_spread_deg, 1) +
+                        " deg if quaternions are read with w " +
+                        (w_first ? "last, and to " : "first, and to ") +
+                        internal::FixedText(original.spread_deg, 1) + " deg as read",
+                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
     } else if (original.turn_deg > kMinBodyTurnDeg &&
                original.spread_deg < kMaxRemainder * original.turn_deg) {
-      Warn("all orientations are turned by the same " + RoundedText(original.turn_deg, 4) +
+      Warn("all orientations differ by the same rotation of " + RoundedText(original.turn_deg, 4) +
                " deg: probably another body frame",
-           "poses of the same body; the positions may also be of another point");
+           "poses of the same body frame; the positions may also be those of another point");
     }
   }
 
-  const Evaluation& evaluation_;  ///< its estimate is not yet aligned
+  const Evaluation& evaluation_;  ///< the estimate in it is not aligned yet
   const Matches& matches_;
   const Trajectory& whole_reference_;
   const Trajectory& whole_estimate_;

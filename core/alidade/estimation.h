@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// All headers of estimation: problems, filters, out-of-sequence measurements and the smoother.
+/// Includes all headers for estimation: problems, filters, out-of-sequence measurements, smoother.
 #include "alidade/base/timestamp.h"
 #include "alidade/estimation/direct_models.h"
 #include "alidade/estimation/ekf.h"

@@ -50,7 +50,7 @@ void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
   std::iota(order_.begin(), order_.end(), 0);
   best_.assign(matches_.size(), 0);
   std::ptrdiff_t best_count = 0;
-  double failure = 1.0;  // the lowest probability of failure that a sensor allows
+  double failure = 1.0;  // smallest 1 - confidence of the sensors
   for (const PendingMeasurement* const pending : matches_) {
     failure = std::min(failure, 1.0 - pending->binding->outlier_rejection->confidence);
   }
@@ -70,8 +70,8 @@ void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
   }
 }
 
-/// Finds the matches whose residuals are within their noise after an update by one match alone.
-/// Consider states stay unchanged in it, and known roles have their values.
+/// Finds the matches whose residuals are within their noise after an update by one match alone. The
+/// update does not change consider states and known roles.
 void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   const Workspace::Use use(f.work);
   const PendingMeasurement& match = *matches_[hypothesis];
@@ -81,12 +81,12 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
   s = Eigen::Map<const RowMajor>(report.s.data(), m, m);
-  f.update.CopyColumns(match.linearised.column, pht);  // P H', as computed for the gate
+  f.update.CopyColumns(match.linearised.column, pht);  // P H' was computed for the gate
   y = Eigen::Map<const Eigen::VectorXd>(report.innovation.data(), m);
   ForEachConsidered(f, matches, [&](int offset, int size, int column, int count) {
     pht.block(offset, column, size, count).setZero();
   });
-  Factorise(s);  // positive definite: it has passed the gate
+  Factorise(s);  // S is positive definite, because the match passed the gate
   s.triangularView<Eigen::Lower>().solveInPlace(y);
   s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
   dx.noalias() = pht * y;

@@ -8,26 +8,26 @@
 
 namespace alidade::internal {
 
-/// One-point RANSAC [Civera2010]: separates the inliers among the matches of a frame from the
-/// outliers, for sensors with the option outlier_rejection. A hypothesis is the state after an
-/// update by one match alone. The support of a hypothesis consists of the matches whose residuals
-/// are then within their noise.
+/// One-point RANSAC [Civera2010]: divides the matches of a frame into inliers and outliers, for
+/// sensors with the option outlier_rejection. A hypothesis is the state after an update by one
+/// match alone. A match supports a hypothesis if its residual at that state is within the noise of
+/// the match. The matches that support a hypothesis are its support.
 class Consensus {
  public:
   explicit Consensus(const Problem& problem);
 
   /// Returns whether any of the measurements belongs to a sensor with outlier_rejection.
   static bool IsEnabledFor(std::span<PendingMeasurement* const> rows);
-  /// Divides the measurements of a frame. Appends the support of the best hypothesis, and the
-  /// measurements of sensors without outlier_rejection, to `inliers`, in their order. Appends the
-  /// other ones to `remaining`. No match is tried twice. The number of hypotheses is
-  /// log(1 - confidence) / log(1 - share of the support). The same `seed` results in the same order
-  /// of hypotheses.
+  /// Divides the measurements `rows` of a frame. Appends the support of the best hypothesis, and
+  /// all measurements of sensors without outlier_rejection, to `inliers`, in the order of `rows`.
+  /// Appends the other measurements to `remaining`. Each match is tried at most once. The number of
+  /// hypotheses is log(1 - confidence) / log(1 - q), with q the fraction of matches in the support.
+  /// Equal seeds result in the same order of hypotheses.
   void Split(FilterState& f, std::span<PendingMeasurement* const> rows, std::uint64_t seed,
              std::vector<PendingMeasurement*>& inliers,
              std::vector<PendingMeasurement*>& remaining);
-  /// Returns whether a measurement outside the support passes the gate after the update by the
-  /// support.
+  /// Returns whether a measurement outside the support passes a second gate, which is tested after
+  /// the update by the support.
   bool PassesRescueGate(const PendingMeasurement& pending) const {
     return pending.report->nis <= rescue_[static_cast<std::size_t>(pending.sensor)];
   }
@@ -39,11 +39,12 @@ class Consensus {
   std::vector<double> support_, rescue_;  ///< thresholds on r' R^-1 r and NIS, by sensor
 
   // Reused memory.
-  Scratch<std::vector<PendingMeasurement*>> matches_;  ///< of sensors with outlier_rejection
-  std::vector<std::size_t> order_;                     ///< of hypotheses
+  Scratch<std::vector<PendingMeasurement*>>
+      matches_;                       ///< matches of sensors with outlier_rejection
+  std::vector<std::size_t> order_;    ///< order in which matches are tried
   std::vector<char> supports_;        ///< by match: whether it supports the current hypothesis
   std::vector<char> best_;            ///< by match: whether it supports the best hypothesis
-  std::vector<double> h_, residual_;  ///< of one match
+  std::vector<double> h_, residual_;  ///< h and residual of one match
 };
 
 }  // namespace alidade::internal

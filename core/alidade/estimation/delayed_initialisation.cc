@@ -12,8 +12,8 @@ bool IsMissing(const FilterState& f, const RoleBinding& role) {
   return role.block >= 0 && !f.state.layout()[role.block].present;
 }
 
-/// Returns whether a measurement initialises a block: the only block of its sensor without a value,
-/// with a prior that names this sensor.
+/// Returns whether a measurement initialises a block. This is so if its sensor has exactly one
+/// block without a value, and the prior of this block names the sensor.
 bool IsAwaited(const FilterState& f, const PendingMeasurement& pending) {
   const SensorBinding& sensor = *pending.binding;
   const int index = sensor.model->inverse().role;
@@ -91,7 +91,7 @@ bool IsReady(const FilterState& f, const PendingMeasurement& pending) {
 Outcome Invert(FilterState& f, PendingMeasurement& pending, const LandmarkOptions::Prior* prior,
                InverseMeasurement& inverse) {
   RolesAt(f, pending, f.state.values());
-  Roles roles = pending.roles;  // InvertAt adds y
+  Roles roles = pending.roles;  // a copy, because InvertAt adds pointers to y
   Outcome outcome = InvertAt(*pending.binding, *pending.place, *pending.measurement,
                              prior == nullptr ? nullptr : &prior->inverse_distance, roles, inverse);
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(pending, roles.data());

@@ -15,10 +15,11 @@
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/model_members.h"
 
-/// Models that are structs of the program itself (alidade/model/model.h), without a plugin.
+/// Use of model structs (alidade/model/model.h) that are compiled into the program, without a
+/// plugin.
 namespace alidade {
 
-/// Structs derived from Sensor and from Motion (alidade/model/model.h).
+/// A struct derived from Sensor, or from Motion (alidade/model/model.h).
 template <class Model>
 concept SensorStruct = requires {
   Model::kInitialises;
@@ -46,7 +47,7 @@ Space MeasurementSpace() {
   std::vector<Geometry> geometries;
   if constexpr (Z::kGeometry == ALIDADE_PRODUCT) {
     constexpr auto quantities = Model::kParts;
-    static_assert(quantities.size() == Z::kParts, "one Quantity in kParts for each part");
+    static_assert(quantities.size() == Z::kParts, "kParts needs one Quantity for each part");
     Z::ForEachPart([&](auto part, int, int) {
       geometries.push_back(GeometryOf<decltype(part)>(decltype(part)::kAmbient));
       parts.push_back(SpaceOf(quantities[parts.size()], geometries.back()));
@@ -57,14 +58,14 @@ Space MeasurementSpace() {
   }
 }
 
-/// Converts the prior and dynamics of a role. Throws Error kPlugin if they are invalid.
+/// Converts the prior and dynamics of a role. Throws Error kPlugin if either is invalid.
 OwnedRole OwnedRoleOf(const Owned& owned, const Space& role);
 
 template <class Model>
 SensorModel::Description DescribeSensor(const Model& model, std::string name) {
   static_assert(CheckSensorNames<Model>() && CheckSensorMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kRoles)> == Blocks<Model>::kCount,
-                "one Quantity in kRoles for each role");
+                "kRoles needs one Quantity for each role");
   static_assert(AreNamed(Model::kRoles) && Model::kMeasurement.name != nullptr,
                 "kMeasurement and each Quantity of kRoles need a name, as in Quantity{\"depth\"}");
   SensorModel::Description description;
@@ -101,7 +102,7 @@ template <class Model>
 MotionModel::Description DescribeMotion(const Model& model, std::string name) {
   static_assert(CheckMotionNames<Model>() && CheckMotionMembers<Model>());
   static_assert(std::tuple_size_v<decltype(Model::kBlocks)> == Blocks<Model>::kCount,
-                "one Quantity in kBlocks for each block");
+                "kBlocks needs one Quantity for each block");
   static_assert(AreNamed(Model::kBlocks),
                 "each Quantity of kBlocks needs a name, as in Quantity{\"position\"}");
   MotionModel::Description description;
@@ -124,7 +125,8 @@ MotionModel::Description DescribeMotion(const Model& model, std::string name) {
   return description;
 }
 
-/// Runs `call` of a model. Records the text of an exception as its error text.
+/// Runs `call`, a call of `model`. If it throws, records the text of the exception as the error
+/// text of the model.
 template <class Call>
 Status Guarded(const void* model, const Call& call) {
   try {
@@ -204,7 +206,7 @@ class DirectMotion final : public MotionModel {
     return detail::Guarded(this, [&] {
       Status status = Status::kOk;
       if (out.next != nullptr) {
-        // A model with blocks of dynamic size may leave elements unwritten: they are NaN.
+        // Set to NaN first: a model with blocks of dynamic size may not write all elements.
         if constexpr (!detail::Blocks<Model>::kStatic) {
           for (std::size_t k = 0; k < this->blocks().size(); ++k) {
             std::fill_n(out.next[k], this->blocks()[k].geometry.ambient,
@@ -226,12 +228,12 @@ class DirectMotion final : public MotionModel {
   Model model_;
 };
 
-/// Returns a sensor model that calls `model`. Messages contain `name`.
+/// Returns a sensor model that calls `model`. Messages refer to the model by `name`.
 template <class Model>
 SharedSensor MakeSensor(Model model, std::string name = "model") {
   return std::make_shared<DirectSensor<Model>>(std::move(model), std::move(name));
 }
-/// Returns a motion model that calls `model`. Messages contain `name`.
+/// Returns a motion model that calls `model`. Messages refer to the model by `name`.
 template <class Model>
 SharedMotion MakeMotion(Model model, std::string name = "model") {
   return std::make_shared<DirectMotion<Model>>(std::move(model), std::move(name));

@@ -13,29 +13,30 @@ namespace alidade {
 ///   step       x' = f(x, u, 0),   P' = F P F' + G Q G'
 ///   update     S = H P H' + R = L L',   W = P H' L^-T,   dx = W L^-1 r,   P -= W W'
 ///
-/// With few states, S = L D L' replaces S = L L'; the result is the same. The gain of a consider
-/// block is 0 (Schmidt): P += E E', E = (K - K*) L with the optimal gain K*. If digits would
-/// cancel, the Joseph form replaces both. With a robust loss on the sensor, R / w(d) replaces R,
-/// d^2 = r' S^-1 r.
+/// For small states S is factorised as L D L' instead of L L'; the result is the same. The gain of
+/// a consider block is 0 (Schmidt), which adds E E' to P, E = (K - K*) L with the optimal gain K*.
+/// If these formulas would lose digits by cancellation, the Joseph form is used instead. If the
+/// sensor has a robust loss, R / w(d) replaces R, d^2 = r' S^-1 r.
 ///
-/// A control input acts from the timestamp of its frame until the next input, at most for
-/// InputBinding::timeout_s. If no input acts, u is 0 (event `input_stale`). The event `substeps`
-/// reports a gap that is divided into at least twice as many steps as any gap reported before.
+/// A control input acts from the timestamp of its frame until the next input, but no longer than
+/// InputBinding::timeout_s. If no input acts, u is 0 (event `input_stale`). A gap that is longer
+/// than max_dt_s is divided into steps. The event `substeps` reports it if it has at least twice as
+/// many steps as any gap reported before.
 ///
-/// Discrete noise w ~ N(0, I) is constant over an interval. The interval ends when anything but a
-/// step changes the state; frames without an accepted measurement do not end it. With Lq of the
-/// start of the interval and M = Cov(x, w), which is 0 there, each step computes
+/// Discrete noise w ~ N(0, I) is constant over an interval. The interval ends at any change of the
+/// state other than a step, so frames without an accepted measurement do not end it. Lq is
+/// evaluated at the start of the interval. M = Cov(x, w) is 0 at the start. Each step computes
 ///
 ///   N = G Lq,  A = F M:   P' = F P F' + A N' + N A' + N N',   M' = A + N
 ///
-/// If S is not positive definite because P is not positive semi-definite, P is repaired: negative
-/// pivots of its L D L' count as zero (event `repaired`). After `max_covariance_repairs` repairs
-/// the next one ends the filter.
+/// If S is not positive definite because P is not positive semi-definite, P is repaired: the
+/// negative pivots of P = L D L' are set to zero (event `repaired`). The filter ends if more than
+/// `max_covariance_repairs` repairs are needed.
 ///
-/// Implementation: internal::EkfEquations (ekf_equations.h).
+/// internal::EkfEquations (ekf_equations.h) implements the equations.
 class Ekf : public Filter {
  public:
-  /// All capabilities.
+  /// Every capability: an Ekf solves all problems.
   static constexpr EstimatorCapabilities kCapabilities = {.consider = true,
                                                           .at_measurement = true,
                                                           .from_measurement = true,

@@ -11,7 +11,7 @@
 
 namespace alidade::internal {
 
-// Some functions are flattened, for the reason given at FilterEngine::Run.
+// Some functions have the attribute flatten. FilterEngine::Run documents the reason.
 
 [[gnu::flatten]] StepError EkfEquations::Step(FilterState& f, double dt_s) {
   if (StepError error = f.motions.Evaluate(f.state, dt_s)) return error;
@@ -40,8 +40,8 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
 }
 
 /// Sets jacobian_roles_, the point at which H is evaluated. First estimates replace the values of
-/// the roles if they are in use, and the implied state does with `jacobian_at: measurement`.
-/// Returns whether this differs from the point at which h is evaluated.
+/// the roles if first estimates are used. With `jacobian_at: measurement`, the value that z implies
+/// replaces the value of the role. Returns whether H is evaluated at another point than h.
 [[gnu::noinline]] bool EkfEquations::FindLinearisation(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   const std::vector<RoleBinding>& bound = pending.binding->roles;
@@ -74,7 +74,7 @@ void EkfEquations::BeginUpdate(FilterState& f, int capacity) {
     const Status status =
         model.Initialise(pending.roles.data(), {pending.z, pending.measurement->known.data()},
                          nullptr, {.y = implied_value_.data()});
-    // If no state implies z, the measurement is invalid.
+    // If no value of the role explains z, the measurement is invalid.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
@@ -127,8 +127,8 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
                        consider_rows_.end());
 }
 
-/// Computes the gain of the consider rows: K* with zeros for consider states. Writes it and the
-/// resulting dx to the update.
+/// Computes the gain of the consider rows: K* with zeros for consider states. Writes the gain and
+/// the resulting dx to f.update.
 [[gnu::noinline]] EkfEquations::ConsiderGain EkfEquations::ConsiderCorrection(
     FilterState& f, std::span<PendingMeasurement* const> rows, bool recorded) {
   const Eigen::Index count = std::ssize(consider_rows_), m = f.update.rows();
@@ -162,8 +162,8 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
   return result;
 }
 
-/// Updates P by the Joseph form, which does not cancel. `consider_gain` is the gain of the consider
-/// rows. Returns false if a variance would be negative.
+/// Updates P by the Joseph form, which does not lose digits by cancellation. `consider_gain` is the
+/// gain of the consider rows. Returns false if a variance would be negative.
 [[gnu::noinline]] bool EkfEquations::Joseph(FilterState& f,
                                             std::span<PendingMeasurement* const> rows,
                                             const Workspace::Matrix* consider_gain) {
@@ -206,7 +206,7 @@ void EkfEquations::AssignColumns(FilterState& f, std::span<PendingMeasurement* c
       AddOuterProduct(f.state.covariance().lower(), consider_rows_, consider_gain->e);
     }
   }
-  f.state.MoveTo(f.moved);  // last, because it also transports P to the new tangent spaces
+  f.state.MoveTo(f.moved);  // last step, because MoveTo also transports P to the new tangent spaces
   if (recorded) {
     RecordGainBy(f, rows,
                  [&](std::span<const int> p_rows, int column, int count, double* destination) {

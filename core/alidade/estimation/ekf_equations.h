@@ -9,7 +9,7 @@
 
 namespace alidade::internal {
 
-/// Equations of Ekf, which documents them: Jacobians and a dense P.
+/// Equations of the extended Kalman filter, as documented at Ekf. P is a dense matrix.
 class EkfEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -23,15 +23,16 @@ class EkfEquations : public UpdateMethod {
     return CorrectBy(f, rows, nullptr);
   }
 
-  /// Corrects x and P as Correct does, but x by `correction`. If it is null, x by K r.
+  /// Corrects P as Correct does. Adds `correction` to x, or K r if `correction` is null.
   Outcome CorrectBy(FilterState& f, std::span<PendingMeasurement* const> rows,
                     const double* correction);
-  /// Assigns consecutive columns to the rows. The rows may be a subset of those that passed the
-  /// gate.
+  /// Assigns consecutive columns of the update to the measurements `rows`, which may be a subset of
+  /// those that passed the gate.
   void AssignColumns(FilterState& f, std::span<PendingMeasurement* const> rows);
 
  private:
-  /// K and E = (K - K*) L of the consider rows of P; K* = P H' S^-1, S = L L'.
+  /// Gain K of the rows of P that belong to consider states, and E = (K - K*) L for these rows. K*
+  /// = P H' S^-1, S = L L'.
   struct ConsiderGain {
     Workspace::Matrix gain, e;
   };
@@ -44,11 +45,11 @@ class EkfEquations : public UpdateMethod {
               const Workspace::Matrix* consider_gain);
 
   // Reused memory.
-  Roles jacobian_roles_{};                                ///< the point at which H is evaluated
-  Scratch<std::vector<double>> implied_value_;            ///< with jacobian_at: measurement
-  Scratch<std::vector<double>> jacobian_h_;               ///< h at jacobian_roles_
-  Scratch<std::vector<const MeasurementRows*>> stacked_;  ///< of the update
-  Scratch<std::vector<int>> consider_rows_;  ///< rows of P whose gain is not the optimal one
+  Roles jacobian_roles_{};                      ///< the point at which H is evaluated
+  Scratch<std::vector<double>> implied_value_;  ///< for roles with `jacobian_at: measurement`
+  Scratch<std::vector<double>> jacobian_h_;     ///< h at jacobian_roles_
+  Scratch<std::vector<const MeasurementRows*>> stacked_;  ///< measurements of the update
+  Scratch<std::vector<int>> consider_rows_;  ///< rows of P that do not use the optimal gain
 };
 
 }  // namespace alidade::internal

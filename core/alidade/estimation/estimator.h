@@ -22,7 +22,7 @@ namespace alidade {
 
 class Filter;
 
-/// Result of processing one measurement. The meanings are in kOutcomes.
+/// Result of processing one measurement. kOutcomes documents the values.
 enum class Outcome {
   kAccepted,
   kInitialised,
@@ -39,19 +39,21 @@ enum class Outcome {
 
 /// Properties of an outcome.
 struct OutcomeInfo {
-  const char* name;     ///< in files
-  const char* meaning;  ///< a sentence for the documentation
-  /// Whether it counts towards rejection recovery; `not_finite` only if h was computed.
+  const char* name;     ///< name in files
+  const char* meaning;  ///< a phrase for the documentation
+  /// Whether the outcome counts as a rejection for rejection recovery. An outcome `not_finite`
+  /// counts only if h was computed.
   bool is_rejection = false;
-  bool is_gated = false;           ///< by the gate or by outlier rejection
-  bool is_initialisation = false;  ///< the measurement initialises a block, or could do so
+  bool is_gated = false;           ///< rejected by the gate or by outlier rejection
+  bool is_initialisation = false;  ///< the measurement initialised a block or waits to do so
 };
-/// Properties of all outcomes, indexed by Outcome. A new outcome is a value of Outcome and a row.
+/// Properties of all outcomes, indexed by Outcome. To add an outcome, add a value to Outcome and an
+/// entry here.
 inline constexpr std::array kOutcomes = {
     OutcomeInfo{.name = "accepted",
-                .meaning = "the update used it; also the initial value during a frame"},
+                .meaning = "the update used it (also the value before the frame is processed)"},
     OutcomeInfo{.name = "initialised",
-                .meaning = "it was consumed to initialise a block",
+                .meaning = "it initialised a block and was not used for an update",
                 .is_initialisation = true},
     OutcomeInfo{.name = "gated",
                 .meaning = "the gate or the outlier rejection rejected it",
@@ -66,16 +68,17 @@ inline constexpr std::array kOutcomes = {
     OutcomeInfo{.name = "not_finite",
                 .meaning = "z, h, H, R, S or the update is not finite; an update was rolled back",
                 .is_rejection = true},
-    OutcomeInfo{.name = "not_pd",
-                .meaning = "the update would have lost positive definiteness, and was rolled back",
-                .is_rejection = true},
+    OutcomeInfo{
+        .name = "not_pd",
+        .meaning = "S or P would not have been positive definite; the update was rolled back",
+        .is_rejection = true},
     OutcomeInfo{.name = "stale", .meaning = "it is older than the state"},
     OutcomeInfo{.name = "not_ready",
                 .meaning = "a required block has no value yet",
                 .is_initialisation = true},
     OutcomeInfo{.name = "failed", .meaning = "the plugin failed"},
     OutcomeInfo{.name = "ended",
-                .meaning = "it was not processed: the estimator had failed before"},
+                .meaning = "it was not processed, because the estimator had already ended"},
 };
 static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
 /// Returns the properties of an outcome.
@@ -84,7 +87,7 @@ inline const OutcomeInfo& InfoOf(Outcome outcome) {
 }
 /// Returns the name of an outcome in files: `accepted`, `gated`.
 inline const char* ToString(Outcome outcome) { return InfoOf(outcome).name; }
-/// Converts the status of a model to the outcome of the measurement; kOk to kAccepted.
+/// Converts the status of a model to the outcome of the measurement. kOk becomes kAccepted.
 inline Outcome OutcomeOf(Status status) {
   switch (status) {
     case Status::kOk:
@@ -99,15 +102,15 @@ inline Outcome OutcomeOf(Status status) {
   return Outcome::kFailed;
 }
 
-/// Read-only view of the numbers of a report. Equal if all elements are equal.
+/// Read-only view of numbers in a report. Two views are equal if all elements are equal.
 struct Numbers : std::span<const double> {
   using std::span<const double>::span;  // NOLINT(modernize-use-equals-default)
   friend bool operator==(const Numbers& a, const Numbers& b) { return std::ranges::equal(a, b); }
 };
 
-/// Result of one measurement; m = dof, its tangent size. The numbers are stored in the estimator
-/// and valid until its next frame; the numbers of a copy are stored in its UpdateReport. A view is
-/// empty if its quantity was not computed.
+/// Result of one measurement. m: tangent size of the measurement (dof). The estimator stores the
+/// numbers, which are valid until the next frame. After a copy of an UpdateReport, the copy stores
+/// its own numbers. A view is empty if the quantity was not computed.
 struct MeasurementReport {
   MeasurementReport() = default;
   MeasurementReport(int sensor_index, Outcome result, std::int64_t landmark_id, int tangent_size)
@@ -118,16 +121,16 @@ struct MeasurementReport {
   std::int64_t landmark = -1;
   int dof = 0;
   double nis = 0.0;    ///< r' S^-1 r, not divided by dof; S without the weight w
-  Numbers z, h;        ///< ambient
-  Numbers innovation;  ///< r = z (-) h, m
+  Numbers z, h;        ///< measurement and its prediction, ambient
+  Numbers innovation;  ///< r = z (-) h, size m
   Numbers s;           ///< S = H P H' + R / w, m x m; w = 1 without a robust loss
-  /// K, column by column. Its rows belong to the blocks with a covariance, in the order of the
-  /// layout. Empty unless accepted.
+  /// K, column by column. The rows belong to the blocks with a covariance, in the order of the
+  /// layout. Empty unless the measurement was accepted.
   Numbers gain;
 };
 
-/// Reports of the measurements of a frame, and memory for numbers that no other object stores. A
-/// copy stores all numbers itself.
+/// Reports of the measurements of a frame. Can also store the numbers of the reports: Copy adds
+/// numbers, and a copy of this object stores all of them.
 class MeasurementReports {
  public:
   MeasurementReports() = default;
@@ -155,11 +158,11 @@ class MeasurementReports {
   std::vector<std::vector<double>> numbers_;
 };
 
-/// Parts of the processing of a frame, in their order; see Filter.
+/// Parts of the processing of a frame, in their order. Filter documents them.
 enum class FramePart { kStep, kEvaluate, kGate, kUpdate, kLandmarks };
 inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
 
-/// Report of one frame. Can be reused without allocating memory.
+/// Report of one frame. The object can be reused for the next frame without allocating memory.
 class UpdateReport {
  public:
   std::span<const MeasurementReport> measurements() const { return measurements_.entries(); }
@@ -182,41 +185,43 @@ class UpdateReport {
   }
   void ClearMeasurements() { measurements_.Clear(); }
 
-  bool stale = false;       ///< the frame is older than the state, which is unchanged
+  bool stale = false;       ///< the frame is older than the state and was not processed
   std::vector<int> inputs;  ///< indices into Problem::motions of the control inputs that were set
   std::vector<Event> events;
   LandmarkCounts landmarks;
-  /// Last estimates of the landmarks that the frame removed from the state. Empty for a batch.
+  /// Last estimates of the landmarks that were removed from the state at this frame. Empty for a
+  /// batch.
   std::vector<LandmarkEstimate> removed_landmarks;
-  /// Wall-clock time by FramePart. Only filters with landmarks measure it.
+  /// Wall-clock time of each FramePart. Measured only by filters with landmarks.
   std::array<double, kFrameParts> spent_s{};
 
  private:
   MeasurementReports measurements_;
 };
 
-/// Estimator for one problem. It does not read files, print or exit.
+/// Estimator for one problem. An estimator does not read files, print or end the program.
 class Estimator {
  public:
-  /// Receives the estimate and the report of frame `index`, counted from the first call of Process.
+  /// Function that receives the estimate and the report of frame `index`. The frame of the first
+  /// call of Process has index 0.
   using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
 
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Timestamp timestamp) = 0;
-  /// Steps to the timestamp of the frame and uses the measurements whose stream has a sensor. The
-  /// report is valid until the next call.
+  /// Propagates the state to the timestamp of the frame, and uses the measurements of all streams
+  /// that have a sensor. The report is valid until the next call.
   virtual const UpdateReport& Process(const Frame& frame) = 0;
   /// Returns whether the estimates depend on later frames too (a smoother, a batch). If so, state()
   /// is not meaningful after Process, and Smooth computes the estimates.
   virtual bool offline() const { return false; }
-  /// Computes the estimates of all frames and passes them to `emit` in order. Called once, after
-  /// the last frame. The last report has the events of the smoothing itself. If estimates are
-  /// missing, throws an Error with the reason, and failed() is true. Exceptions of `emit`
-  /// propagate.
+  /// Computes the estimates of all frames and passes them to `emit` in the order of the frames.
+  /// Called once, after the last frame. The events of the smoothing itself are in the last report.
+  /// If an estimate cannot be computed, throws an Error with the reason, and failed() is true.
+  /// Exceptions of `emit` propagate.
   virtual void Smooth(const Emit& /*emit*/) {}
-  /// Sets a function that Smooth calls repeatedly while it runs. If it returns true, Smooth throws
-  /// an Error kStopped. A null function never stops.
+  /// Sets a function that Smooth calls repeatedly while it runs. If the function returns true,
+  /// Smooth throws an Error kStopped. If the function is null, Smooth is never stopped.
   virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
   /// Returns a copy whose later results equal those of this estimator bit by bit, or null if the
   /// estimator cannot be copied.
@@ -227,10 +232,10 @@ class Estimator {
   /// Returns the landmarks in the state, ordered by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
   virtual Timestamp timestamp() const = 0;
-  /// Returns whether the estimate left the domain of a sensor or the numbers became invalid; see
-  /// the events.
+  /// Returns whether the filter diverged: its estimate left the domain of a sensor, or its numbers
+  /// became invalid. An event reports the reason.
   virtual bool diverged() const = 0;
-  /// Returns whether the estimator cannot continue (not finite, unrecoverable).
+  /// Returns whether the estimator ended early because it cannot continue.
   virtual bool failed() const = 0;
 };
 

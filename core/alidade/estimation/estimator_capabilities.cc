@@ -25,7 +25,7 @@ std::optional<ProblemDefect> FindUnsupportedBlock(const Problem& problem,
                          "mean and sigma", prior.block};
   }
   if (problem.landmarks && !capabilities.landmarks) {
-    return ProblemDefect{"landmarks", "landmarks", "`sensors` that measure none"};
+    return ProblemDefect{"landmarks", "landmarks", "`sensors` that measure no landmarks"};
   }
   return std::nullopt;
 }
@@ -66,8 +66,8 @@ std::optional<ProblemDefect> CheckStart(const Problem& problem, const Prior& pri
       "a sensor whose inverse measurement model determines this block", prior.block};
 }
 
-/// Returns the first cycle among the blocks reachable from `chain`, in which each block needs the
-/// next one to start. Requires that all sensors that blocks start from exist.
+/// Follows the blocks that must have a value before the last block of `chain` can start. Returns
+/// the first cycle among them. Requires that every sensor from which a block starts exists.
 std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<BlockId>& chain) {
   const BlockId last = chain.back();
   if (std::ranges::find(chain, last) != chain.end() - 1) {
@@ -87,7 +87,7 @@ std::optional<ProblemDefect> FindCycle(const Problem& problem, std::vector<Block
   return {};
 }
 
-/// Returns a text such as `consider blocks (block 'target.depth'); expected ...`.
+/// Returns the text of a defect, such as `consider blocks (block 'target.depth'); expected ...`.
 std::string Describe(const ProblemDefect& defect, const Problem& problem) {
   std::string text = defect.description;
   if (defect.block >= 0) text += " (block '" + problem.layout[defect.block].name + "')";

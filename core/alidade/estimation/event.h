@@ -49,17 +49,17 @@ enum class EventKind {
 
 /// Severity of a kind of event.
 enum class EventSeverity {
-  kInfo,     ///< for the record
-  kWarning,  ///< the estimates may be worse than the filter believes
+  kInfo,     ///< recorded for information only
+  kWarning,  ///< the estimates may be worse than their covariance indicates
   kError,    ///< the estimator, or one of its sensors, ended
 };
 
 /// Name, severity and meaning of a kind of event.
 struct EventKindInfo {
   EventKind kind;
-  const char* name;  ///< the word in files
+  const char* name;  ///< name in files
   EventSeverity severity;
-  const char* meaning;  ///< a sentence for the documentation
+  const char* meaning;  ///< a phrase for the documentation
 };
 
 /// All kinds of events. To add a kind, add a value of EventKind and an entry here.
@@ -69,14 +69,15 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kFailed, "failed", EventSeverity::kError,
                   "the estimator failed with an error and ended"},
     EventKindInfo{EventKind::kStopped, "stopped", EventSeverity::kError,
-                  "the smoothing of the estimator was stopped before its end"},
+                  "the estimator was stopped before it had finished smoothing"},
     EventKindInfo{EventKind::kPluginFailed, "plugin_failed", EventSeverity::kError,
                   "a model of a plugin failed for this measurement"},
     EventKindInfo{EventKind::kSensorDisabled, "sensor_disabled", EventSeverity::kWarning,
-                  "the sensor's model failed; `on_plugin_failure: disable` drops the sensor"},
-    EventKindInfo{
-        EventKind::kInconsistent, "inconsistent", EventSeverity::kWarning,
-        "the error of a block element exceeded 10 sigma for 20 timestamps in a row; needs truth"},
+                  "the sensor's model failed; the sensor is not used any more (`on_plugin_failure: "
+                  "disable`)"},
+    EventKindInfo{EventKind::kInconsistent, "inconsistent", EventSeverity::kWarning,
+                  "the error of a block element exceeded 10 sigma for 20 timestamps in a row; "
+                  "requires truth"},
     EventKindInfo{EventKind::kNeesBounds, "nees_bounds", EventSeverity::kWarning,
                   "a mean NEES is outside its 95 % bounds"},
     EventKindInfo{EventKind::kNisBounds, "nis_bounds", EventSeverity::kWarning,
@@ -87,14 +88,15 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kUnused, "unused", EventSeverity::kWarning,
                   "the estimator used no measurement of this sensor; the text states the reason"},
     EventKindInfo{EventKind::kTruth, "truth", EventSeverity::kWarning,
-                  "the source names a truth that no frame provided"},
+                  "the source has a truth, but no frame contained a value of it"},
     EventKindInfo{EventKind::kUnobservable, "unobservable", EventSeverity::kWarning,
                   "no sensor of this estimator determines this direction of the state"},
     EventKindInfo{
         EventKind::kObservability, "observability", EventSeverity::kInfo,
-        "unobservable directions were not searched for: the state has more than 500 elements"},
+        "unobservable directions were not computed, because the state has more than 500 elements"},
     EventKindInfo{EventKind::kRejectionRecovery, "rejection_recovery", EventSeverity::kWarning,
-                  "many measurements of a sensor in a row were rejected; the filter recovers"},
+                  "many measurements of a sensor in a row were rejected; the filter reset or "
+                  "inflated blocks"},
     EventKindInfo{
         EventKind::kRepaired, "repaired", EventSeverity::kWarning,
         "a covariance lost positive semi-definiteness and was repaired (`max_covariance_repairs`)"},
@@ -106,40 +108,46 @@ inline constexpr std::array kEventKinds = {
     EventKindInfo{EventKind::kConditioning, "conditioning", EventSeverity::kWarning,
                   "S is so ill-conditioned that the update loses digits"},
     EventKindInfo{EventKind::kGuarded, "guarded", EventSeverity::kWarning,
-                  "sigma points left the domain of a model and were drawn closer to the estimate"},
+                  "sigma points left the domain of a model and were moved closer to the estimate"},
     EventKindInfo{EventKind::kNotConverged, "not_converged", EventSeverity::kWarning,
                   "an iteration ended before it converged"},
     EventKindInfo{EventKind::kStale, "stale", EventSeverity::kWarning,
-                  "the frame is older than the state, so its measurements are not used; reported "
+                  "the frame is older than the state and was not used; reported "
                   "once for consecutive frames"},
     EventKindInfo{EventKind::kOutOfSequence, "out_of_sequence", EventSeverity::kWarning,
                   "the frame was dropped: it is older than `out_of_sequence.window_s` allows"},
     EventKindInfo{EventKind::kInputStale, "input_stale", EventSeverity::kWarning,
-                  "a motion model steps with u = 0: no control input has arrived, or the last is "
+                  "a motion model uses u = 0: no control input has arrived, or the last one is "
                   "older than `timeout_s`"},
-    EventKindInfo{EventKind::kInputRefused, "input_refused", EventSeverity::kWarning,
-                  "a control input is not finite; reported once until an input is accepted"},
+    EventKindInfo{
+        EventKind::kInputRefused, "input_refused", EventSeverity::kWarning,
+        "a control input is not finite or not of unit length; reported once until an input is "
+        "accepted"},
     EventKindInfo{EventKind::kSubsteps, "substeps", EventSeverity::kInfo,
-                  "a gap longer than `max_dt_s` was divided into steps, at least twice as many as "
+                  "a gap longer than `max_dt_s` was divided into at least twice as many steps as "
                   "in the last report"},
     EventKindInfo{EventKind::kTooManySubsteps, "too_many_substeps", EventSeverity::kError,
-                  "a gap needs more steps than allowed; the estimator ended"},
+                  "a gap between timestamps needs more steps than allowed; the estimator ended"},
     EventKindInfo{EventKind::kSolution, "solution", EventSeverity::kInfo,
-                  "the end of the batch: its iterations, and whether it converged"},
+                  "the batch ended; the text states its iterations, and whether it converged"},
     EventKindInfo{EventKind::kNoSolution, "no_solution", EventSeverity::kError,
                   "the batch has no solution"},
     EventKindInfo{EventKind::kInitialEstimate, "initial_estimate", EventSeverity::kWarning,
-                  "the filter that provides initial estimates to the batch ended"},
+                  "the filter that provides the initial estimates of the batch ended early"},
     EventKindInfo{EventKind::kEdgeOfDomain, "edge_of_domain", EventSeverity::kWarning,
                   "the solution lies at the edge of the domain of a model"},
-    EventKindInfo{EventKind::kSolvedAsAWhole, "solved_as_a_whole", EventSeverity::kInfo,
-                  "an incremental solve was repeated over all data"},
-    EventKindInfo{EventKind::kInexact, "inexact", EventSeverity::kWarning,
-                  "variances of the batch may have large rounding errors: a prior is very vague"},
-    EventKindInfo{EventKind::kSlow, "slow", EventSeverity::kInfo,
-                  "the batch has many noise inputs; the time of a solve grows with their cube"},
+    EventKindInfo{
+        EventKind::kSolvedAsAWhole, "solved_as_a_whole", EventSeverity::kInfo,
+        "an incremental solve was not possible and was replaced by a solve over all data"},
+    EventKindInfo{
+        EventKind::kInexact, "inexact", EventSeverity::kWarning,
+        "variances of the batch may have large rounding errors, because a prior has a very "
+        "large sigma"},
+    EventKindInfo{
+        EventKind::kSlow, "slow", EventSeverity::kInfo,
+        "the batch has many noise inputs; the time of a solve grows with the cube of their number"},
     EventKindInfo{EventKind::kEstimatorSpecific, "estimator_specific", EventSeverity::kInfo,
-                  "an event of an estimator plugin without a kind in this list"},
+                  "an event of an estimator plugin that has no kind of its own"},
 };
 static_assert(
     [] {
@@ -154,7 +162,7 @@ static_assert(
 inline const EventKindInfo& InfoOf(EventKind kind) {
   return kEventKinds[static_cast<std::size_t>(kind)];
 }
-/// Returns the name of a kind as in files: `diverged`.
+/// Returns the name of a kind in files, such as `diverged`.
 inline const char* ToString(EventKind kind) { return InfoOf(kind).name; }
 /// Returns the name of a severity: `info`, `warning`, `error`.
 inline const char* ToString(EventSeverity severity) {
@@ -162,9 +170,10 @@ inline const char* ToString(EventSeverity severity) {
   return kNames[static_cast<std::size_t>(severity)];
 }
 
-/// An occurrence that the user of an estimator should know about.
+/// Event during a run that an estimator reports to its user.
 struct Event {
-  Timestamp timestamp = kNoTimestamp;  ///< of the frame; kNoTimestamp: whole run
+  /// Timestamp of the frame. kNoTimestamp: the event concerns the whole run.
+  Timestamp timestamp = kNoTimestamp;
   EventKind kind = EventKind::kEstimatorSpecific;
   std::string text;
   bool divergence = false;  ///< true if the estimator diverged or failed at this event

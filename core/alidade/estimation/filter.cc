@@ -19,18 +19,18 @@ namespace {
 [[noreturn]] void ThrowUnknownName(const char* kind, std::string_view name,
                                    const std::vector<std::string>& names) {
   throw Error(ExitCode::kBadConfig, "no " + std::string(kind) + " '" + std::string(name) +
-                                        "'; the filter has " + internal::Join(names));
+                                        "'; expected " + internal::Join(names));
 }
 
 void CheckKnown(const std::string& place, int size, const std::vector<double>& known) {
   if (std::ssize(known) == size) return;
   throw Error(ExitCode::kBadData, place + ": " + std::to_string(known.size()) +
-                                      " known numbers with a measurement; expected " +
+                                      " known numbers in a measurement; expected " +
                                       std::to_string(size));
 }
 
-/// Returns the index of the sensor. Throws an Error if its model needs another amount of known
-/// numbers.
+/// Returns the index of the sensor. Throws an Error if the sensor does not exist, or its model
+/// needs another number of known numbers.
 int FindSensor(const Problem& problem, std::string_view name, const std::vector<double>& known) {
   const int index = problem.FindSensor(name);
   if (index < 0) ThrowUnknownName("sensor", name, internal::NamesOf(problem.sensors));
@@ -45,7 +45,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem
     throw Error(ExitCode::kBadData,
                 reading.stream < 0
                     ? "a reading has no stream; expected a sensor, or a state with a control input"
-                    : "no stream " + std::to_string(reading.stream) + "; the filter has " +
+                    : "no stream " + std::to_string(reading.stream) + "; expected an index below " +
                           std::to_string(streams.size()));
   }
   const StreamInfo& stream = streams[static_cast<std::size_t>(reading.stream)];
@@ -60,9 +60,10 @@ void CheckReading(const std::vector<StreamInfo>& streams, const Problem& problem
     const Geometry& geometry = sensor.model->measurement().geometry;
     const double defect = DistanceFrom(geometry, reading.values.data());
     if (defect > kUnitTolerance) {
-      throw Error(ExitCode::kBadData, "stream '" + stream.name +
-                                          "': the values do not have unit length: it is off by " +
-                                          internal::RoundedText(defect, 4));
+      throw Error(ExitCode::kBadData,
+                  "stream '" + stream.name +
+                      "': the values do not have unit length: the length differs from 1 by " +
+                      internal::RoundedText(defect, 4));
     }
     const int m = geometry.tangent;
     if (reading.covariance.empty() || std::ssize(reading.covariance) == m * m) continue;

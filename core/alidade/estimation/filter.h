@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Grouping of the measurements of one timestamp into updates.
+/// How the measurements of one timestamp are grouped into updates.
 enum class Fuse {
   kJoint,           ///< one stacked update
   kPerSensor,       ///< one update for each sensor, in the order of the config
@@ -23,28 +23,31 @@ enum class Fuse {
 
 /// Reaction to `rejection_recovery_after` consecutive rejections of one sensor.
 enum class RejectionRecovery {
-  kReset,    ///< re-initialise its blocks from the measurement if possible, else inflate
-  kInflate,  ///< multiply the covariance of its blocks by 100
+  /// Re-initialise the block that the measurement determines. If that is not possible, inflate.
+  kReset,
+  kInflate,  ///< multiply the covariance of the sensor's blocks by 100
   kNone,
 };
 
-/// Value at which H is evaluated for the blocks of stationary motion models (`constant`)
+/// Value of the blocks of stationary motion models (`constant`) at which H is evaluated
 /// [Huang2010].
 enum class JacobianPolicy {
-  kLatest,         ///< the latest estimate
-  kFirstEstimate,  ///< the initial value: the mean of the prior, or the value that z implied
+  kLatest,  ///< the latest estimate
+  /// The initial value: the mean of the prior, or the value that the first measurement implied.
+  kFirstEstimate,
 };
 
 /// Options common to all Kalman filters.
 struct EkfOptions {
-  /// Probability that a consistent measurement passes the gate; 1: no gate (`gate: none`).
+  /// Probability that the gate accepts a measurement whose noise agrees with R. 1: no gate.
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
   JacobianPolicy jacobian = JacobianPolicy::kLatest;
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
   int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
-  int max_covariance_repairs = 10;    ///< the filter ends at the next one
-  /// Longer gaps are divided into equal steps of at most this length, in whole ns, at least 1 ns.
+  int max_covariance_repairs = 10;    ///< the filter ends if one more repair is needed
+  /// A longer gap is divided into equal steps of at most this length, rounded to whole ns, at least
+  /// 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 };
 
@@ -60,7 +63,7 @@ inline EkfOptions WithoutRecovery(EkfOptions options) {
 
 }  // namespace internal
 
-/// One measurement of a sensor, or one control input of a state, for Filter::Push.
+/// One measurement of a sensor, or one control input of a state. Argument of Filter::Push.
 struct Reading {
   Reading(int stream_index, std::vector<double> z, std::int64_t landmark_id = -1,
           std::vector<double> r = {}, std::vector<double> known_numbers = {})
@@ -72,19 +75,20 @@ struct Reading {
   Reading(const SensorHandle& sensor, std::vector<double> z, std::int64_t landmark_id = -1,
           std::vector<double> r = {}, std::vector<double> known_numbers = {})
       : Reading(sensor.stream, std::move(z), landmark_id, std::move(r), std::move(known_numbers)) {}
-  /// The control input of a state.
+  /// Creates a control input of a state.
   Reading(const StateHandle& state, std::vector<double> u) : Reading(state.input, std::move(u)) {}
 
-  int stream;  ///< Filter::stream
+  int stream;  ///< index of the stream (Filter::stream)
   std::vector<double> values;
   std::int64_t landmark;
-  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: the model's
-  std::vector<double> known;       ///< known numbers of the sensor model; mostly empty
+  /// R, row-major, which replaces the noise of the model. Empty: the noise of the model is used.
+  std::vector<double> covariance;
+  std::vector<double> known;  ///< known inputs of the sensor model; empty for most sensors
 };
 
 /// Predicted measurement of a sensor.
 struct Prediction {
-  std::vector<double> z;  ///< h, ambient
+  std::vector<double> z;  ///< predicted measurement h, ambient
   Eigen::MatrixXd s;      ///< S = H P H' + R, m x m
 };
 
@@ -93,30 +97,33 @@ struct Prediction {
 ///
 /// Each frame is processed in these stages:
 ///
-///   step         propagate to its timestamp; divided if a control input changes or the gap is
-///                longer than max_dt_s; discrete noise is constant until the next update
-///   initialise   blocks that wait for one of its measurements
-///   predict      h, r and S of each measurement, for all measurements of a group at one state
-///   gate         compare r' S^-1 r of each measurement with chi-square; robust losses; consensus
-///   correct      one stacked update by the accepted measurements
-///   recover      repair a covariance that is not positive semi-definite; reset or inflate blocks
-///                if a sensor was rejected too often in a row
-///   landmarks    count, prune, convert and initialise
+///   step         propagate the state to the timestamp of the frame, in several steps if a control
+///                input changes or the gap is longer than max_dt_s
+///   initialise   initialise the blocks that wait for one of the measurements
+///   predict      compute h, r and S of each measurement in a group at the same state
+///   gate         compare r' S^-1 r of each measurement with a chi-square quantile; compute robust
+///                weights; reject outliers by RANSAC
+///   correct      correct the state by one stacked update with the accepted measurements
+///   recover      repair P if it is not positive semi-definite; reset or inflate blocks if a sensor
+///                was rejected too often in a row
+///   landmarks    count, prune, convert and initialise landmarks
 ///
-/// Control inputs of the frame act from its timestamp on. An update is atomic: if it would leave
-/// the state not finite or not positive definite, it is rolled back and reported.
+/// The control inputs of a frame act from its timestamp on. An update is atomic: if the new state
+/// would not be finite, or P not positive definite, the update is rolled back and reported.
 ///
-/// Live use: Push processes the readings of one timestamp. At returns the estimate at a later time,
-/// and Expect the predicted measurement of a sensor. Neither changes the filter.
+/// In live use, Push processes the readings of one timestamp. At returns the estimate at a later
+/// time. Expect returns the predicted measurement of a sensor. At and Expect do not change the
+/// filter.
 ///
-/// Frames have to be ordered by timestamp; an older one is `stale`. For late frames use Rollback.
+/// Frames must be ordered by timestamp. A frame older than the state is reported as `stale` and not
+/// used. Use Rollback to process late frames.
 ///
-/// Threads: as for values of the standard library. Several threads may call const members
+/// Thread safety is that of standard library types. Several threads may call const members
 /// concurrently while no thread calls a non-const member. Copies share only the problem and its
-/// models. These do not change, and models may be called from several threads.
+/// models, which never change. Models may be called from several threads.
 class Filter : public Estimator {
  public:
-  // By frames.
+  // Processing frame by frame (Estimator).
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
@@ -129,22 +136,25 @@ class Filter : public Estimator {
 
   const Problem& problem() const;
 
-  // Live.
-  /// Returns the index of a stream, for Reading::stream. Error kBadConfig for an unknown name.
+  // Live use: processing reading by reading.
+  /// Returns the index of a stream, the value of Reading::stream. Throws Error kBadConfig if the
+  /// name is unknown.
   int stream(std::string_view name) const;
-  /// Returns the id of a block of the problem, `owner.block`. Error kBadConfig for an unknown name.
+  /// Returns the id of a block of the problem. The name has the form `owner.block`. Throws Error
+  /// kBadConfig if the name is unknown.
   BlockId block(std::string_view name) const;
-  /// Converts the readings of one timestamp to a frame. Throws Error kBadData for an unknown
-  /// stream, or if the size of values, covariance or known numbers is not that of the stream. The
-  /// length of a quaternion or direction may differ from 1 by at most 1e-3.
+  /// Converts the readings of one timestamp to a frame. Throws Error kBadData if a stream is
+  /// unknown, or if its measurements need another number of values, covariance elements or known
+  /// numbers. The length of a quaternion or direction may differ from 1 by at most 1e-3.
   Frame MakeFrame(Timestamp timestamp, const std::vector<Reading>& readings) const;
-  /// Calls MakeFrame and Process. The report is valid until the next call. Errors: those of
+  /// Calls MakeFrame and Process. The report is valid until the next call. Throws the errors of
   /// MakeFrame; the filter is then unchanged.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   const UpdateReport& Push(Timestamp timestamp, const SensorHandle& sensor, double z) {
     return Push(timestamp, {Reading(sensor, {z})});
   }
-  // A Timestamp is in nanoseconds: TimestampFromSeconds(t_s).
+  // Times in seconds are rejected at compile time: TimestampFromSeconds converts them to
+  // nanoseconds.
   template <std::floating_point Seconds, class... Arguments>
   const UpdateReport& Push(Seconds t_s, const Arguments&... arguments) = delete;
   template <std::floating_point Seconds>
@@ -156,18 +166,19 @@ class Filter : public Estimator {
                                    const Arguments&... arguments) const = delete;
   /// Returns the estimate of a block. ContractViolation if the block has no value yet.
   BlockEstimate Estimate(BlockId block) const;
-  /// Returns the state after a frame without measurements at `timestamp`, not before timestamp().
-  /// The filter is unchanged. If a step fails, returns the state before that step.
+  /// Returns the predicted state at `timestamp`, which must not be before timestamp(). The filter
+  /// is unchanged. If a step fails, returns the state before that step.
   State At(Timestamp timestamp) const;
-  /// Predicts the measurement of a sensor at `timestamp`. `landmark` is the id of the landmark, if
-  /// the sensor measures landmarks; `known` are the known numbers of its model. Returns nullopt if
-  /// h is not defined or not finite, S is not positive definite, or a block or the landmark has no
-  /// value yet. Errors: kBadConfig for an unknown sensor, kBadData for a wrong size of `known`.
+  /// Predicts the measurement of a sensor at `timestamp`. `landmark` is the id of the landmark if
+  /// the sensor measures landmarks. `known` are the known numbers of the sensor model. Returns
+  /// nullopt if h is not defined or not finite, S is not positive definite, or a block or the
+  /// landmark has no value yet. Throws Error kBadConfig if the sensor is unknown, and kBadData if
+  /// `known` has a wrong size.
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1,
                                    const std::vector<double>& known = {}) const;
-  /// Calls Expect for each of the landmarks, with a single step of the state. The sensor must not
-  /// have known numbers.
+  /// Returns Expect of each landmark, but propagates the state only once. The sensor model must not
+  /// need known numbers.
   std::vector<std::optional<Prediction>> ExpectEach(
       std::string_view sensor, Timestamp timestamp,
       const std::vector<std::int64_t>& landmarks) const;

@@ -15,14 +15,14 @@ Event StaleEvent(const Frame& frame, Timestamp state) {
   return {frame.timestamp, EventKind::kStale,
           "the frame at " + SecondsText(frame.timestamp) + " is older than the state at " +
               SecondsText(state) +
-              ": its measurements are not used; if it came late, set `out_of_sequence: {policy: "
-              "rollback, ...}` or, in C++, process frames by alidade::Rollback"};
+              ": the measurements of this frame are not used; to use late frames, set "
+              "`out_of_sequence: {policy: rollback, ...}` or, in C++, alidade::Rollback"};
 }
 
-/// Returns the options. Throws Error kBadConfig if one is out of its range.
+/// Returns the options. Throws Error kBadConfig if an option is out of range.
 const EkfOptions& CheckedOptions(const EkfOptions& options) {
   ExpectOption(options.gate > 0.0 && options.gate <= 1.0, "gate", options.gate,
-               "a probability in (0, 1], 1: no gate");
+               "a probability in (0, 1]; 1 means no gate");
   ExpectOption(options.max_dt_s > 0.0, "max_dt_s", options.max_dt_s, "seconds > 0");
   ExpectOption(options.rejection_recovery_after >= 1, "rejection_recovery_after",
                options.rejection_recovery_after, "at least 1");
@@ -66,8 +66,9 @@ void FilterEngine::Process(const Frame& frame) {
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 
-/// Processes a frame. Flattened: its parts are so small that a call of each would cost as much as
-/// its work. Large and rarely called functions are marked `noinline`.
+/// Processes a frame. The attribute flatten inlines the called functions, because most of them are
+/// so small that a call would cost as much as their work. Large and rarely called functions are
+/// marked `noinline`.
 [[gnu::flatten]] void FilterEngine::Run(const Frame& frame) {
   if (landmarks) part_start_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
@@ -93,7 +94,7 @@ void FilterEngine::Process(const Frame& frame) {
   if (f.health.ended) return;
   for (PendingMeasurement& pending : rows) {
     if (landmarks && pending.binding->model->has_landmark())
-      continue;  // rejections of landmarks do not count
+      continue;  // rejected landmarks do not cause a recovery
     if (gate_.Count(f, *pending.report)) recovery_.Recover(f, pending);
   }
   AddElapsedTo(FramePart::kUpdate);
@@ -102,7 +103,7 @@ void FilterEngine::Process(const Frame& frame) {
   AddElapsedTo(FramePart::kLandmarks);
 }
 
-/// Adds the time since the end of the previous part to this part, in the report.
+/// Adds the time since the end of the previous part to the reported time of this part.
 void FilterEngine::AddElapsedTo(FramePart part) {
   if (!landmarks) return;
   const auto now = std::chrono::steady_clock::now();
@@ -111,8 +112,8 @@ void FilterEngine::AddElapsedTo(FramePart part) {
   part_start_ = now;
 }
 
-/// Propagates the state to `timestamp`. If a step fails, the state stays at the end of the previous
-/// step and the filter ends.
+/// Propagates the state to `timestamp`. If a step fails, the filter ends with the state before that
+/// step.
 void FilterEngine::StepTo(Timestamp timestamp) {
   while (f.timestamp < timestamp) {
     time_.UseInputs(f.timestamp, f.motions, f.report.events);
@@ -147,7 +148,7 @@ void FilterEngine::UpdateInGroups(std::span<PendingMeasurement> rows) {
   Update(group);
 }
 
-/// Performs one update by the measurements of a group that pass the gate.
+/// Performs one update with the measurements of a group that pass the gate.
 void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   PredictAndGate(group);
   if (landmarks && Consensus::IsEnabledFor(group)) {
@@ -157,7 +158,8 @@ void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   }
 }
 
-/// Performs one update by the inliers, and a second one by the measurements that it rescues.
+/// Performs one update with the inliers. Then performs a second update with the remaining
+/// measurements that pass the rescue gate.
 [[gnu::noinline]] void FilterEngine::UpdateByConsensus(std::span<PendingMeasurement* const> group) {
   groups_.inliers.clear();
   groups_.remaining.clear();
@@ -182,7 +184,8 @@ void FilterEngine::Update(std::vector<PendingMeasurement*>& group) {
   }
 }
 
-/// Predicts all measurements of a group at the state, and removes those that the gate rejects.
+/// Predicts all measurements of a group at the current state. Removes those that the gate rejects
+/// from the group.
 void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   int capacity = 0;
   for (PendingMeasurement* const pending : group) {
@@ -206,7 +209,7 @@ void FilterEngine::PredictAndGate(std::vector<PendingMeasurement*>& group) {
   AddElapsedTo(FramePart::kGate);
 }
 
-/// Performs one update. Returns false if the state is unchanged.
+/// Performs one update. Returns false if the update failed and the state is unchanged.
 bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   if (rows.empty()) return false;
   gate_.ApplyRobustWeights(rows);
@@ -214,9 +217,9 @@ bool FilterEngine::Correct(std::span<PendingMeasurement* const> rows) {
   AddElapsedTo(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
     AddEvent(f, EventKind::kNotPd,
-             "the update would leave S or P not positive definite; rolled back");
+             "S or P would not be positive definite; the update was rolled back");
   } else if (outcome == Outcome::kNotFinite) {
-    AddEvent(f, EventKind::kNotFinite, "the update is not finite; rolled back");
+    AddEvent(f, EventKind::kNotFinite, "the update is not finite and was rolled back");
   }
   if (outcome != Outcome::kAccepted) {
     for (const PendingMeasurement* const pending : rows) {
@@ -250,7 +253,7 @@ std::optional<Prediction> FilterEngine::Expect(int sensor, std::int64_t landmark
       PredictAt(f, pending, f.state.values(), measurement.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
-  std::ranges::copy(measurement.values, pending.z);  // z = h: the innovation is zero
+  std::ranges::copy(measurement.values, pending.z);  // the innovation is then zero
   if (method->Predict(f, pending) != Outcome::kAccepted) return std::nullopt;
   const int m = pending.report->dof;
   method->BeginUpdate(f, m);

@@ -19,40 +19,40 @@
 
 namespace alidade::internal {
 
-/// Checks an option of a filter. Throws Error kBadConfig if it is not `in_range`.
+/// Throws Error kBadConfig with the option, its value and `expected`, unless `in_range` is true.
 void ExpectOption(bool in_range, const char* option, double value, const char* expected);
 
-/// Engine of every recursive filter. Processes a frame by these parts, in this order:
+/// Implementation of every recursive filter. Processes a frame in these stages, with these
+/// functions:
 ///
 ///   step         StepTo            Timeline::NextSubStep, UpdateMethod::Step
-///   collect                        PendingMeasurements::Collect, by measurement and sensor
+///   collect                        PendingMeasurements::Collect of all measurements and sensors
 ///   initialise                     InitialiseWaiting, LandmarkMap::Attach
-///   group        UpdateInGroups    Update of each group that `fuse` defines:
+///   group        UpdateInGroups    Update of each group that `fuse` defines, which consists of:
 ///   predict      PredictAndGate    UpdateMethod::Predict of each measurement
 ///   gate                           UpdateMethod::ComputeNis and Gate::Test of each;
 ///                                  Consensus::Split
 ///   correct      Correct           Gate::ApplyRobustWeights, UpdateMethod::Correct
 ///   recover                        Recovery::RepairCovariance; Gate::Count, Recovery::Recover
 ///   landmarks                      LandmarkMap::Maintain
-///   inputs                         Timeline::TakeInputs: they act from the frame's timestamp on
+///   inputs                         Timeline::TakeInputs, which act from the frame's timestamp on
 ///
-/// Parts point to the problem index, which copies share, and not to each other. A copy is therefore
-/// an independent filter.
+/// The members do not point to each other, only to the problem index, which all copies share. A
+/// copy is therefore an independent filter.
 class FilterEngine {
  public:
   FilterEngine(Problem problem, const EkfOptions& options, const std::vector<StreamInfo>& streams,
                std::unique_ptr<UpdateMethod> method);
 
-  /// Implements Filter::Process. The report is in f.
+  /// Implements Filter::Process. The report is `f.report`.
   void Process(const Frame& frame);
-  /// Predicts a measurement of the sensor at the current time, as Filter::Expect. `sensor` is an
-  /// index into Problem::sensors.
+  /// Implements Filter::Expect at the current time. `sensor` is an index into Problem::sensors.
   std::optional<Prediction> Expect(int sensor, std::int64_t landmark,
                                    const std::vector<double>& known);
 
   FilterState f;
   ClonePtr<UpdateMethod> method;
-  std::optional<LandmarkMap> landmarks;  ///< if the problem has landmarks
+  std::optional<LandmarkMap> landmarks;  ///< nullopt if the problem has no landmarks
 
  private:
   void Run(const Frame& frame);
@@ -64,7 +64,7 @@ class FilterEngine {
   bool Correct(std::span<PendingMeasurement* const> rows);
   void AddElapsedTo(FramePart part);
 
-  /// One group of measurements, and its division into inliers and remaining ones.
+  /// A group of measurements, and its division into inliers and remaining measurements.
   struct Groups {
     std::vector<PendingMeasurement*> group, inliers, remaining;
   };
@@ -74,8 +74,8 @@ class FilterEngine {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
-  bool stale_reported_ = false;                       ///< the last frame was stale
-  std::chrono::steady_clock::time_point part_start_;  ///< of the current FramePart
+  bool stale_reported_ = false;                       ///< whether the last frame was stale
+  std::chrono::steady_clock::time_point part_start_;  ///< start of the current FramePart
   Scratch<PendingMeasurements> rows_;
   Scratch<Groups> groups_;
 };

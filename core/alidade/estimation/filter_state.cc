@@ -35,7 +35,7 @@ void FilterState::Activate() {
   if (uses_first_estimates_) StoreFirstEstimates();
 }
 
-/// Stores the values of stationary blocks whose first estimate is not stored yet.
+/// Stores the values of stationary blocks that have no first estimate yet.
 void FilterState::StoreFirstEstimates() {
   for (const MotionBinding& motion : problem_index->problem.motions) {
     if (!motion.model->stationary()) continue;

@@ -15,11 +15,14 @@
 
 namespace alidade::internal {
 
-/// Health of a filter, and the findings that were already reported: each is reported once.
+/// Health of a filter. Also records which problems were already reported, because each is reported
+/// once.
 struct Health {
-  std::vector<char> out_of_domain, inflated;  ///< by sensor: since its last acceptance
+  /// By sensor: whether h was not defined, or blocks were inflated, since its last accepted
+  /// measurement.
+  std::vector<char> out_of_domain, inflated;
   bool diverged = false, ended = false;
-  /// The last accepted measurement.
+  /// Last measurement that an update used.
   struct {
     int sensor = -1;
     Timestamp timestamp = kNoTimestamp;
@@ -28,36 +31,37 @@ struct Health {
 };
 
 /// State shared by the parts of a filter: x and P, the time, the motion models, the report. Only an
-/// UpdateMethod changes P of blocks that have a value, because it may store a root of P. A function
-/// that makes an exception documents it. A copy is a snapshot.
+/// UpdateMethod changes P of blocks that have a value, because an UpdateMethod may store a root of
+/// P. Functions that are exceptions to this rule document it. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const ProblemIndex> index, bool uses_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Updates the members that depend on the set of blocks with a value. Has to be called when a
-  /// block gets its first value, or a new value that replaces a rejected one.
+  /// Updates the members that depend on which blocks have a value. Must be called after a block was
+  /// initialised or reset.
   void Activate();
-  /// Whether first_estimates are in use (JacobianPolicy::kFirstEstimate).
+  /// Returns whether first_estimates are used (JacobianPolicy::kFirstEstimate).
   bool uses_first_estimates() const { return uses_first_estimates_; }
 
   std::shared_ptr<const ProblemIndex> problem_index;
   State state;
-  Timestamp timestamp = kNoTimestamp;  ///< of the state
+  Timestamp timestamp = kNoTimestamp;  ///< time of the state
   Motions motions;
-  /// By block of the problem: the value at which H is computed; empty: the latest estimate.
+  /// By block of the problem: the value at which H is evaluated. Empty: H is evaluated at the
+  /// latest estimate.
   std::vector<std::vector<double>> first_estimates;
-  UpdateReport report;  ///< of the frame
+  UpdateReport report;  ///< report of the current frame
   Health health;
-  /// Summary of the blocks of the problem, by Activate.
+  /// Summary of the blocks of the problem, updated by Activate().
   struct {
-    bool has_missing = false;    ///< a block has no value yet
-    bool has_consider = false;   ///< a block is a consider state
+    bool has_missing = false;    ///< whether a block has no value yet
+    bool has_consider = false;   ///< whether a block is a consider state
     std::vector<int> gain_rows;  ///< rows of P of the blocks that have a value
   } blocks;
-  /// Temporary matrices. A function that uses it has a Workspace::Use.
+  /// Memory for temporary matrices. A function that uses it must create a Workspace::Use.
   Scratch<Workspace> work;
   Scratch<std::vector<double>> moved;  ///< the corrected x, before the update is committed
-  Scratch<KalmanUpdate> update;        ///< the last update of a method with Jacobians
+  Scratch<KalmanUpdate> update;        ///< last update of a method that computes Jacobians
 
  private:
   void StoreFirstEstimates();
@@ -65,13 +69,14 @@ struct FilterState {
   bool uses_first_estimates_;
 };
 
-/// Appends an event to the report. Its timestamp is set at the end of the frame.
+/// Appends an event to the report. The timestamp of the event is set at the end of the frame.
 Event& AddEvent(FilterState& f, EventKind kind, std::string text);
-/// Appends an event after which the filter counts as diverged.
+/// Appends an event and marks the filter as diverged.
 void AddDivergenceEvent(FilterState& f, EventKind kind, std::string text);
-/// Returns `block = value, ...` for those of the blocks that have a value.
+/// Returns the text `block = value, ...` of the blocks that have a value.
 std::string Describe(const State& state, std::span<const BlockId> blocks);
-/// Ends the filter with an event: the reason, the last good state, the last used measurement.
+/// Ends the filter. Appends an event with the reason, the last valid state and the last used
+/// measurement.
 void End(FilterState& f, EventKind kind, const std::string& reason);
 
 }  // namespace alidade::internal

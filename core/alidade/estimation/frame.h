@@ -13,8 +13,9 @@ namespace alidade {
 struct StreamInfo {
   std::string name;
   int size = 1;
-  double sigma = 0.0;  ///< of true values: standard deviation of each element, in the tangent space
-  int known = 0;       ///< number of known numbers of each measurement
+  /// Standard deviation of each tangent element of a true value. Not used for measurements.
+  double sigma = 0.0;
+  int known = 0;  ///< number of known numbers of each measurement
 };
 
 /// One value of one stream.
@@ -23,13 +24,14 @@ struct Measurement {
   int stream = 0;  ///< index into the streams of the source
   std::int64_t landmark = -1;
   std::vector<double> values;
-  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: the model's
-  /// Inputs of the sensor model that are known exactly, such as the position of a satellite. Mostly
-  /// empty.
+  /// R, row-major, which replaces the noise of the model. Empty: the noise of the model is used.
+  std::vector<double> covariance;
+  /// Inputs of the sensor model that are known exactly, such as the position of a satellite. Empty
+  /// for most sensors.
   std::vector<double> known = {};
 };
 
-/// Measurements of one timestamp, in the order of the source. The only input of an estimator.
+/// Measurements and control inputs of one timestamp, in the order of the source.
 struct Frame {
   Timestamp timestamp = 0;
   std::vector<Measurement> measurements;

@@ -12,8 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns whether a measurement counts as a rejection. Non-finite measurements, for which h was
-/// not computed, do not count.
+/// Returns whether the outcome of a measurement counts as a rejection. Measurements that are not
+/// finite do not count, because h was not computed for them.
 bool IsRejected(const MeasurementReport& entry) {
   return InfoOf(entry.outcome).is_rejection &&
          (entry.outcome != Outcome::kNotFinite || !entry.h.empty());
@@ -58,7 +58,7 @@ Gate::Gate(const Problem& problem, const EkfOptions& options)
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
-/// Returns kNotFinite if a number of the measurement is not finite, else kAccepted.
+/// Returns kNotFinite if h, H, R, r or S of the measurement is not finite, else kAccepted.
 Outcome Gate::CheckFinite(FilterState& f, PendingMeasurement& pending) {
   MeasurementReport& entry = *pending.report;
   const char* const quantity = !AllFinite(entry.h)            ? "h"
@@ -86,7 +86,7 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   }
 }
 
-/// Counts a measurement that was not accepted. Returns whether the filter has to recover.
+/// Counts a measurement that was not accepted. Returns whether the filter has to recover (Count).
 [[gnu::noinline]] bool Gate::CountRejection(const MeasurementReport& entry) {
   if (max_rejections_ == 0 || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
@@ -95,7 +95,7 @@ void Gate::ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const {
   return true;
 }
 
-/// Reports, once per sensor, that the noise is negligible compared with H P H'.
+/// Reports that the noise is negligible compared with H P H', once for each sensor.
 [[gnu::noinline]] void Gate::WarnOfConditioning(FilterState& f, const PendingMeasurement& pending,
                                                 std::size_t i) {
   const auto sensor = static_cast<std::size_t>(pending.sensor);

@@ -9,24 +9,25 @@
 
 namespace alidade::internal {
 
-/// Chi-square gate: accepts a measurement if its NIS r' S^-1 r is at most the quantile of the
-/// configured probability. Also computes the robust-loss weight, and counts consecutive rejections
-/// per sensor. A copy is a snapshot.
+/// Chi-square gate: accepts a measurement if its NIS r' S^-1 r is at most the chi-square quantile
+/// of the probability EkfOptions::gate. Also computes the weight of the robust loss, and counts
+/// consecutive rejections of each sensor. A copy is a snapshot.
 class Gate {
  public:
   Gate(const Problem& problem, const EkfOptions& options);
 
-  /// Tests a measurement by its NIS, and computes its robust weight w. Returns kAccepted, or the
-  /// reason for a rejection. A measurement whose R / w is not finite is rejected.
+  /// Compares the NIS of a measurement with the threshold, and computes the robust weight w.
+  /// Returns kAccepted, or the reason for a rejection. A measurement is also rejected if R / w is
+  /// not finite.
   Outcome Test(FilterState& f, PendingMeasurement& pending, double nis) {
     return nis <= thresholds_[static_cast<std::size_t>(pending.sensor)] ? Accept(f, pending, nis)
                                                                         : Reject(f, pending, nis);
   }
-  /// Divides R by the robust weight w, in R and in S, for measurements that passed.
+  /// Replaces R by R / w in the stored R and S of measurements that passed the gate.
   void ApplyRobustWeights(std::span<PendingMeasurement* const> rows) const;
 
   /// Counts the outcome of a measurement. Returns true if the consecutive rejections of its sensor
-  /// reached the limit, so that the filter has to recover. The count then restarts.
+  /// reached the limit: the filter has to recover, and the count restarts at zero.
   bool Count(FilterState& f, const MeasurementReport& entry) {
     if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
       return CountRejection(entry);
@@ -60,12 +61,12 @@ class Gate {
   void WarnOfConditioning(FilterState& f, const PendingMeasurement& pending, std::size_t i);
   bool CountRejection(const MeasurementReport& entry);
 
-  bool has_gate_;                   ///< false: an infinite NIS passes too
-  std::vector<double> thresholds_;  ///< on r' S^-1 r, by sensor; finite
-  bool has_robust_loss_ = false;    ///< whether any sensor has one
-  std::vector<bool> is_warned_;     ///< by sensor
-  std::vector<int> rejections_;     ///< consecutive, by sensor
-  int max_rejections_;              ///< consecutive; 0: unlimited
+  bool has_gate_;                   ///< if false, an infinite NIS passes too
+  std::vector<double> thresholds_;  ///< by sensor: largest accepted r' S^-1 r; finite
+  bool has_robust_loss_ = false;    ///< whether any sensor has a robust loss
+  std::vector<bool> is_warned_;     ///< by sensor: whether bad conditioning was reported
+  std::vector<int> rejections_;     ///< by sensor: number of consecutive rejections
+  int max_rejections_;              ///< limit of consecutive rejections; 0: unlimited
 };
 
 }  // namespace alidade::internal

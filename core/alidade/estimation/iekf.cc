@@ -18,13 +18,13 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Returns r' R^-1 r for R = L L', L the lower triangle of `l`. Sets r to L^-1 r.
+/// Returns r' R^-1 r for R = L L'. L is the lower triangle of `l`. Sets r to L^-1 r.
 double SquaredNorm(const Workspace::Matrix& l, Workspace::Vector& r) {
   l.triangularView<Eigen::Lower>().solveInPlace(r);
   return r.squaredNorm();
 }
 
-/// Equations of Iekf: Gauss-Newton iterations over updates of EkfEquations.
+/// Equations of Iekf: Gauss-Newton iterations, each with an update of EkfEquations.
 class IekfEquations : public UpdateMethod {
  public:
   IekfEquations(int max_iterations, double tolerance)
@@ -48,11 +48,11 @@ class IekfEquations : public UpdateMethod {
   struct Minimum {
     Workspace::Vector dx;
     int iterations = 0;
-    /// The next step, in posterior standard deviations; nullopt if h has no Jacobian.
+    /// Length of the next step in posterior standard deviations. nullopt: h has no Jacobian.
     std::optional<double> step = std::nullopt;
     bool converged = false;
   };
-  /// An iterate dx = P v, and a step from it, step = P step_v.
+  /// An iterate dx = P v, and the step from this iterate to the next, step = P step_v.
   struct IterateStep {
     const Workspace::Vector &dx, &v, &step, &step_v;
   };
@@ -68,7 +68,7 @@ class IekfEquations : public UpdateMethod {
   EkfEquations ekf_;
   int max_iterations_;
   double tolerance_;
-  std::vector<double> iterate_;             ///< values of the iterate; the state is the prediction
+  std::vector<double> iterate_;             ///< x at the iterate (f.state is the prediction)
   std::vector<double> prediction_numbers_;  ///< h, innovations and S at the prediction
 };
 
@@ -88,20 +88,20 @@ Outcome IekfEquations::Correct(FilterState& f, std::span<PendingMeasurement* con
     source += count;
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    AddEvent(f, EventKind::kNotConverged,
-             "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
-                 (minimum->step ? ", a step of " + RoundedText(*minimum->step, 3) +
-                                      " sigma before its optimum"
-                                : std::string(" because h has no Jacobian")) +
-                 "; the last iterate is used");
+    AddEvent(
+        f, EventKind::kNotConverged,
+        "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+            (minimum->step ? ": the next step would be " + RoundedText(*minimum->step, 3) + " sigma"
+                           : std::string(" because h has no Jacobian")) +
+            "; the last iterate is used");
   }
   return outcome;
 }
 
-/// Computes the minimum of one update, or the last iterate. The measurements are then linearised at
-/// the last iterate at which this is possible. P may be singular: dx = P v for all iterates, so
-/// that dx' P^-1 dx = v' dx. If the first step is not possible, returns nullopt and leaves the
-/// measurements unchanged.
+/// Computes the minimum of one update, or the last iterate if there is no convergence. Leaves the
+/// measurements linearised at the last iterate at which this is possible. P may be singular: dx = P
+/// v for all iterates, so dx' P^-1 dx = v' dx. If the first step is not possible, returns nullopt
+/// and leaves the measurements unchanged.
 std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
     FilterState& f, std::span<PendingMeasurement* const> rows) {
   const Eigen::Index n = f.size(), m = TotalDof(rows);
@@ -110,7 +110,7 @@ std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = f.work.Take(n), step = f.work.Take(n), step_v = f.work.Take(n);
   Workspace::Vector y = f.work.Take(m), residual = f.work.Take(m);
-  Workspace::Vector linearised = f.work.Take(n);  // dx of the last linearisation
+  Workspace::Vector linearised = f.work.Take(n);  // dx at the last linearisation
   Workspace::Matrix s = f.work.Take(m, m), r = f.work.Take(m, m);
   dx.setZero();
   v.setZero();
@@ -156,9 +156,9 @@ std::optional<IekfEquations::Minimum> IekfEquations::Minimise(
   return minimum;
 }
 
-/// Returns the largest fraction 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not
-/// rise by more than rounding, or 0 if all of them fail. `r` is the factor of R. `residual` has the
-/// innovations at dx, and is overwritten.
+/// Returns the largest fraction 1, 1/2, 1/4, ... of the step that does not increase v' dx + r' R^-1
+/// r by more than rounding errors. Returns 0 if every fraction fails. `r` is the factor of R.
+/// `residual` contains the innovations at dx and is overwritten.
 double IekfEquations::FindStepFraction(FilterState& f, std::span<PendingMeasurement* const> rows,
                                        const IterateStep& full, const Workspace::Matrix& r,
                                        Workspace::Vector& residual) {
@@ -178,13 +178,13 @@ double IekfEquations::FindStepFraction(FilterState& f, std::span<PendingMeasurem
   return 0.0;
 }
 
-/// Sets the iterate to prediction (+) dx. Returns false if it is not finite.
+/// Sets the iterate to prediction (+) dx. Returns false if the iterate is not finite.
 bool IekfEquations::SetIterate(FilterState& f, const double* dx) {
   return f.state.Retract(dx, iterate_);
 }
 
-/// Computes z (-) h of all measurements at the iterate. Returns false if an h is not defined or an
-/// innovation is not finite.
+/// Computes z (-) h of all measurements at the iterate. Returns false if h of a measurement is not
+/// defined or an innovation is not finite.
 bool IekfEquations::ComputeInnovations(FilterState& f, std::span<PendingMeasurement* const> rows,
                                        Workspace::Vector& innovations) {
   Eigen::Index offset = 0;

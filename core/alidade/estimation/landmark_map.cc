@@ -17,7 +17,7 @@ namespace {
 /// Candidates are deleted after this number of frames without an observation.
 constexpr int kMaxCandidateFrames = 30;
 
-/// Returns the role of a landmark with the representation xyz, m.
+/// Returns the role of a landmark with the representation xyz, in m.
 Space Xyz() {
   return {"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
 }
@@ -26,7 +26,8 @@ bool IsUsed(const PendingMeasurement& pending) {
   return pending.report->outcome == Outcome::kAccepted;
 }
 
-/// Returns pointers to the values of a landmark that has a representation.
+/// Returns pointers to the values of the blocks of a landmark. The landmark must have a
+/// representation.
 std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
   std::array<const double*, 3> values{};
   const auto value = [&](BlockId id) { return state.value(id); };
@@ -38,7 +39,8 @@ bool HasInverseDistance(const LandmarkRecord& landmark) {
   return landmark.in_state() && landmark.representation && !IsXyz(*landmark.representation);
 }
 
-/// Returns the inverse distance, the last element of each representation that has one.
+/// Returns the inverse distance. It is the last element of each representation that has an inverse
+/// distance.
 double InverseDistance(const State& state, const LandmarkRecord& landmark) {
   const BlockId last = landmark.blocks.back();
   return state.value(last)[state.layout()[last].geometry().ambient - 1];
@@ -55,11 +57,11 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
                      InverseDistanceSigma(state, landmark), camera);
 }
 
-/// Returns J P J' for the blocks of a landmark.
+/// Returns J P J'. The columns of J belong to the blocks of a landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
                              const LandmarkPoint& point) {
   constexpr int kMaxRows = 6;
-  std::array<int, kMaxRows> rows;  // of P
+  std::array<int, kMaxRows> rows;  // rows of P
   auto jacobian = point.jacobian;
   int used = 0, column = 0;
   for (const BlockId id : landmark.blocks) {
@@ -217,7 +219,7 @@ void LandmarkMap::Attach(const FilterState& f, PendingMeasurement& pending,
   InitialiseNew(f, rows);
 }
 
-/// Counts the observations of landmarks, and the outcomes of their measurements.
+/// Counts the observations of each landmark, and how many of them were accepted.
 void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
   for (const PendingMeasurement& pending : rows) {
     if (!IsOfLandmark(pending) ||
@@ -235,7 +237,8 @@ void LandmarkMap::Count(FilterState& f, std::span<PendingMeasurement> rows) {
   }
 }
 
-/// Returns the record of a landmark. A new record reuses the memory of a deleted one.
+/// Returns the record of a landmark, and creates it if necessary. A new record reuses the memory of
+/// a deleted one.
 LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
   const auto entry = landmarks_.lower_bound(id);
   if (entry != landmarks_.end() && entry->first == id) return entry->second;
@@ -254,8 +257,8 @@ LandmarkRecord& LandmarkMap::RecordOf(std::int64_t id) {
   return landmarks_.insert(entry, std::move(node))->second;
 }
 
-/// Counts landmarks whose inverse distance is at or below zero after an update, and deletes them
-/// with the option negative_depth: delete.
+/// Counts landmarks whose inverse distance is at or below zero after an update. With
+/// `negative_depth: delete`, also deletes them.
 void LandmarkMap::CheckDepths(FilterState& f) {
   DeleteIf(f, [&](LandmarkRecord& landmark) {
     return IsNegative(f, landmark) &&
@@ -263,7 +266,8 @@ void LandmarkMap::CheckDepths(FilterState& f) {
   });
 }
 
-/// Returns whether the inverse distance of a landmark is at or below zero. Counts the change to it.
+/// Returns whether the inverse distance of a landmark is at or below zero. Counts the landmark if
+/// it was above zero before.
 bool LandmarkMap::IsNegative(FilterState& f, LandmarkRecord& landmark) {
   const bool is_negative =
       HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
@@ -272,20 +276,22 @@ bool LandmarkMap::IsNegative(FilterState& f, LandmarkRecord& landmark) {
   return is_negative;
 }
 
-/// Deletes landmarks that missed too many frames or have a low match ratio, but not known ones.
+/// Deletes landmarks that were not observed for too many frames or have a low match ratio. Known
+/// landmarks are never deleted.
 void LandmarkMap::Prune(FilterState& f) {
   DeleteIf(f, [&](const LandmarkRecord& landmark) {
     return !landmark.is_known && (frame_ >= PruneFrameOf(landmark) || HasLowMatchRatio(landmark));
   });
 }
 
-/// Returns whether too few measurements of a landmark are accepted.
+/// Returns whether too few measurements of a landmark were accepted.
 bool LandmarkMap::HasLowMatchRatio(const LandmarkRecord& landmark) const {
   return landmark.tried >= options_.min_attempts &&
          landmark.accepted < options_.min_match_ratio * landmark.tried;
 }
 
-/// Returns the frame at which a landmark is deleted if no earlier frame measures it.
+/// Returns the frame in which a landmark will be deleted if no frame before it measures the
+/// landmark.
 std::int64_t LandmarkMap::PruneFrameOf(const LandmarkRecord& landmark) const {
   const int max_frames = landmark.in_state() ? options_.max_missed_frames : kMaxCandidateFrames;
   return max_frames > 0 ? landmark.last_frame + max_frames
@@ -329,7 +335,7 @@ void LandmarkMap::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
   landmark.blocks.clear();
 }
 
-/// Converts the landmarks of the frame to xyz whose linearity index is low enough.
+/// Converts landmarks to xyz if the frame measures them and their linearity index is low enough.
 void LandmarkMap::Convert(FilterState& f, std::span<PendingMeasurement> rows) {
   if (!(options_.max_linearity_index > 0.0)) return;
   for (const PendingMeasurement& pending : rows) {
@@ -358,7 +364,8 @@ bool LandmarkMap::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& 
   return true;
 }
 
-/// Initialises candidates that the frame measures, until max_per_frame landmarks are measured.
+/// Initialises candidates that the frame measures, until the frame measures max_per_frame landmarks
+/// in the state.
 void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> rows) {
   FindMeasured(rows);
   auto count = std::ssize(measured_);
@@ -379,7 +386,8 @@ void LandmarkMap::InitialiseNew(FilterState& f, std::span<PendingMeasurement> ro
   }
 }
 
-/// Returns the candidate that the measurement may initialise, or the end of the map.
+/// Returns the candidate that the measurement can initialise, or the end of the map if there is
+/// none.
 LandmarkMap::ById::iterator LandmarkMap::FindCandidate(const FilterState& f,
                                                        const PendingMeasurement& pending) {
   if (!IsOfLandmark(pending) || pending.report->outcome != Outcome::kNotReady ||
@@ -396,8 +404,8 @@ LandmarkMap::ById::iterator LandmarkMap::FindCandidate(const FilterState& f,
   return is_candidate ? found : landmarks_.end();
 }
 
-/// Reserves memory for all landmarks that the frame may initialise, at most `max_count`. The first
-/// frame initialises many.
+/// Reserves memory for the landmarks that the frame may initialise, at most `max_count`. This
+/// matters in the first frame, which initialises many landmarks.
 void LandmarkMap::Reserve(FilterState& f, std::span<const PendingMeasurement> rows,
                           std::ptrdiff_t max_count) {
   int size = 0;
@@ -411,7 +419,7 @@ void LandmarkMap::Reserve(FilterState& f, std::span<const PendingMeasurement> ro
   f.state.covariance().Reserve(size);
 }
 
-/// Finds the first accepted measurement of each landmark in the state, sorted by id.
+/// Sets measured_ to the first accepted measurement of each landmark in the state, sorted by id.
 void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
   measured_.clear();
   for (const PendingMeasurement& pending : rows) {
@@ -429,10 +437,11 @@ void LandmarkMap::FindMeasured(std::span<PendingMeasurement> rows) {
   measured_.erase(std::unique(measured_.begin(), measured_.end(), same), measured_.end());
 }
 
-/// Returns the median of the inverse distances of the measured landmarks that have converged. If
-/// there are fewer than adapt_after, returns the inverse distance of the prior.
+/// Returns the median inverse distance of the measured landmarks that have converged. If fewer than
+/// adapt_after have converged, returns the inverse distance of the prior.
 double LandmarkMap::PriorInverseDistance(const State& state) {
-  constexpr double kConverged = 0.1;  // linearity index, without conversion to xyz
+  constexpr double kConverged =
+      0.1;  // largest linearity index, if landmarks are not converted to xyz
   const double limit =
       options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
   inverse_distances_.clear();
@@ -454,9 +463,9 @@ double LandmarkMap::PriorInverseDistance(const State& state) {
   return *middle;
 }
 
-/// Initialises the blocks of a landmark, correlated with the blocks that the observation depends
-/// on. The first landmark of a frame creates the block of a shared role. The other landmarks of the
-/// sensor share this block.
+/// Initialises the blocks of a landmark, and their correlation with the other blocks of the sensor.
+/// The first landmark that a sensor initialises in a frame creates the block of a shared role. The
+/// other landmarks of the sensor share this block.
 Outcome LandmarkMap::Initialise(FilterState& f, std::int64_t id, PendingMeasurement& pending,
                                 LandmarkRecord& landmark) {
   LandmarkSensorInfo& info = sensor_infos_[static_cast<std::size_t>(pending.sensor)];

@@ -12,65 +12,69 @@
 
 namespace alidade::internal {
 
-/// Counts the deleted landmarks of each id. Forgets old ids, but not the last 50 000 deletions.
+/// Counts how many landmarks with each id were deleted. Remembers at least the last 50 000
+/// deletions; older ids may be forgotten.
 class LandmarkIdReuse {
  public:
   /// Returns the number of deleted landmarks with this id.
   int CountOf(std::int64_t id) const;
-  /// Records that the landmark was deleted, and that `count` landmarks with its id are now deleted.
+  /// Records that a landmark with this id was deleted. `count` is the new number of deleted
+  /// landmarks with the id.
   void Record(std::int64_t id, int count);
 
  private:
   struct Deletion {
     std::int64_t id;
-    std::int64_t order;  ///< of the last deletion
+    std::int64_t order;  ///< index of the last deletion with this id
     int count;
   };
   std::vector<Deletion> deletions_;  ///< sorted by id
   std::int64_t total_ = 0;
 };
 
-/// Landmark in the state, or a candidate that waits for its initialisation.
+/// Landmark in the state, or a candidate: a landmark that waits for its initialisation.
 struct LandmarkRecord {
   std::optional<LandmarkRepresentation> representation;
-  std::vector<BlockId> blocks;  ///< by landmark role; empty: a candidate
+  std::vector<BlockId> blocks;  ///< by landmark role; empty for a candidate
   int generation = 0, observations = 0, tried = 0, accepted = 0;
-  std::int64_t last_frame = 0;  ///< the last frame that measured it
+  std::int64_t last_frame = 0;  ///< last frame that measured the landmark
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
-  bool is_negative = false;  ///< whether its inverse distance is at or below zero
-  bool is_known = false;     ///< from the config: never pruned
+  bool is_negative = false;  ///< whether the inverse distance is at or below zero
+  bool is_known = false;     ///< whether the config defines the landmark; never pruned
   bool in_state() const { return !blocks.empty(); }
 };
 
-/// Landmarks of a filter: finds them for the measurements of a frame, and initialises, converts and
-/// prunes them after the updates of the frame. A copy is a snapshot.
+/// Landmarks of a filter. Finds the landmark of each measurement of a frame. After the updates of
+/// the frame, initialises, converts and prunes landmarks. A copy is a snapshot.
 class LandmarkMap {
  public:
-  /// The problem of `index` has to have landmarks.
+  /// Requires that the problem of `index` has landmarks.
   explicit LandmarkMap(const ProblemIndex& index);
 
   /// Adds the known landmarks to the state. Called once.
   void AddKnown(FilterState& f);
-  /// Sets the offsets of measurements whose landmark is in the state. The outcome of the other ones
-  /// is kNotReady.
+  /// Binds the measurements whose landmark is in the state to the blocks of the landmark. The
+  /// outcome of all other measurements of landmarks is kNotReady.
   void Attach(FilterState& f, std::span<PendingMeasurement> rows);
   /// Counts, prunes, converts and initialises landmarks. Called after the updates of a frame.
   void Maintain(FilterState& f, std::span<PendingMeasurement> rows);
 
   std::vector<LandmarkEstimate> Estimates(const State& state) const;
-  /// Returns the number of frames with a measurement of a landmark.
+  /// Returns the number of frames until now that contain a measurement of a landmark.
   std::int64_t frame() const { return frame_; }
 
  private:
   using ById = std::map<std::int64_t, LandmarkRecord>;
   /// Landmark roles of a sensor.
   struct LandmarkSensorInfo {
-    int first = -1;     ///< first landmark role (they come last); -1: not a sensor of landmarks
-    int position = -1;  ///< index of the role `position`, the camera in the world
+    /// First landmark role. The roles of a landmark come last. -1: the sensor does not measure
+    /// landmarks.
+    int first = -1;
+    int position = -1;  ///< index of the role `position`: the camera position in the world
     std::optional<LandmarkRepresentation> representation;
-    std::vector<Space> roles;             ///< of the landmark
-    Scratch<InverseMeasurement> inverse;  ///< of the last initialisation
-    std::vector<BlockId> shared;  ///< by landmark role: the shared block of this frame, or -1
+    std::vector<Space> roles;             ///< roles of the landmark
+    Scratch<InverseMeasurement> inverse;  ///< result of the last initialisation
+    std::vector<BlockId> shared;          ///< by landmark role: block shared in this frame, or -1
   };
 
   bool IsOfLandmark(const PendingMeasurement& pending) const {
@@ -107,26 +111,26 @@ class LandmarkMap {
 
   LandmarkOptions options_;
   std::vector<LandmarkSensorInfo> sensor_infos_;  ///< by sensor
-  ById landmarks_;                                ///< by the id of the measurements
-  std::vector<int> shared_block_refcount_;        ///< by block: landmarks that share it
-  std::int64_t frame_ = 0;                        ///< frames with a measurement of a landmark
+  ById landmarks_;                                ///< by landmark id
+  std::vector<int> shared_block_refcount_;        ///< by block: number of landmarks that share it
+  std::int64_t frame_ = 0;  ///< number of frames with a measurement of a landmark
   std::int64_t block_name_counter_ = 0;
   LandmarkIdReuse id_reuse_;
-  LandmarkOptions::Prior prior_;  ///< of landmarks that this frame initialises
+  LandmarkOptions::Prior prior_;  ///< prior of landmarks that this frame initialises
 
   Space xyz_;  ///< role of a landmark with the representation xyz
 
   // Reused memory.
   Scratch<std::vector<ById::node_type>> recycled_nodes_;  ///< records of deleted landmarks
-  std::string name_;                                      ///< of the declared block
+  std::string name_;                                      ///< name of the declared block
   Scratch<std::vector<const PendingMeasurement*>>
-      measured_;  ///< an accepted measurement of each landmark in the state, by id
+      measured_;  ///< one accepted measurement of each landmark in the state, sorted by id
   struct {
     std::vector<BlockId> blocks;
     std::vector<double> values;
-    std::vector<int> rows;  ///< of the inverse measurement
-  } new_blocks_;            ///< blocks of a new landmark, without existing shared ones
-  std::vector<double> inverse_distances_;  ///< of converged landmarks
+    std::vector<int> rows;  ///< rows of the inverse measurement
+  } new_blocks_;            ///< blocks of a new landmark, without those that exist already
+  std::vector<double> inverse_distances_;  ///< inverse distances of converged landmarks
 };
 
 }  // namespace alidade::internal

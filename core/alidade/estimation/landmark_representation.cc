@@ -12,7 +12,7 @@ namespace {
 static_assert(detail::RepresentationTraits<LandmarkRepresentations>::kMaxTangent <=
               internal::kMaxLandmarkTangent);
 
-/// Returns true if the landmark roles equal the roles of the representation.
+/// Returns whether the landmark roles equal the roles of the representation.
 template <class Representation>
 bool HasRoles(const std::vector<Space>& roles) {
   constexpr int count = detail::Blocks<Representation>::kCount;

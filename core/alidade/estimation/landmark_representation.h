@@ -7,18 +7,19 @@
 
 #include "alidade/state/manifold.h"
 
-/// Run-time selection of the representations in alidade/model/landmark.h.
+/// Functions that select a representation of alidade/model/landmark.h at run time.
 namespace alidade {
 
 enum class LandmarkRepresentation;  // in alidade/model/landmark.h
 
-/// Returns the name in `landmarks.representation`: `inverse_depth`, `anchored` or `xyz`.
+/// Returns the name of a representation in the key `landmarks.representation`: `inverse_depth`,
+/// `anchored` or `xyz`.
 const char* ToString(LandmarkRepresentation representation);
-/// Returns true for `xyz`, the representation by the point itself.
+/// Returns true for `xyz`, the representation of a landmark by its coordinates.
 bool IsXyz(LandmarkRepresentation representation);
-/// Returns the representation of the landmark roles among `roles`. Returns nothing if the sensor
-/// defines its own representation: such landmarks are never converted, and their position is not
-/// recorded.
+/// Returns the representation of the landmark roles among `roles`. Returns nullopt if the sensor
+/// defines its own representation. Landmarks of such a sensor are never converted, and their
+/// positions are not recorded.
 std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>& roles);
 
 namespace internal {
@@ -26,19 +27,19 @@ namespace internal {
 /// The largest number of tangent elements of a representation.
 inline constexpr int kMaxLandmarkTangent = 6;
 
-/// Position of a landmark, with its Jacobian.
+/// Position of a landmark, and the Jacobian of the position.
 struct LandmarkPoint {
   Eigen::Vector3d position;  ///< in the world, m
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 6>
-      jacobian;  ///< of the position by the tangents of the blocks
+      jacobian;  ///< derivative by the tangent elements of all blocks
 };
 
-/// Computes the position of a landmark from the values of its blocks, in the order of its roles.
-/// Returns nothing unless the inverse distance is positive.
+/// Computes the position of a landmark from the values of its blocks, which are in the order of the
+/// landmark roles. Returns nullopt unless the inverse distance is positive.
 std::optional<LandmarkPoint> PointOf(LandmarkRepresentation representation,
                                      const double* const* blocks);
 
-/// Returns the representation of landmarks that have converged.
+/// Returns the representation to which converged landmarks are converted: xyz.
 LandmarkRepresentation XyzRepresentation();
 
 /// Computes the linearity index of a landmark (LinearityIndex). `camera` is the position of the

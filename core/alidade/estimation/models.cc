@@ -15,7 +15,7 @@ struct ModelError {
   std::string text;
 };
 
-/// Latest error of each model in this thread.
+/// Latest error text of each model in this thread.
 thread_local std::vector<ModelError> model_errors;
 
 std::string ErrorTextOf(const void* model) {
@@ -32,7 +32,7 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
   };
   if (!has_size(owned.mean, geometry.ambient) || !has_size(owned.sqrt_prior, n * n) ||
       !has_size(owned.sqrt_density, n * n)) {
-    return "have another size than the role";
+    return "do not have the size of the role";
   }
   if (owned.mean.empty()) owned.mean = geometry.Identity();
   if (!AllFinite(owned.mean) || !AllFinite(owned.sqrt_prior) || !AllFinite(owned.sqrt_density) ||
@@ -40,7 +40,7 @@ std::string internal::CheckOwned(const Geometry& geometry, OwnedRole& owned) {
     return "are not finite";
   }
   if (DistanceFrom(geometry, owned.mean.data()) > kUnitTolerance) {
-    return "have a mean that does not have unit length";
+    return "have a mean whose length is not 1";
   }
   geometry.Normalise(owned.mean.data());
   if (owned.dynamics != OwnedDynamics::kGaussMarkov) owned.time_constant_s = 0.0;
@@ -56,7 +56,7 @@ Status internal::RecordModelError(const void* model, const std::string& text) no
     std::erase_if(model_errors, [&](const ModelError& error) { return error.model == model; });
     if (model_errors.size() == kMaxErrors) model_errors.erase(model_errors.begin());
     model_errors.push_back({model, text});
-  } catch (const std::bad_alloc&) {  // the error then has no text
+  } catch (const std::bad_alloc&) {  // the error text then remains empty
   }
   return Status::kError;
 }

@@ -13,70 +13,73 @@
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
 
-/// Interfaces of sensor and motion models for estimators. A struct (direct_models.h) or a plugin
-/// implements them.
+/// Interfaces through which estimators call sensor and motion models. A struct (direct_models.h) or
+/// a plugin implements an interface.
 namespace alidade {
 
 /// Maximum number of roles of a sensor, and of blocks of a motion model.
 inline constexpr int kMaxRoles = ALIDADE_MAX_ROLES;
 
-/// Process of a model parameter state of a sensor, such as a bias.
+/// Dynamics of a model parameter state of a sensor, such as a bias.
 enum class OwnedDynamics : std::uint32_t {
   kConstant = ALIDADE_STAYS,
   kRandomWalk = ALIDADE_RANDOM_WALK,
   kGaussMarkov = ALIDADE_GAUSS_MARKOV,
 };
 
-/// Prior and dynamics of a role that is a model parameter state. n: its tangent size.
+/// Prior and dynamics of a role that is a model parameter state. n: tangent size of the role.
 struct OwnedRole {
-  std::vector<double> mean;        ///< ambient
-  std::vector<double> sqrt_prior;  ///< L of P = L L', n x n row-major; empty: known exactly
+  std::vector<double> mean;  ///< ambient
+  std::vector<double>
+      sqrt_prior;  ///< L of the prior P = L L', n x n row-major; empty: known exactly
   OwnedDynamics dynamics = OwnedDynamics::kConstant;
-  std::vector<double> sqrt_density;  ///< L of the driving noise, per sqrt(s); empty: zero
-  double time_constant_s = 0.0;      ///< of a Gauss-Markov process
+  std::vector<double> sqrt_density;  ///< L of the driving noise density, per sqrt(s); empty: zero
+  double time_constant_s = 0.0;      ///< time constant of a Gauss-Markov process
 };
 
 /// Inverse measurement model of a sensor: the output of SensorModel::Initialise.
 struct InverseModel {
-  int role = -1;       ///< the first role that it determines; -1: the sensor has no inverse model
-  int count = 0;       ///< number of roles from `role` on: all roles of a landmark, else one
-  int prior_size = 0;  ///< number of prior values that it needs besides the measurement
+  int role = -1;       ///< first role that the model determines; -1: no inverse model
+  int count = 0;       ///< number of roles from `role` on: all roles of a landmark, or one
+  int prior_size = 0;  ///< number of prior values that the model needs
 };
 
-/// Measurement as the input of a sensor model.
+/// Measurement that is the input of a sensor model.
 struct Observation {
   const double* z = nullptr;      ///< ambient; null for a prediction
-  const double* known = nullptr;  ///< known numbers of the measurement, if the sensor has any
+  const double* known = nullptr;  ///< known numbers of the measurement; null if there are none
 };
 
-/// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All calls are
-/// const; they are thread-safe if the implementation is.
+/// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All members
+/// are const. They are thread-safe if those of the derived class are.
 class SensorModel {
  public:
   struct Description {
-    std::string name;    ///< of the model
-    std::string origin;  ///< the plugin file; empty: not from a plugin
+    std::string name;    ///< name of the model
+    std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> roles;
     Space measurement;
-    Space known = {};  ///< known numbers of each measurement; empty name: none
+    Space known = {};  ///< known numbers of each measurement; no name: there are none
     InverseModel inverse = {};
-    std::map<std::size_t, OwnedRole> owned = {};  ///< by role, if the model defines it
-    bool has_validity = false;                    ///< whether Valid may reject a measurement
-    /// L of R = L L', m x m row-major, which replaces the L of the model; empty: the model's.
+    std::map<std::size_t, OwnedRole> owned =
+        {};                     ///< by role, if the model defines prior and dynamics
+    bool has_validity = false;  ///< whether Valid may reject a measurement
+    /// L of R = L L', m x m row-major, which replaces the L of the model. Empty: the L of the model
+    /// is used.
     std::vector<double> sqrt_noise = {};
   };
-  /// Destinations of an evaluation; null: not computed.
+  /// Destinations of an evaluation. A quantity is not computed if its pointer is null.
   struct Output {
     double* h = nullptr;                 ///< ambient
     double* const* jacobians = nullptr;  ///< dh / d role_i, row-major; each may be null
-    const int* strides = nullptr;        ///< from row to row of each Jacobian
+    const int* strides = nullptr;        ///< distance between the rows of each Jacobian
     double* sqrt_noise = nullptr;        ///< L, m x m row-major
   };
-  /// Destinations of the inverse model; null: not computed.
+  /// Destinations of the inverse model. A quantity is not computed if its pointer is null.
   struct InverseOutput {
     double* y = nullptr;           ///< ambient
     double* const* jx = nullptr;   ///< dy / d role_i of the other roles, row-major
-    const int* strides = nullptr;  ///< from row to row of each jx; null: dense
+    const int* strides = nullptr;  ///< distance between the rows of each jx; null: dense
     double* jz = nullptr;          ///< dy / dz, row-major
     double* jp = nullptr;          ///< dy / d prior, row-major
   };
@@ -92,14 +95,16 @@ class SensorModel {
   const Space& known() const { return description_.known; }
   int known_size() const { return known_size_; }
   const InverseModel& inverse() const { return description_.inverse; }
-  /// Returns whether some roles belong to the landmark that a measurement names.
+  /// Returns whether the sensor measures landmarks: some of its roles then belong to the measured
+  /// landmark.
   bool has_landmark() const;
-  /// Returns prior and dynamics of a role with ALIDADE_ROLE_OWNED: those that the model defines, or
-  /// a constant at the neutral element.
+  /// Returns prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED. If the model does not
+  /// define them, returns a constant at the neutral element.
   OwnedRole owned(std::size_t role) const;
 
-  /// Computes h, its Jacobians and L at the roles. Returns kOutOfDomain if h is not defined there;
-  /// the outputs are then unspecified. ContractViolation if the known numbers are missing.
+  /// Computes h, its Jacobians and L at the values of the roles. Returns kOutOfDomain if h is not
+  /// defined at these values; the outputs are then unspecified. ContractViolation if the known
+  /// numbers are missing.
   Status Evaluate(const Observation& observation, const double* const* roles,
                   const Output& out) const {
     ALIDADE_EXPECTS(observation.known != nullptr || known_size_ == 0);
@@ -121,12 +126,13 @@ class SensorModel {
                    const double* known = nullptr) const {
     return Evaluate({z, known}, roles, {.sqrt_noise = l});
   }
-  /// Returns kInvalid if the measurement cannot be used for any state.
+  /// Returns kInvalid if the measurement cannot be used, whatever the state is.
   Status Valid(const Observation& observation) const {
     return description_.has_validity ? DoValid(observation) : Status::kOk;
   }
-  /// Computes y = g(other roles, z, prior), the initialised roles one after the other. Returns
-  /// kInvalid if a required prior is missing. ContractViolation if the sensor has no inverse model.
+  /// Computes y = g(other roles, z, prior): the values of the initialised roles, one after the
+  /// other. Returns kInvalid if a required prior is missing. ContractViolation if the sensor has no
+  /// inverse model.
   Status Initialise(const double* const* roles, const Observation& observation, const double* prior,
                     InverseOutput out) const;
   /// Returns the reason why the last call in this thread returned kError.
@@ -146,27 +152,29 @@ class SensorModel {
 
   Description description_;
   int known_size_ = 0;
-  std::vector<int> tangents_;  ///< of the roles
+  std::vector<int> tangents_;  ///< tangent sizes of the roles
 };
 
-/// Motion model x' = f(x, u, w, dt), w ~ N(0, L L'). n: tangent size of all blocks, n_w: size of w.
+/// Motion model x' = f(x, u, w, dt), w ~ N(0, L L'). n: total tangent size of the blocks, n_w: size
+/// of w.
 class MotionModel {
  public:
   struct Description {
-    std::string name;    ///< of the model
-    std::string origin;  ///< the plugin file; empty: not from a plugin
+    std::string name;    ///< name of the model
+    std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> blocks;
-    Space input = {};  ///< the control input; empty name: none
+    Space input = {};  ///< the control input; no name: there is none
     int noise_size = 0;
-    bool stationary = false;      ///< its blocks never change: Step need not be called
-    bool discrete_noise = false;  ///< w is constant from an update to the next
-    /// L of Qw = L L', n_w x n_w row-major, which replaces the L of the model; empty: the model's.
+    bool stationary = false;      ///< the blocks never change: Step need not be called
+    bool discrete_noise = false;  ///< w is constant from one update to the next
+    /// L of Qw = L L', n_w x n_w row-major, which replaces the L of the model. Empty: the L of the
+    /// model is used.
     std::vector<double> sqrt_noise = {};
   };
-  /// Destinations of a step; null: not computed.
+  /// Destinations of a step. A quantity is not computed if its pointer is null.
   struct Output {
     double* const* next = nullptr;  ///< x', by block
-    double* f = nullptr;            ///< F = dx' / dx, n x n row-major; requires g
+    double* f = nullptr;            ///< F = dx' / dx, n x n row-major; computed only with g
     double* g = nullptr;            ///< G = dx' / dw, n x n_w row-major
     double* sqrt_q = nullptr;       ///< L, n_w x n_w row-major
   };
@@ -185,7 +193,8 @@ class MotionModel {
   bool has_input() const { return !description_.input.name.empty(); }
   const Space& input() const { return description_.input; }
 
-  /// Computes x' with its Jacobians, and L, for input u and noise w. A null w counts as zero.
+  /// Computes x', its Jacobians and L for the control input u and the noise w. A null w means w =
+  /// 0.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               const Output& out) const {
     if (w == nullptr) w = zero_noise_.data();
@@ -219,11 +228,11 @@ using SharedMotion = std::shared_ptr<const MotionModel>;
 
 namespace internal {
 
-/// Checks prior and dynamics of a role with this geometry. Returns the defect, or "" if they are
-/// valid. A missing mean becomes the neutral element, and a given mean is normalised.
+/// Checks prior and dynamics of a role with this geometry. Returns the defect, or "" if there is
+/// none. Sets a missing mean to the neutral element, and normalises a given mean.
 std::string CheckOwned(const Geometry& geometry, OwnedRole& owned);
 
-/// Records `text` as the error text of a model in this thread, and returns kError.
+/// Records `text` as the last error text of a model in this thread, and returns kError.
 [[gnu::cold]] Status RecordModelError(const void* model, const std::string& text) noexcept;
 
 }  // namespace internal

@@ -10,7 +10,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Computes gl = G L, for G n x w and L w x w.
+/// Computes gl = G L. G is n x w, L is w x w.
 void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
   for (int i = 0; i < n; ++i, g += w, gl += w) {
     for (int c = 0; c < w; ++c) {
@@ -21,7 +21,7 @@ void SpreadNoise(const double* g, const double* l, int n, int w, double* gl) {
   }
 }
 
-/// As StepAt, but checks only x' for finite values.
+/// Does the same as StepAt, but checks only x' for finite values.
 [[gnu::always_inline]] inline Outcome CallStep(const MotionBinding& motion,
                                                const MotionPlace& place, const double* x,
                                                const double* u, const double* w, double dt_s,
@@ -65,11 +65,12 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
   if (outcome == Outcome::kAccepted) return {};
   const std::string model = "motion model of '" + motion.name + "' ";
   if (outcome == Outcome::kNotFinite) {
-    return {EventKind::kNotFinite, model + "steps to a state that is not finite"};
+    return {EventKind::kNotFinite, model + "predicts a state that is not finite"};
   }
   const bool failed = outcome == Outcome::kFailed;
   return {failed ? EventKind::kPluginFailed : EventKind::kDiverged,
-          model + "cannot step: " + (failed ? motion.model->error_text() : "out of its domain")};
+          model + "cannot predict the state: " +
+              (failed ? motion.model->error_text() : "the state is out of domain")};
 }
 
 Motions::Motions(const ProblemIndex& index)
@@ -81,7 +82,7 @@ Motions::Motions(const ProblemIndex& index)
     const auto n = static_cast<std::size_t>(model.tangent_size());
     const auto n_w = static_cast<std::size_t>(model.noise_size());
     Step& step = steps_[i];
-    step.f.resize(n * n, kNotANumber);  // detects elements that the model does not write
+    step.f.resize(n * n, kNotANumber);  // shows whether the model writes all elements
     step.g.resize(n * n_w, kNotANumber);
     step.l.resize(n_w * n_w, kNotANumber);
     step.gl.resize(n * n_w);
@@ -122,7 +123,7 @@ StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s,
     output.g = step.g.data();
   }
   if (!continues_interval) output.l = step.l.data();
-  // Apply detects F, G and L that are not finite, because P is then not finite.
+  // Apply checks that F, G and L are finite: if not, P is not finite either.
   const double* const x = state.values().data();
   const Outcome outcome = derivatives
                               ? CallStep(motion, place, x, step.u.data(), nullptr, dt_s, output)
@@ -140,8 +141,8 @@ StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s,
   return {};
 }
 
-/// Computes C = A N' and M <- A + N, with A = F M and N = G Lq. M is zero for blocks without a
-/// covariance.
+/// Computes C = A N' and M <- A + N, with A = F M and N = G Lq. The rows of M that belong to blocks
+/// without a covariance are zero.
 [[gnu::noinline]] void Motions::PropagateDiscreteNoise(const MotionModel& model,
                                                        const MotionPlace& place, Step& step) {
   const Workspace::Use use(memory_);
@@ -159,7 +160,7 @@ StepError Motions::EvaluateModel(std::size_t i, const State& state, double dt_s,
 
 StepError Motions::Apply(State& state) {
   Covariance& p = state.covariance();
-  if (active_.size() <= 1) {  // a failed propagation by one model leaves P unchanged
+  if (active_.size() <= 1) {  // if the propagation of a single model fails, P is unchanged
     if (!Propagate(p)) return FindNotFinite();
   } else if (IsBounded(p)) {
     Propagate(p);
@@ -176,7 +177,7 @@ StepError Motions::Apply(State& state) {
   return {};
 }
 
-/// Returns the reason why P after the step is not finite.
+/// Returns the error that explains why P after the step is not finite.
 [[gnu::noinline]] StepError Motions::FindNotFinite() const {
   for (const std::size_t i : active_) {
     const Step& step = steps_[i];
@@ -186,8 +187,8 @@ StepError Motions::Apply(State& state) {
   return {EventKind::kNotFinite, "the covariance after the step is not finite"};
 }
 
-/// Returns whether P after this step cannot overflow, because |F P F'|_ij <= (n max|F|)^2 max|P|
-/// and |N N'|_ij <= n_w max|N|^2.
+/// Returns true if P cannot overflow in this step. The bounds are |F P F'|_ij <= (n max|F|)^2
+/// max|P| and |N N'|_ij <= n_w max|N|^2.
 [[gnu::noinline]] bool Motions::IsBounded(const Covariance& covariance) const {
   constexpr double kSafe = 1e300;
   double f = 1.0, noise = 0.0, cross = 0.0, p = 0.0;
@@ -206,8 +207,7 @@ StepError Motions::Apply(State& state) {
   return rows * rows * p + noise_size() * noise * noise + 2.0 * cross <= kSafe;
 }
 
-/// Propagates P by all active models. Stops and returns false at a model after which P would not be
-/// finite.
+/// Propagates P by all active models. Stops and returns false if a model would make P not finite.
 bool Motions::Propagate(Covariance& p) {
   for (const std::size_t i : active_) {
     const MotionPlace& place = index_->motion_places[i];
@@ -222,7 +222,7 @@ bool Motions::Propagate(Covariance& p) {
   return true;
 }
 
-/// Propagates P by a model with blocks that are not in P.
+/// Propagates P by a model some of whose blocks are not in P.
 [[gnu::noinline]] bool Motions::PropagatePart(Covariance& p, const MotionPlace& place,
                                               const Step& step, int width) {
   if (place.rows.empty()) return true;

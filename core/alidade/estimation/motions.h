@@ -12,18 +12,18 @@
 
 namespace alidade::internal {
 
-// Evaluation of motion models at values x of the whole state, such as the estimate of a filter, a
-// sigma point or an iterate of a batch. n_w: number of noise inputs.
+// Evaluation of motion models at a value x of the whole state, such as an estimate, a sigma point
+// or an iterate of a batch. n_w: number of noise inputs.
 
-/// Error of a step; converts to false if the step succeeded. As small as a pointer, because every
-/// step returns one.
+/// Error of a step. Converts to false if the step succeeded. Every step returns a StepError, so it
+/// is only as large as a pointer.
 class StepError {
  public:
   StepError() = default;
   StepError(EventKind kind, std::string text)
       : detail_(std::make_unique<const Detail>(Detail{kind, std::move(text)})) {}
   explicit operator bool() const { return detail_ != nullptr; }
-  EventKind kind() const { return detail_->kind; }  ///< of the event
+  EventKind kind() const { return detail_->kind; }  ///< kind of the event that reports the error
   const std::string& text() const { return detail_->text; }
 
  private:
@@ -34,18 +34,18 @@ class StepError {
   std::unique_ptr<const Detail> detail_;
 };
 
-/// Destinations of a step, row-major; null: not computed.
+/// Destinations of a step, row-major. A quantity is not computed if its pointer is null.
 struct StepOutput {
-  double* next = nullptr;  ///< x' of the whole state; written for the blocks of the model
-  double* f = nullptr;     ///< F, n x n; requires g
+  double* next = nullptr;  ///< x' of the whole state; only the blocks of the model are written
+  double* f = nullptr;     ///< F, n x n; computed only with g
   double* g = nullptr;     ///< G, n x n_w
   double* l = nullptr;     ///< L of Qw = L L', n_w x n_w
 };
-/// Computes x' = f(x, u, w, dt) of one motion model at the values x of the whole state. A null w
-/// counts as zero.
+/// Computes x' = f(x, u, w, dt) of one motion model at the value x of the whole state. A null w
+/// means w = 0.
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, const StepOutput& output);
-/// Converts an outcome of StepAt into an error; no error if it is kAccepted.
+/// Converts an outcome of StepAt into an error. kAccepted becomes "no error".
 StepError StepErrorOf(const MotionBinding& motion, Outcome outcome);
 /// Copies x' to x for the blocks that are not constant, and normalises them to their manifolds.
 inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
@@ -55,20 +55,20 @@ inline void TakeStep(const MotionPlace& place, const double* next, double* x) {
   }
 }
 
-/// Propagation by the motion models of a problem over one step: x', F and G Lq. Discrete noise
-/// w ~ N(0, I) is constant over an interval, as Ekf documents: M = Cov(x, w), N = G Lq, A = F M.
-/// n: size of P, n_w: noise inputs of the active models. A copy is a snapshot.
+/// Propagates the state by the motion models of a problem over one step: computes x', F and G Lq.
+/// Discrete noise w ~ N(0, I) is constant over an interval (see Ekf): M = Cov(x, w), N = G Lq, A =
+/// F M. n: size of P, n_w: number of noise inputs of the active models. A copy is a snapshot.
 class Motions {
  public:
-  /// Step of one model. Matrices are row-major, in the order of its blocks.
+  /// Step of one model. Matrices are row-major, in the order of the blocks of the model.
   struct Step {
-    bool active = false;              ///< false: stationary, or a block has no value yet
-    std::vector<double> u;            ///< control input; empty: the model has no control input
-    std::vector<double> f, g;         ///< F, G
-    std::vector<double> l, gl;        ///< L of Qw, G L
-    std::vector<double> cross;        ///< C = A N', if `continues_interval`
-    std::vector<double> m;            ///< M, if the noise is discrete
-    bool continues_interval = false;  ///< the discrete noise is that of the previous step
+    bool active = false;        ///< false: the model is stationary, or a block has no value yet
+    std::vector<double> u;      ///< control input; empty: the model has no control input
+    std::vector<double> f, g;   ///< F, G
+    std::vector<double> l, gl;  ///< L of Qw, G L
+    std::vector<double> cross;  ///< C = A N'; used if `continues_interval`
+    std::vector<double> m;      ///< M; used if the noise is discrete
+    bool continues_interval = false;  ///< whether the discrete noise is that of the previous step
   };
 
   explicit Motions(const ProblemIndex& index);
@@ -76,13 +76,14 @@ class Motions {
   /// Determines the active models: those that are not stationary and whose blocks all have a value.
   void Activate(const StateLayout& layout);
   std::vector<Step>& steps() { return steps_; }
-  /// Returns x' of the whole state; valid for the blocks of active models.
+  /// Returns x' of the whole state. Only the blocks of active models are valid.
   std::vector<double>& next() { return next_; }
 
-  /// Computes x', F, G and Lq of all active models; without `derivatives` only x' and Lq.
+  /// Computes x', F, G and Lq of all active models. If `derivatives` is false, computes only x' and
+  /// Lq.
   StepError Evaluate(const State& state, double dt_s, bool derivatives = true);
-  /// Sets P <- F P F' + N N', N = G Lq, and x <- x'. If it fails, both are unchanged and the error
-  /// is returned.
+  /// Sets P <- F P F' + N N', N = G Lq, and x <- x'. If this fails, returns the error and leaves P
+  /// and x unchanged.
   StepError Apply(State& state);
 
   /// Returns whether the next step continues an interval of discrete noise.
@@ -93,10 +94,11 @@ class Motions {
   bool has_discrete_noise() const { return has_discrete_noise_; }
 
   int noise_size() const;  ///< n_w
-  // Matrices of the last step, in `work`:
+  // The following functions return matrices of the last step, stored in `work`.
   Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
-  /// Returns G Lq (`matrix` is Step::gl) or M (Step::m), n x n_w, with the columns of the models
-  /// side by side. The columns of continuous noise are zero unless `with_continuous`.
+  /// Returns G Lq if `matrix` is Step::gl, or M if it is Step::m: n x n_w, with the columns of the
+  /// models side by side. The columns of continuous noise are zero unless `with_continuous` is
+  /// true.
   Workspace::Matrix NoiseColumns(std::vector<double> Step::*matrix, int n, Workspace& work,
                                  bool with_continuous = false) const;
 
@@ -109,7 +111,7 @@ class Motions {
   StepError FindNotFinite() const;
 
   const ProblemIndex* index_;
-  std::vector<Step> steps_;  ///< as in Problem::motions
+  std::vector<Step> steps_;  ///< in the order of Problem::motions
   std::vector<double> next_;
   std::vector<std::size_t> active_;  ///< indices of the active steps
   bool has_discrete_noise_ = false;

@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Positions of the landmarks in the camera frame, divided by their usual distance.
+/// Positions of the landmarks in the camera frame, relative to the typical distance of landmarks.
 constexpr double kPositions[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
                                     {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
@@ -23,7 +23,7 @@ const SharedSensor& XyzModel(const SensorBinding& sensor) {
   return xyz ? sensor.model : sensor.xyz;
 }
 
-/// Returns the block in the role with this name, or -1.
+/// Returns the block that fills the role with this name, or -1.
 BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
     if (sensor.model->roles()[i].name == role) return sensor.roles[i].block;
@@ -31,7 +31,7 @@ BlockId BlockIn(const SensorBinding& sensor, const char* role) {
   return -1;
 }
 
-/// Returns the mean of the prior of a block, or else `default_mean`.
+/// Returns the mean of the prior of a block, or `default_mean` if the prior has no mean.
 std::vector<double> PriorMeanOf(const Problem& problem, BlockId block,
                                 const std::vector<double>& default_mean) {
   const auto prior = std::ranges::find(problem.priors, block, &Prior::block);
@@ -39,7 +39,7 @@ std::vector<double> PriorMeanOf(const Problem& problem, BlockId block,
   return has_mean ? prior->mean : default_mean;
 }
 
-/// Returns the sensor as a sensor of the landmark `block` alone.
+/// Returns a copy of the sensor that measures only the landmark `block`.
 SensorBinding SensorOfLandmark(const SensorBinding& sensor, BlockId block) {
   SensorBinding binding{sensor.name, sensor.stream, XyzModel(sensor), {}};
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
@@ -49,16 +49,16 @@ SensorBinding SensorOfLandmark(const SensorBinding& sensor, BlockId block) {
   return binding;
 }
 
-/// Values of the blocks along a trajectory, and their columns in the observability matrix.
+/// Values of the blocks at a point of a trajectory, and their columns in the observability matrix.
 struct Trajectory {
   std::vector<std::vector<double>> values;
-  std::vector<int> columns;  ///< first column by block; -1: constant, no column
+  std::vector<int> columns;  ///< by block: first column; -1: no column, because it is constant
   std::vector<double> scale;
   std::vector<std::string> names;
 };
 
-/// Returns a generic point near the prior: no element has a special value, and the point is in the
-/// domain of the sensors.
+/// Returns a generic point near the prior. No element has a special value such as 0, and the point
+/// is in the domain of the sensors.
 Trajectory StartNearPrior(const Problem& problem) {
   Trajectory t;
   t.values.resize(problem.layout.blocks().size());
@@ -89,8 +89,8 @@ Trajectory StartNearPrior(const Problem& problem) {
   return t;
 }
 
-/// Returns a generic control input. With a generator, each element is multiplied by a random factor
-/// from 1/4 to 7/4. Empty if the model has no control input.
+/// Returns a generic control input, which is empty if the model has no control input. If a random
+/// generator is given, each element is multiplied by a random factor from 1/4 to 7/4.
 std::vector<double> GenericInput(const MotionModel& model, Random* random) {
   if (!model.has_input()) return {};
   const Geometry& geometry = model.input().geometry;
@@ -104,7 +104,7 @@ std::vector<double> GenericInput(const MotionModel& model, Random* random) {
   return input;
 }
 
-/// Propagates the values by dt_s and sets phi <- F phi. Returns false if a model fails.
+/// Propagates the values by dt_s, and sets phi <- F phi. Returns false if a model fails.
 bool Advance(const Problem& problem, double dt_s, Random* random, Trajectory& t,
              Eigen::MatrixXd& phi) {
   for (const MotionBinding& motion : problem.motions) {
@@ -142,13 +142,14 @@ bool Advance(const Problem& problem, double dt_s, Random* random, Trajectory& t,
   return true;
 }
 
-/// Span of the rows of the observability matrix, as an orthonormal basis.
+/// Orthonormal basis of the row space of the observability matrix.
 class RowSpace {
  public:
   explicit RowSpace(Eigen::Index n) : q_(n, n) {}
 
   Eigen::Index rank() const { return rank_; }
-  /// Adds the component of `row` orthogonal to the span, unless it is a rounding error.
+  /// Extends the basis by the part of `row` that is orthogonal to it, unless this part is a
+  /// rounding error.
   void Add(Eigen::VectorXd row) {
     constexpr double kRankTolerance = 1e-9;
     const double norm = row.norm();
@@ -167,7 +168,8 @@ class RowSpace {
   Eigen::Index rank_ = 0;
 };
 
-/// Adds the rows H phi of a sensor, in units of the prior sigma, if h is defined at the values.
+/// Adds the rows H phi of a sensor, scaled to units of the prior sigma. Adds nothing if h is not
+/// defined at the values.
 void AddSensorRows(const SensorBinding& sensor, const double* known, const Problem& problem,
                    const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
@@ -202,8 +204,8 @@ void AddSensorRows(const SensorBinding& sensor, const double* known, const Probl
   for (Eigen::Index i = 0; i < m; ++i) rows.Add(h_phi.row(i).cwiseProduct(scale));
 }
 
-/// Adds the rows of every sensor. Sensors with known numbers measure several times, with random
-/// known numbers of the magnitude of the state.
+/// Adds the rows of every sensor. Sensors with known numbers are evaluated several times, with
+/// random known numbers of the magnitude of the state.
 void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen::MatrixXd& phi,
                         Random& random, RowSpace& rows) {
   constexpr int kMeasurements = 4;
@@ -220,8 +222,8 @@ void AddObservationRows(const Problem& problem, const Trajectory& t, const Eigen
   }
 }
 
-/// Adds the elements with an exact prior, and the positions of known landmarks. With landmarks,
-/// they define the world frame.
+/// Adds the elements with an exact prior, and the positions of known landmarks. If the problem has
+/// landmarks, these elements and positions define the world frame.
 void AddKnown(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& t,
               RowSpace& rows) {
   const auto n = static_cast<Eigen::Index>(t.names.size());
@@ -238,9 +240,9 @@ void AddKnown(const internal::ProblemWithLandmarks& landmark_problem, const Traj
   }
 }
 
-/// Removes the direction of scale from a null-space basis: it moves all landmarks along their
-/// offsets from the camera, d p = p - r, and may move the other blocks. Returns false if the null
-/// space does not contain it.
+/// Removes the direction of scale from a basis of the null space. This direction moves each
+/// landmark p along its offset from the camera r, d p = p - r, and may move the other blocks.
+/// Returns false if the null space does not contain the direction.
 bool RemoveScale(const internal::ProblemWithLandmarks& landmark_problem, const Trajectory& start,
                  Eigen::MatrixXd& basis) {
   constexpr double kTolerance = 1e-5;
@@ -261,8 +263,8 @@ bool RemoveScale(const internal::ProblemWithLandmarks& landmark_problem, const T
   return true;
 }
 
-/// Converts the columns of a null-space basis to reduced echelon form, so that each column moves
-/// few elements.
+/// Converts the columns of a basis of the null space to reduced echelon form. Each column then
+/// moves few elements.
 void Reduce(Eigen::MatrixXd& basis) {
   Eigen::Index rank = 0;
   for (Eigen::Index row = 0; row < basis.rows() && rank < basis.cols(); ++row) {
@@ -299,7 +301,8 @@ std::optional<internal::ProblemWithLandmarks> internal::PlaceLandmarks(const Pro
   const std::vector<double> q =
       PriorMeanOf(problem, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
   const auto& prior = problem.landmarks->prior;
-  constexpr double kMaxDistance_m = 1000.0;  // landmarks at infinity do not determine the scale
+  // Landmarks at infinity do not determine the scale.
+  constexpr double kMaxDistance_m = 1000.0;
   const double distance_m = prior ? std::min(1.0 / prior->inverse_distance, kMaxDistance_m) : 2.0;
   const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3)};
   for (const auto& position : kPositions) {
@@ -349,7 +352,7 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
   Random random(1), known(2);
   Random* const changing = excitation == Excitation::kChanging ? &random : nullptr;
   // If a step does not increase the rank, later steps do not either, because state and inputs are
-  // generic. Two such steps are required, because trajectories turn.
+  // generic. The loop ends after two such steps, because trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index previous_rank = rows.rank();
     AddObservationRows(problem, t, phi, known, rows);
@@ -369,7 +372,7 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(
       const std::string& name = start.names[static_cast<std::size_t>(i)];
       if (names.empty() || names.back() != name) names.push_back(name);
     }
-    // A landmark alone becomes observable when the trajectory continues.
+    // A direction of landmarks alone becomes observable when the trajectory continues.
     if (!landmark_problem || names.front() != internal::kLandmarks)
       directions.push_back(std::move(names));
   }

@@ -12,17 +12,17 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns A + (B - A)+ with the positive part (.)+: a covariance that is at least A and at least B
-/// in every direction.
+/// Returns A + (B - A)+, with (.)+ the positive part of a matrix. In every direction, this
+/// covariance is at least A and at least B.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const SymmetricEigen difference = EigenOf(b - a);
   const Eigen::VectorXd positive = difference.values.cwiseMax(0.0);
   return a + ProductTransposed(difference.vectors * positive.asDiagonal(), difference.vectors);
 }
 
-/// Resets the covariance of the blocks that share a motion model with block `id` to the upper bound
-/// of prior and current covariance, without correlations. Their values are unchanged. `id` itself
-/// is initialised afterwards.
+/// Resets the covariance of the other blocks of the motion model of block `id` to an upper bound of
+/// prior and current covariance, without correlations. The values of these blocks are unchanged.
+/// Block `id` itself is initialised afterwards.
 void ResetMotionBlocks(FilterState& f, BlockId id) {
   for (const MotionBinding& motion : f.problem_index->problem.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
@@ -43,7 +43,7 @@ void ResetMotionBlocks(FilterState& f, BlockId id) {
 }
 
 /// Multiplies the standard deviations of the blocks that a sensor corrects by 10. Returns false if
-/// it corrects no blocks.
+/// the sensor corrects no block.
 bool Inflate(FilterState& f, const SensorBinding& sensor) {
   constexpr double kInflation = 10.0;
   bool is_changed = false;
@@ -74,7 +74,7 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   const double defect = SquareRootOf(p.Dense(), ldlt, root);
   if (!(defect < -kRounding)) return;
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
-                           RoundedText(defect, 3) + " of its largest variance";
+                           RoundedText(defect, 3) + " times the largest variance";
   if (repairs_ == options_.max_covariance_repairs) {
     return End(f, EventKind::kNotPd, text + ", after " + std::to_string(repairs_) + " repairs");
   }
@@ -82,13 +82,13 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   f.motions.EndInterval();
   p.SetBlock(0, 0, ProductTransposed(root, root));
   AddEvent(f, EventKind::kRepaired,
-           text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
-               std::to_string(options_.max_covariance_repairs) + ")");
+           text + "; negative pivots were set to zero (repair " + std::to_string(repairs_) +
+               " of " + std::to_string(options_.max_covariance_repairs) + ")");
 }
 
 [[gnu::noinline]] void Recovery::Recover(FilterState& f, PendingMeasurement& pending) {
   const SensorBinding& sensor = *pending.binding;
-  const std::string reason = "sensor '" + sensor.name + "' rejected " +
+  const std::string reason = "sensor '" + sensor.name + "' was rejected " +
                              std::to_string(options_.rejection_recovery_after) +
                              " times in a row: ";
   const int role = sensor.model->inverse().role;
@@ -101,15 +101,16 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     ResetMotionBlocks(f, target->block);
     Initialise(f, pending, inverse);
     AddEvent(f, EventKind::kRejectionRecovery,
-             reason + "reset " + f.state.layout()[target->block].name + " from its measurement");
+             reason + "block '" + f.state.layout()[target->block].name +
+                 "' was reset from the last measurement");
     return;
   }
   char& inflated = f.health.inflated[static_cast<std::size_t>(pending.sensor)];
   if (inflated != 0) return;
   inflated = 1;
   AddEvent(f, EventKind::kRejectionRecovery,
-           reason + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
-                                        : "it has no estimated block to inflate"));
+           reason + (Inflate(f, sensor) ? "the covariance of its blocks was inflated"
+                                        : "the sensor has no estimated block to inflate"));
 }
 
 }  // namespace alidade::internal

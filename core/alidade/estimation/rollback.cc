@@ -71,7 +71,7 @@ Rollback::Processed Rollback::Process(Frame frame) {
   return {window.end() - static_cast<std::ptrdiff_t>(count), window.end()};
 }
 
-/// Reports a stale frame; a copy of the filter makes the report.
+/// Returns the report of a stale frame. A copy of the filter creates the report.
 Rollback::Processed Rollback::Reject(Frame frame) {
   const Timestamp newest = snapshots_.frames().back().frame.timestamp;
   ProcessedFrame rejected{std::move(frame), {}, filter_->Clone()};
@@ -81,8 +81,8 @@ Rollback::Processed Rollback::Reject(Frame frame) {
       {rejected.frame.timestamp, EventKind::kStale,
        "the frame at " + internal::SecondsText(rejected.frame.timestamp) + " is " +
            internal::SecondsText(internal::Lag(newest, rejected.frame.timestamp)) +
-           " older than the newest, beyond the window of " + internal::SecondsText(window_) +
-           ": its measurements are not used"}};
+           " older than the newest frame, more than the window of " +
+           internal::SecondsText(window_) + ": the measurements of this frame are not used"}};
   rejected.snapshot = filter_->Clone();
   rejected_.clear();
   rejected_.push_back(std::move(rejected));

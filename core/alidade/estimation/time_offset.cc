@@ -12,14 +12,15 @@
 namespace alidade::internal {
 namespace {
 
-/// Motion model that moves roles of a sensor: its blocks are `count` roles from `first` on.
+/// Motion model that changes blocks of a sensor. In the new roles, its blocks are the `count` roles
+/// from `first` on.
 struct Mover {
   SharedMotion model;
   int first, count;
-  std::vector<bool> is_constant;  ///< by block
+  std::vector<bool> is_constant;  ///< by block of the motion model
 };
 
-/// Sensor model that evaluates another one at the time t + delta.
+/// Sensor model that evaluates another sensor model at the time t + delta.
 class OffsetSensor final : public SensorModel {
  public:
   OffsetSensor(SharedSensor sensor, std::vector<Mover> movers, std::vector<int> role_map,
@@ -41,7 +42,7 @@ class OffsetSensor final : public SensorModel {
   }
 
  private:
-  /// Temporary memory of a call, reused by the calls of a thread.
+  /// Temporary memory of a call. Later calls in the same thread reuse it.
   struct Memory {
     std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
     std::vector<double> shifted, jacobian;
@@ -73,7 +74,8 @@ class OffsetSensor final : public SensorModel {
     return description;
   }
 
-  /// Computes x' of one mover after dt_s, block after block, and F unless it is null.
+  /// Computes x' of one mover after dt_s, block after block. Also computes F, unless its pointer is
+  /// null.
   static Status Move(const Mover& mover, const double* const* x, double dt_s, double* next,
                      Memory& memory, double* f) {
     std::array<double*, kMaxRoles> destinations;
@@ -126,8 +128,8 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// Computes the roles of the sensor at t + delta, in memory.roles; with `derivatives` also F and
-  /// df/ddelta.
+  /// Computes the values of the sensor's roles at t + delta, and points memory.roles to them. If
+  /// `derivatives` is true, also computes F and df/ddelta.
   Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
     memory.next.resize(ambient_);
     memory.shifted.resize(ambient_);
@@ -148,8 +150,8 @@ class OffsetSensor final : public SensorModel {
         status = Differentiate(mover, x, dt_s, next, memory, rate);
       }
       if (status == Status::kError) {
-        status = RecordModelError(this, "motion model '" + mover.model->name() +
-                                            "' of its roles: " + mover.model->error_text());
+        status = RecordModelError(
+            this, "motion model '" + mover.model->name() + "': " + mover.model->error_text());
       }
       if (status != Status::kOk) return status;
       for (std::size_t i = 0; i < role_map_.size(); ++i) {
@@ -168,8 +170,9 @@ class OffsetSensor final : public SensorModel {
     return Status::kOk;
   }
 
-  /// Sets the destinations of the Jacobians of the sensor, of m rows. Roles that do not move use
-  /// the destinations of the caller, and roles that move use temporary memory.
+  /// Sets the destinations of the Jacobians of the sensor, which have m rows. Jacobians of roles
+  /// that do not move are written to the destinations of the caller. Those of roles that move are
+  /// written to temporary memory.
   void SetJacobianDestinations(int m, double* const* jacobians, const int* strides,
                                Memory& memory) const {
     std::size_t size = 0;
@@ -194,7 +197,7 @@ class OffsetSensor final : public SensorModel {
   }
 
   /// Computes J_c = sum_i J_i F_ic for the blocks c of all movers, and J_delta = sum_i J_i
-  /// df_i/ddelta, from the Jacobians J_i, of m rows, of the roles i that move.
+  /// df_i/ddelta. J_i, with m rows, are the Jacobians of the roles i that move.
   void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
     const auto output = [&](int role, int columns) {
       return Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>(jacobians[role], m, columns,
@@ -283,10 +286,12 @@ class OffsetSensor final : public SensorModel {
   std::vector<Mover> movers_;
   std::vector<int> role_map_;  ///< by role of the sensor: role of this model; -1: no block
   int offset_;
-  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;  ///< of Memory
+  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0,
+              noise_ = 1;  ///< sizes of the arrays in Memory
 };
 
-/// Roles of an OffsetSensor, made from the roles of a sensor and the blocks of its motion models.
+/// Roles of an OffsetSensor: the roles of a sensor, and the blocks of the motion models that move
+/// them.
 struct Arrangement {
   std::vector<Mover> movers;
   std::vector<Space> roles;
@@ -303,7 +308,8 @@ struct Arrangement {
   }
 };
 
-/// Arranges the roles for a model of the sensor: SensorBinding::model or SensorBinding::xyz.
+/// Returns the roles of the OffsetSensor for `model`, which is SensorBinding::model or
+/// SensorBinding::xyz.
 Arrangement Arrange(const Problem& problem, BlockId offset, const SensorBinding& sensor,
                     const SensorModel& model) {
   Arrangement arrangement;
@@ -321,8 +327,8 @@ Arrangement Arrange(const Problem& problem, BlockId offset, const SensorBinding&
                                   static_cast<int>(arrangement.roles.size()),
                                   static_cast<int>(motion.blocks.size()),
                                   {}});
-    // The blocks of the motion model that are not roles of the sensor get the mode of its first
-    // role.
+    // Blocks of the motion model that fill no role of the sensor get the mode of the first role
+    // that the model moves.
     const auto moved =
         std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
@@ -365,17 +371,18 @@ std::string OffsetInTime(const Problem& problem, BlockId offset, SensorBinding& 
   Arrangement arrangement = Arrange(problem, offset, sensor, *sensor.model);
   for (const Mover& mover : arrangement.movers) {
     if (mover.model->has_input()) {
-      return "motion model '" + mover.model->name() + "' of its roles has a control input";
+      return "motion model '" + mover.model->name() +
+             "', which changes blocks of this sensor, has a control input";
     }
   }
   const auto at_measurement = [](const RoleBinding& role) {
     return role.jacobian_at == JacobianAt::kMeasurement;
   };
   if (std::ranges::any_of(sensor.roles, at_measurement)) {
-    return "a role has jacobian_at: measurement";
+    return "a role of this sensor has `jacobian_at: measurement`";
   }
   if (arrangement.movers.empty()) {
-    return "no motion model moves its roles, so that a time offset has no effect";
+    return "no motion model changes the blocks of this sensor, so a time offset has no effect";
   }
   if (sensor.xyz) {
     sensor.xyz = Offset(sensor.xyz, Arrange(problem, offset, sensor, *sensor.xyz));

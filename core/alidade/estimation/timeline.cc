@@ -16,11 +16,11 @@ constexpr Timestamp kForever = std::numeric_limits<Timestamp>::max();
 
 /// Returns timeout_s in whole nanoseconds, at least one.
 Timestamp TimeoutOf(double timeout_s) {
-  constexpr double kLimit_s = 9.2e9;  // longer times overflow a Timestamp
+  constexpr double kLimit_s = 9.2e9;  // longer times would overflow a Timestamp
   return timeout_s < kLimit_s ? std::max<Timestamp>(1, TimestampFromSeconds(timeout_s)) : kForever;
 }
 
-/// Returns the reason why an input cannot be used, or "".
+/// Returns the reason why an input cannot be used, or "" if it can be used.
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
   if (!AllFinite(value)) return "not finite";
   if (DistanceFrom(geometry, value.data()) > kUnitTolerance) return "not of unit length";
@@ -29,7 +29,7 @@ std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
 
 /// Returns max_dt_s in whole nanoseconds, at least one.
 Timestamp MaxStep(double max_dt_s) {
-  constexpr double kLimit_ns = 9.2e18;  // longer times overflow a Timestamp
+  constexpr double kLimit_ns = 9.2e18;  // longer times would overflow a Timestamp
   const double ns = std::round(1e9 * max_dt_s);
   return ns < kLimit_ns ? std::max<Timestamp>(1, static_cast<Timestamp>(ns)) : kForever;
 }
@@ -63,7 +63,8 @@ StepError Timeline::NextSubStep(Timestamp start, Timestamp end, std::vector<Even
   constexpr Timestamp kMaxSteps = 1'000'000;
   sub_step.start = start;
   sub_step.end = end;
-  for (const StoredInput& input : inputs_) {  // u changes when an input expires
+  for (const StoredInput& input :
+       inputs_) {  // u changes when an input expires, so the sub-step ends then
     if (IsActive(input, start)) sub_step.end = std::min(sub_step.end, input.expiration);
   }
   Timestamp elapsed = 0;
@@ -91,10 +92,10 @@ std::string Timeline::DescribeMissing(const StoredInput& input) {
   const std::string description =
       "control input of '" + input.name + "' from stream '" + input.binding.stream + "'";
   if (input.timestamp == kNoTimestamp) {
-    return "no " + description + " has arrived yet: steps with u = 0";
+    return "no " + description + " has arrived yet: the motion model uses u = 0";
   }
   return "the " + description + " is older than " + NumberText(input.binding.timeout_s) +
-         " s: steps with u = 0";
+         " s: the motion model uses u = 0";
 }
 
 std::span<const double> Timeline::Input(std::size_t motion, Timestamp start,
@@ -131,7 +132,7 @@ void Timeline::UseInputs(Timestamp start, Motions& motions, std::vector<Event>& 
         report.events.push_back({frame.timestamp, EventKind::kInputRefused,
                                  "a control input of '" + input.name + "' from stream '" +
                                      input.binding.stream + "' is " + defect +
-                                     ": the previous input continues to act"});
+                                     ": the previous input remains in use"});
       }
       input.refusal_reported = !defect.empty();
       if (input.refusal_reported) continue;

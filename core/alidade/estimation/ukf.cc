@@ -19,10 +19,11 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Computes the mean of `centre` and the columns y_i of `points`, f_i = (y_i (-) mean) -
-/// (centre (-) mean) in `f` (tangent x 2N), and m = w sum f_i. The iteration has converged when its
-/// step is at most the rounding error: 16 eps for each of the 2N f_i, and for the centre in each of
-/// them. Returns false if it does not converge, because the points are too far apart.
+/// Computes the mean of `centre` and the columns y_i of `points`. Writes f_i = (y_i (-) mean) -
+/// (centre (-) mean) to `f` (tangent x 2N), and computes m = w sum f_i. The iteration has converged
+/// if its step is at most the rounding error: 16 eps for each of the 2N f_i, and for the centre in
+/// each f_i. Returns false if the points are too far apart, so that the iteration does not
+/// converge.
 bool MeanOf(const Geometry& geometry, const double* centre,
             const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
@@ -52,10 +53,10 @@ bool MeanOf(const Geometry& geometry, const double* centre,
   return false;
 }
 
-/// Spread and weights of the transform with 2N sigma points besides the centre.
+/// Spread and weights of the transform with a centre and 2N other sigma points.
 struct Transform {
   double c, w;
-  double centre;  ///< beta - alpha^2
+  double centre;  ///< weight of m m': beta - alpha^2
 };
 
 /// Computes moments = w f f' + centre m m'.
@@ -68,7 +69,7 @@ void MomentsOf(const Transform& transform, const Eigen::Ref<const Eigen::MatrixX
   for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += transform.centre * m[i] * m;
 }
 
-/// Equations of Ukf, which use sigma points instead of Jacobians.
+/// Equations of the unscented Kalman filter (Ukf). They use sigma points instead of Jacobians.
 class UkfEquations : public UpdateMethod {
  public:
   explicit UkfEquations(const UkfOptions& options) : options_(options) {}
@@ -87,10 +88,10 @@ class UkfEquations : public UpdateMethod {
  private:
   /// Prediction of one measurement by sigma points.
   struct SigmaPrediction {
-    int halvings = 0;                       ///< of the spread
+    int halvings = 0;                       ///< number of times that the spread was halved
     std::vector<double> centre;             ///< h(x0)
-    std::vector<double> h, innovation;      ///< the mean, and z (-) h
-    std::vector<double> deviations, shift;  ///< f_i, tangent x 2n by columns, and m
+    std::vector<double> h, innovation;      ///< the mean h, and z (-) h
+    std::vector<double> deviations, shift;  ///< f_i (tangent x 2n, column by column), and m
 
     Workspace::Matrix f() {
       return {deviations.data(), std::ssize(shift), std::ssize(deviations) / std::ssize(shift)};
@@ -114,26 +115,28 @@ class UkfEquations : public UpdateMethod {
   void ReportGuard(FilterState& f, std::size_t index, int halvings, bool is_sufficient);
 
   UkfOptions options_;
-  Eigen::MatrixXd root_;  ///< of P
+  Eigen::MatrixXd root_;  ///< A, with P = A A'
   bool root_is_current_ = false;
-  Eigen::MatrixXd noise_cross_;               ///< M, during an interval of discrete noise
-  std::vector<SigmaPrediction> predictions_;  ///< by report
-  std::vector<bool> is_guarded_;              ///< by sensor; the last element: the motion models
+  Eigen::MatrixXd noise_cross_;               ///< M; used in an interval of discrete noise
+  std::vector<SigmaPrediction> predictions_;  ///< by index of the measurement's report
+  /// By sensor: whether a reduced spread was reported. The last element is for the motion models.
+  std::vector<bool> is_guarded_;
   // Reused memory.
   Eigen::MatrixXd conditional_covariance_, conditional_root_;
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
-  const MotionBinding* failed_motion_ = nullptr;  ///< motion model whose plugin failed last
+  const MotionBinding* failed_motion_ = nullptr;  ///< last motion model that failed
 };
 
 Transform UkfEquations::TransformOf(Eigen::Index directions, int halvings) const {
   const double alpha = std::ldexp(options_.alpha, -halvings);
-  if (directions == 0) return {0.0, 0.0, options_.beta - alpha * alpha};  // only the centre
+  if (directions == 0)
+    return {0.0, 0.0, options_.beta - alpha * alpha};  // the centre is the only point
   const double c2 = alpha * alpha * (static_cast<double>(directions) + options_.kappa);
   return {std::sqrt(c2), 0.5 / c2, options_.beta - alpha * alpha};
 }
 
-/// Calls attempt(halvings) with a spread that is halved each time, until no point is out of its
-/// domain or alpha reaches its minimum. Returns the last outcome and sets `halvings`.
+/// Calls attempt(halvings) with a spread that is halved each time. Stops when no point is out of
+/// domain, or alpha has reached its minimum. Returns the last outcome and sets `halvings`.
 template <class Attempt>
 Outcome UkfEquations::ReduceSpread(int& halvings, const Attempt& attempt) const {
   for (halvings = 0;; ++halvings) {
@@ -143,7 +146,7 @@ Outcome UkfEquations::ReduceSpread(int& halvings, const Attempt& attempt) const 
   }
 }
 
-/// Returns A with P = A A'. Repairs P if it is not positive semi-definite.
+/// Returns A with P = A A'. If P is not positive semi-definite, repairs it first.
 const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
@@ -155,22 +158,22 @@ const Eigen::MatrixXd& UkfEquations::RootOf(FilterState& f) {
     p.SetBlock(0, 0, root_ * root_.transpose());
     AddEvent(f, EventKind::kRepaired,
              "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
-                 " of its largest variance; negative pivots count as zero");
+                 " times the largest variance; negative pivots were set to zero");
   }
   return root_;
 }
 
-/// Returns B with P - M M' = B B', the covariance of x given the discrete noise. Since P includes
-/// M M', negative pivots are rounding errors.
+/// Returns B with P - M M' = B B', the covariance of x for a given discrete noise. Negative pivots
+/// can only be rounding errors, because P includes M M'.
 const Eigen::MatrixXd& UkfEquations::ConditionalRootOf(const FilterState& f) {
-  conditional_covariance_ = f.state.covariance().lower();  // only its lower triangle is used
+  conditional_covariance_ = f.state.covariance().lower();  // only the lower triangle is used
   AddOuterProduct(conditional_covariance_, noise_cross_, -1.0);
   SquareRootOf(conditional_covariance_, ldlt_, conditional_root_);
   return conditional_root_;
 }
 
-/// Computes M from the deviations of the points. Column j is the difference of the deviations at +c
-/// and -c along w_j, divided by 2 c.
+/// Computes M from the deviations of the points. Column j is the difference between the deviations
+/// at +c and -c along w_j, divided by 2 c.
 void UkfEquations::UpdateNoiseCross(FilterState& f, const Workspace::Matrix& deviations, double c) {
   if (!f.motions.has_discrete_noise()) return;
   const Eigen::Index n = deviations.rows(), directions = deviations.cols() / 2;
@@ -185,8 +188,9 @@ void UkfEquations::UpdateNoiseCross(FilterState& f, const Workspace::Matrix& dev
   }
 }
 
-/// Reports once that the spread was reduced, for sensor `index` or, with the index after the last
-/// sensor, for the motion models. `is_sufficient`: the points with this spread can be used.
+/// Reports once that the spread was reduced, for the sensor `index`. The index after the last
+/// sensor stands for the motion models. `is_sufficient`: whether the points with the reduced spread
+/// can be used.
 void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
                                bool is_sufficient) {
   const bool is_guarded = halvings > 0 || !is_sufficient;
@@ -194,16 +198,16 @@ void UkfEquations::ReportGuard(FilterState& f, std::size_t index, int halvings,
     const std::string subject =
         index < f.problem_index->sensor_places.size()
             ? "sensor '" + f.problem_index->problem.sensors[index].name + "'"
-            : "motion";
+            : "motion models";
     AddEvent(f, EventKind::kGuarded,
-             subject + ": sigma points leave its domain or have no mean" +
-                 (is_sufficient ? "" : ", and their spread can be narrowed no further") +
+             subject + ": sigma points are out of domain or have no mean" +
+                 (is_sufficient ? "" : ", even with the smallest spread") +
                  "; their spread is divided by " + std::to_string(1 << halvings));
   }
   is_guarded_[index] = is_guarded;
 }
 
-/// Steps one sigma point by all active models, with their `noise` for w, and writes x' to
+/// Propagates one sigma point by all active models with the noise w = `noise`, and writes x' to
 /// `destination`.
 Outcome UkfEquations::StepPoint(FilterState& f, const double* point, const double* noise,
                                 double dt_s, double* destination) {
@@ -233,7 +237,7 @@ Outcome UkfEquations::StepPoint(FilterState& f, const double* point, const doubl
   return Outcome::kAccepted;
 }
 
-/// Propagates state and covariance. If a point is out of its domain, both are unchanged.
+/// Propagates state and covariance. If a sigma point is out of domain, both are unchanged.
 Outcome UkfEquations::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
   const bool continues_interval = f.motions.in_interval();
@@ -299,10 +303,11 @@ StepError UkfEquations::Step(FilterState& f, double dt_s) {
   if (outcome == Outcome::kFailed) {
     return {EventKind::kPluginFailed,
             "motion model of '" + failed_motion_->name +
-                "' cannot step a sigma point: " + failed_motion_->model->error_text()};
+                "' failed at a sigma point: " + failed_motion_->model->error_text()};
   }
-  return {EventKind::kDiverged, "the sigma points cannot step, even with their spread divided by " +
-                                    std::to_string(1 << halvings)};
+  return {EventKind::kDiverged,
+          "the motion models cannot predict the sigma points, even with a spread divided by " +
+              std::to_string(1 << halvings)};
 }
 
 /// Computes h of one measurement at the sigma points. Requires that h is defined at the estimate.
@@ -355,7 +360,7 @@ Outcome UkfEquations::Predict(FilterState& f, PendingMeasurement& pending) {
     std::ranges::copy(prediction.innovation, pending.innovation);
     pending.report->h = {pending.h, prediction.h.size()};
     pending.report->innovation = {pending.innovation, prediction.innovation.size()};
-    pending.H.clear();  // the UKF has no Jacobian
+    pending.H.clear();  // the UKF computes no Jacobian
   } else if (!is_too_wide) {
     ReportRefusal(f, pending, outcome);
   }
@@ -373,8 +378,8 @@ double UkfEquations::ComputeNis(FilterState& f, PendingMeasurement& pending) {
   return SquaredMahalanobis(pending.s, pending.innovation, pending.report->dof, f.work);
 }
 
-/// Stacks the predictions of all measurements: f instead of H, R, the innovation and m. Predictions
-/// with a larger spread are computed again with `halvings`.
+/// Stacks the predictions of all measurements: f (in place of H), R, the innovation and m.
+/// Predictions with a larger spread are computed again with the spread of `halvings`.
 Outcome UkfEquations::StackPoints(FilterState& f, std::span<PendingMeasurement* const> rows,
                                   int halvings, StackedMeasurements& stacked,
                                   Workspace::Vector& mean) {
@@ -384,7 +389,8 @@ Outcome UkfEquations::StackPoints(FilterState& f, std::span<PendingMeasurement* 
     SigmaPrediction& prediction = PredictionOf(f, *pending);
     if (prediction.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *pending, halvings);
-      if (outcome != Outcome::kAccepted) {  // not a divergence: h is defined at the estimate
+      if (outcome !=
+          Outcome::kAccepted) {  // this is not a divergence, because h is defined at the estimate
         if (outcome == Outcome::kFailed) ReportPluginFailure(f, *pending);
         pending->report->outcome = outcome;
         return Outcome::kNotFinite;
@@ -405,14 +411,14 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   const Workspace::Use use(f.work);
   const Eigen::MatrixXd& root = RootOf(f);
   const Eigen::Index n = root.cols(), m = TotalDof(rows);
-  int halvings = 0;  // of the smallest spread
+  int halvings = 0;  // halvings of the smallest spread
   for (const PendingMeasurement* pending : rows) {
     halvings = std::max(halvings, PredictionOf(f, *pending).halvings);
   }
   StackedMeasurements stacked{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
   Workspace::Vector mean = f.work.Take(m), centre = f.work.Take(n), step = f.work.Take(n);
   Workspace::Matrix s = f.work.Take(m, m), p = f.work.Take(n, n),
-                    deviations = f.work.Take(n, 2 * n);  // dx_i, then dx_i - K f_i
+                    deviations = f.work.Take(n, 2 * n);  // first dx_i, later dx_i - K f_i
   Workspace::Matrix gain = f.work.Take(n, m), gain_noise = f.work.Take(n, m);  // K, K R
   const Outcome outcome = StackPoints(f, rows, halvings, stacked, mean);
   if (outcome != Outcome::kAccepted) return outcome;
@@ -420,7 +426,7 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   MomentsOf(transform, stacked.h, mean, s);
   s += stacked.noise;
   if (!Factorise(s)) return Outcome::kNotPd;
-  if (n == 0) return Outcome::kAccepted;  // nothing to correct
+  if (n == 0) return Outcome::kAccepted;  // no state to correct
   deviations.leftCols(n) = transform.c * root;
   deviations.rightCols(n) = -transform.c * root;
   gain.setZero();
@@ -443,7 +449,7 @@ Outcome UkfEquations::Correct(FilterState& f, std::span<PendingMeasurement* cons
   return Outcome::kAccepted;
 }
 
-/// Returns the prediction of a measurement, stored by the index of its report.
+/// Returns the stored prediction of a measurement.
 UkfEquations::SigmaPrediction& UkfEquations::PredictionOf(const FilterState& f,
                                                           const PendingMeasurement& pending) {
   const auto index = static_cast<std::size_t>(pending.report - f.report.measurements().data());

@@ -153,7 +153,8 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
   const UpdateReport& report = ekf.Process(FrameOf(kDrive[1]));
   ASSERT_EQ(report.events.size(), 2u);
   EXPECT_EQ(report.events[0].text,
-            "no control input of 'car' from stream 'odometry' has arrived yet: steps with u = 0");
+            "no control input of 'car' from stream 'odometry' has arrived yet: the motion model "
+            "uses u = 0");
   EXPECT_EQ(report.events[1].text,
             "a gap of 0.5 s, longer than max_dt_s = 0.1, is divided into 5 equal steps");
   EXPECT_EQ(report.events[1].timestamp, 500'000'000);
@@ -172,7 +173,7 @@ TEST(ControlInputs, AnOldOneIsToldOnceUntilOneActsAgain) {
   EXPECT_TRUE(texts.empty());
   for (const double t_s : {0.6, 0.7, 0.8}) step(t_s, kNone);
   EXPECT_EQ(texts, std::vector<std::string>{"the control input of 'car' from stream 'odometry' is "
-                                            "older than 0.5 s: steps with u = 0"});
+                                            "older than 0.5 s: the motion model uses u = 0"});
   step(0.9, 1.0);
   step(1.0, kNone);
   EXPECT_EQ(texts.size(), 1u);
@@ -189,7 +190,7 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   EXPECT_EQ(report.events[0].kind, EventKind::kInputRefused);
   EXPECT_EQ(report.events[0].text,
             "a control input of 'car' from stream 'odometry' is not finite: the previous input "
-            "continues to act");
+            "remains in use");
   EXPECT_TRUE(report.inputs.empty());
   EXPECT_TRUE(ekf.Process(FrameAt(2.0, {{kOdometry, kInfinity}})).events.empty());
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 5.0, 1e-15);

@@ -413,10 +413,10 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
     for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
     return report.events.empty() ? "" : report.events.back().text;
   };
-  const std::string why = "sensor 'disparity' rejected 20 times in a row: ";
-  EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "inflated the covariance of its blocks");
-  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "it has no estimated block to inflate");
-  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "it has no estimated block to inflate");
+  const std::string why = "sensor 'disparity' was rejected 20 times in a row: ";
+  EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "the covariance of its blocks was inflated");
+  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "the sensor has no estimated block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "the sensor has no estimated block to inflate");
 }
 
 TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
@@ -469,7 +469,7 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrect
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 100.0}}));
   ASSERT_FALSE(report.events.empty());
   EXPECT_EQ(report.events.back().text,
-            "sensor 's' rejected 20 times in a row: inflated the covariance of its blocks");
+            "sensor 's' was rejected 20 times in a row: the covariance of its blocks was inflated");
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-12);
 }
 

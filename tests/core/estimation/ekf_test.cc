@@ -350,11 +350,12 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
   };
   const std::vector<std::string> none;
   EXPECT_EQ(stale(1.0), none);
-  EXPECT_EQ(stale(0.5),
-            std::vector<std::string>{
-                "the frame at 0.500000 s is older than the state at 1.000000 s: its measurements "
-                "are not used; if it came late, set `out_of_sequence: {policy: rollback, ...}` or, "
-                "in C++, process frames by alidade::Rollback"});
+  EXPECT_EQ(
+      stale(0.5),
+      std::vector<std::string>{
+          "the frame at 0.500000 s is older than the state at 1.000000 s: the measurements of "
+          "this frame are not used; to use late frames, set `out_of_sequence: {policy: "
+          "rollback, ...}` or, in C++, alidade::Rollback"});
   EXPECT_EQ(stale(0.6), none);  // same episode
   EXPECT_EQ(stale(1.1), none);
   EXPECT_EQ(stale(1.0).size(), 1u);

@@ -219,12 +219,12 @@ TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
     return "";
   };
   EXPECT_EQ(text([&] { ekf.stream("disparty"); }),
-            "no stream 'disparty'; the filter has disparity, inverse_scale");
+            "no stream 'disparty'; expected disparity, inverse_scale");
   EXPECT_EQ(text([&] { ekf.block("depth"); }),
-            "no block 'depth'; the filter has target.depth, target.depth_rate, "
+            "no block 'depth'; expected target.depth, target.depth_rate, "
             "template.inverse_distance");
   EXPECT_EQ(text([&] { ekf.Expect("stereo", 0); }),
-            "no sensor 'stereo'; the filter has disparity, inverse_scale");
+            "no sensor 'stereo'; expected disparity, inverse_scale");
 }
 
 TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {

@@ -174,10 +174,10 @@ TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
     ASSERT_EQ(report.events.size(), 1u) << most;
     int count = 0;
     double left = 0.0;
-    ASSERT_EQ(
-        std::sscanf(report.events[0].text.c_str(),
-                    "an update stopped after %d iterations, a step of %lf sigma", &count, &left),
-        2)
+    ASSERT_EQ(std::sscanf(report.events[0].text.c_str(),
+                          "an update stopped after %d iterations: the next step would be %lf sigma",
+                          &count, &left),
+              2)
         << report.events[0].text;
     EXPECT_EQ(count, most);
     const double x = ValueOf(iekf.state(), "p.x"), dx = x - 3.0;

@@ -155,9 +155,10 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kStale);
   ASSERT_EQ(report.events.size(), 1u);
   EXPECT_EQ(report.events[0].kind, EventKind::kStale);
-  EXPECT_EQ(report.events[0].text,
-            "the frame at 1.250000 s is 0.750000 s older than the newest, beyond the window of "
-            "0.500000 s: its measurements are not used");
+  EXPECT_EQ(
+      report.events[0].text,
+      "the frame at 1.250000 s is 0.750000 s older than the newest frame, more than the window "
+      "of 0.500000 s: the measurements of this frame are not used");
   ExpectSame(late.filter().state(), in_order.state());
   late.Process(FrameAt(1.75, {{0, 81.0}}));  // within the window
   EXPECT_FALSE(late.filter().state().values() == in_order.state().values());

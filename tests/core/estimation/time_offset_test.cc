@@ -144,7 +144,7 @@ TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
   double z = 0.0;
   const Blocks fast{{0.0}, {4e8}, {0.1}};
   EXPECT_EQ(sensor.model->Predict(Pointers(fast).data(), &z), Status::kError);
-  EXPECT_EQ(sensor.model->error_text(), "motion model 'refusing' of its roles: faster than light");
+  EXPECT_EQ(sensor.model->error_text(), "motion model 'refusing': faster than light");
 }
 
 TEST(TimeOffset, RefusesWhatItCannotDo) {

@@ -113,9 +113,10 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
     EXPECT_TRUE(report.measurements()[0].h.empty());
     ASSERT_EQ(report.events.size(), 1u);
     EXPECT_EQ(report.events[0].kind, EventKind::kGuarded);
-    EXPECT_EQ(report.events[0].text,
-              "sensor 'near': sigma points leave its domain or have no mean, and their spread can "
-              "be narrowed no further; their spread is divided by 64");
+    EXPECT_EQ(
+        report.events[0].text,
+        "sensor 'near': sigma points are out of domain or have no mean, even with the smallest "
+        "spread; their spread is divided by 64");
     EXPECT_FALSE(ukf.diverged());
     EXPECT_EQ(ValueOf(ukf.state(), "p.x"), x);
     EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());  // reported once

@@ -208,7 +208,7 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
       ASSERT_EQ(report.events.size(), 1u);
       EXPECT_EQ(report.events[0].kind, EventKind::kNotFinite);
       EXPECT_EQ(report.events[0].text,
-                "motion model of 'p' steps to a state that is not finite; last good state at "
+                "motion model of 'p' predicts a state that is not finite; last good state at "
                 "0.000000 s: p.v = 1");
     }
   }

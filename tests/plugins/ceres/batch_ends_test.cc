@@ -99,7 +99,8 @@ void ExpectSaid(const Problem& problem, int budget, bool so_far) {
     said += e.what();
   }
   EXPECT_TRUE(batch->failed()) << budget << ' ' << said;
-  EXPECT_NE(said.find("motion model of 'p' cannot step: out of its domain"), std::string::npos)
+  EXPECT_NE(said.find("motion model of 'p' cannot predict the state: the state is out of domain"),
+            std::string::npos)
       << budget << ' ' << said;
 }
 
@@ -141,7 +142,8 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   }
   ASSERT_EQ(said.size(), 1u);
   EXPECT_EQ(said[0].find("the filter that the batch starts from, and that gives blocks their first "
-                         "values, ended: motion model of 'p' cannot step: out of its domain"),
+                         "values, ended: motion model of 'p' cannot predict the state: the state "
+                         "is out of domain"),
             0u)
       << said[0];
   std::vector<Outcome> outcomes;

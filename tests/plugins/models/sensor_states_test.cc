@@ -324,7 +324,7 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
       still.find("model: constant_velocity, noise: {kind: continuous, acceleration: 0.4},"), 71,
       "model: constant, blocks: {value: position},");
   still.replace(still.find(", velocity: {mean: -3, sigma: 0.2}"), 34, "");
-  expect(still, "sensors.right.time_offset_s: no motion model moves its roles");
+  expect(still, "sensors.right.time_offset_s: no motion model changes the blocks of this sensor");
   std::string unknown = Filled("", "", "");
   const std::size_t at = unknown.find("known:");
   unknown.replace(at, unknown.find("]]") + 2 - at, "missing: 0.5");

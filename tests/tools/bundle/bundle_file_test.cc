@@ -23,7 +23,7 @@ class BundleFiles : public ::testing::Test {
     std::ofstream(folder_ / "p", std::ios::binary) << text;
     return ReadBundle(folder_ / "p");
   }
-  /// Expects that reading `text` fails with all of `words` in the message.
+  /// Expects that reading `text` fails with a message that contains all of `words`.
   void ExpectBad(const std::string& text, const std::vector<std::string>& words) const {
     try {
       ReadText(text);
@@ -59,9 +59,9 @@ class BundleFiles : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-/// A camera rotated by 90 degrees about its z axis, (x, y) -> (-y, x), and translated; f = 100 px,
-/// k1 = 1. It maps the point (0.2, 0.1, -3) to (-0.1, 0.2, -3) + (0, 0, 1): p = (-0.05, 0.1), q =
-/// 0.0125, z = 101.25 p.
+/// The camera is rotated by 90 degrees about its z axis, (x, y) -> (-y, x), and translated. It has
+/// f = 100 px and k1 = 1. The point (0.2, 0.1, -3) is at (-0.1, 0.2, -3) + (0, 0, 1) in its frame:
+/// p = (-0.05, 0.1), q = 0.0125, z = 101.25 p.
 const std::string kBal =
     "1 1 1\n0 0 -5.0625e+00 1.0125e+01\n"
     "0\n0\n1.5707963267948966\n0\n0\n1\n100\n1\n0\n0.2\n0.1\n-3\n";
@@ -95,7 +95,7 @@ TEST_F(BundleFiles, BalIsReadAndWrittenWithoutALoss) {
   }
 }
 
-/// The camera of kBal, an unregistered camera, and a point without an observation.
+/// Contains the camera of kBal, an unregistered camera, and a point without an observation.
 const std::string kBundler =
     "# Bundle file v0.3\n2 2\n100 1 0\n0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"
     "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
@@ -132,10 +132,10 @@ std::string Libmv(bool little) {
     add(word);
   };
   for (const float k : {100.f, 320.f, 240.f, 1.f, 0.f, 0.f, 0.f, 0.f}) number(k);
-  add(1);  // camera of image 7: columns of R, t
+  add(1);  // camera of image 7: the columns of R, then t
   add(7);
   for (const float k : {0.f, 1.f, 0.f, -1.f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f}) number(k);
-  add(1);  // point of track 9, in the camera's frame (-0.1, 0.2, 2)
+  add(1);  // point of track 9; in the frame of the camera it is (-0.1, 0.2, 2)
   add(9);
   for (const float k : {0.2f, 0.1f, 1.f}) number(k);
   add(1);
@@ -238,7 +238,7 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "it is there";
 }
 
-/// The unregistered camera of kBundler has no pose, and zeros have no sign.
+/// The unregistered camera of kBundler has no pose. A zero is written without a sign.
 TEST_F(BundleFiles, SavesPosesOfRegisteredCamerasOnly) {
   std::string text = kBundler;
   text.replace(text.find("0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"), 25, "1 0 0\n0 1 0\n0 0 1\n0 0 0\n");

@@ -21,19 +21,19 @@ TEST(Derivative, IsThatOfSmoothFunctionsWithinItsError) {
   ASSERT_TRUE(d.has_value());
   const double exact[] = {std::cos(0.7), -0.75, 5.0, 0.0};
   for (int i = 0; i < 4; ++i) {
-    // The pole of the second function at t = -2 is at least 20 h away.
+    // The second function has its pole at t = -2, which is at least 20 steps h away.
     EXPECT_NEAR(d->value[i], exact[i], 1e-10) << i;
     EXPECT_LE(std::abs(d->value[i] - exact[i]), 10.0 * d->error[i] + 1e-13) << i;
   }
 }
 
 TEST(Derivative, SaysWhereItIsNotToBeTrusted) {
-  // With a kink within the steps, at t = 0.03, the tableau does not converge.
+  // |t - 0.03| has a kink at t = 0.03, within the steps, so the tableau does not converge.
   const Curve kink = [](double t) { return Array({std::abs(t - 0.03)}); };
   const auto d = Differentiate(kink, 0.1);
   ASSERT_TRUE(d.has_value());
   EXPECT_GT(d->error[0] + 1e-9, std::abs(d->value[0] + 1.0) / 10.0);
-  // Noise of 1e-3 with steps of about 1e-2.
+  // The noise is 1e-3 and the steps are about 1e-2.
   int calls = 0;
   const Curve noisy = [&](double) { return Array({++calls % 3 == 0 ? 1e-3 : 0.0}); };
   EXPECT_GT(Differentiate(noisy, 0.1)->error[0], 1e-4);

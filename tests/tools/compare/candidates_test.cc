@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons of constructed runs: the reference of each estimator, and runs with different data.
+// Comparisons of constructed runs: tests the reference of each estimator, and runs with different
+// data.
 #include "alidade/compare/candidates.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,8 @@ EstimatorKind KindOf(const std::string& type) {
   return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
 }
 
-/// An estimator of a block p.x with the truth 0 and the error `error` at three timestamps.
+/// Returns an estimator of a block p.x. The truth is 0, and the error at each of three timestamps
+/// is `error`.
 Candidate Entry(const std::string& name, const std::string& type, bool smoothed, double error,
                 const std::vector<std::string>& sensors = {"stereo"}) {
   Candidate entry;
@@ -78,15 +80,15 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
       << text;
 }
 
-// A batch with other overrides, such as a robust loss, is a reference only if no batch of the same
-// problem is usable.
+// A batch with other overrides, such as a robust loss, solves another problem. It is the reference
+// only if no batch of the same problem is usable.
 TEST(CompareRuns, OverridesMakeAnotherSystem) {
   Candidate other = Entry("other", "ceres_batch", true, 8.0);
   other.result.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
   ComparedRun run =
       RunOf({other, Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "batch");
-  // An explicitly named reference is always used.
+  // A reference that is named explicitly is always used.
   EXPECT_EQ(Find(CompareRuns({run}, {"other", "", true}), "ekf").final_reference, "other");
   run.estimators[2].result.failed = true;
   EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "other");
@@ -109,7 +111,7 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
             "no reference: estimator 'failed' failed, the comparison with it is withheld");
 }
 
-// The filter and the batch then agree, as both have only the prior.
+// Without measurements the filter and the batch agree, because both have only the prior.
 TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
   ComparedRun run =
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
@@ -161,7 +163,7 @@ TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
   EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).decomposed, "ekf");
 }
 
-/// Adds a map of three landmarks with the error `error` along x.
+/// Adds a map of three landmarks. Each has the error `error` along x.
 Candidate WithMap(Candidate entry, double error) {
   const Eigen::Vector3d places[] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 3}};
   entry.result.landmarks.emplace();
@@ -174,8 +176,8 @@ Candidate WithMap(Candidate entry, double error) {
   return entry;
 }
 
-// With landmarks no batch solves at every frame. At the last frame, the batch of all data equals
-// the batch of the data up to it.
+// With landmarks no batch solves at every frame. At the last frame the batch of all data has used
+// the same data as the filter, so the two are compared there.
 TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   Candidate ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
   ekf.series.values = {9.0, 9.0, 2.0};
@@ -201,7 +203,8 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   EXPECT_NE(CompareJson(comparison).find("\"at_end\": true"), std::string::npos);
 }
 
-// If both batches exist, the effect of the gate belongs to another step.
+// If the batch of the accepted measurements also exists, it is the reference. The effect of the
+// gate is then another step.
 TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   Candidate accepted = Entry("accepted", "ceres_batch", true, 1.0);
   accepted.result.accepted_by = "ekf";
@@ -216,7 +219,7 @@ TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   EXPECT_FALSE(step.at_end);
 }
 
-/// Returns the error message for two runs with different measurements.csv.
+/// Returns the error message for two runs with the given texts of measurements.csv.
 std::string Refusal(const std::string& one, const std::string& other) {
   const testing::TemporaryFolder folders[2];
   std::ofstream(folders[0] / "measurements.csv") << one;

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A series of a scalar block and a quaternion, with variances only.
+/// Returns a series of a scalar block and a quaternion block. Only variances are stored.
 internal::Series TwoBlocks() {
   internal::Series series;
   series.blocks = {{"a.x", "m", Geometry::Vector(1)}, {"a.q", "", Geometry::UnitQuaternion()}};
@@ -16,7 +16,7 @@ internal::Series TwoBlocks() {
   return series;
 }
 
-// q and -q are the same rotation. Distances are those in the reference's tangent space.
+// q and -q are the same rotation. Distances are computed in the tangent space of the reference.
 TEST(Series, DistancesAreOfTheTangentAndOfSharedTimestamps) {
   internal::Series series = TwoBlocks(), reference = TwoBlocks();
   series.timestamps = {10, 20, 30};
@@ -29,7 +29,8 @@ TEST(Series, DistancesAreOfTheTangentAndOfSharedTimestamps) {
   EXPECT_NEAR(distance.rms.at("a.x"), std::sqrt((0.25 + 1.0) / 2.0), 1e-15);
   EXPECT_NEAR(distance.final.at("a.x"), 1.0, 1e-15);
   EXPECT_NEAR(distance.final.at("a.q"), 0.2, 1e-12);
-  // (0.5^2 + 1^2 + 0.2^2) / 0.25, over two timestamps and four degrees of freedom.
+  // The sum (0.5^2 + 1^2 + 0.2^2) / 0.25 is divided by two timestamps times four degrees of
+  // freedom.
   EXPECT_NEAR(distance.sigmas.at("a"), std::sqrt((0.25 + 1.0 + 0.04) / 0.25 / 8.0), 1e-12);
 }
 
@@ -42,11 +43,12 @@ TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
   series.covariances = reference.covariances = {1, 1, 1, 1, 0, 1, 1, 1};
   const internal::Distance distance = internal::DistanceBetween(series, reference);
   EXPECT_EQ(distance.rms.at("a.x"), 2.0);
-  EXPECT_FALSE(distance.sigmas.contains("a"));  // one value is NaN, the other is known exactly
+  // One value is NaN. The other value is known exactly.
+  EXPECT_FALSE(distance.sigmas.contains("a"));
 }
 
-// A block that is fixed in both does not count. A block fixed only in the reference has no part in
-// its P.
+// A block that is fixed in both series is not compared. A block that is fixed only in the reference
+// has no rows in the P of the reference.
 TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
   const double nan = std::nan("");
   internal::Series series = TwoBlocks(), reference = TwoBlocks();

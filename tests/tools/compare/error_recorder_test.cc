@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Passes the estimates of the first estimator to a recorder.
+/// Passes the estimates of the first estimator to an ErrorRecorder.
 class ShowsErrors : public RunObserver {
  public:
   explicit ShowsErrors(internal::ErrorRecorder& recorder) : recorder_(recorder) {}
@@ -38,7 +38,7 @@ Followed Follow(int frames) {
   return {recorder.Finish(), std::move(result)};
 }
 
-// The fourth frame has no truth.
+// The fourth frame has no truth, so it has no error.
 TEST(ErrorRecorder, HasWhatTheMetricsAreTakenFrom) {
   const auto [series, result] = Follow(60);
   ASSERT_EQ(series.blocks, (std::vector<std::string>{"target.depth"}));
@@ -55,8 +55,8 @@ TEST(ErrorRecorder, HasWhatTheMetricsAreTakenFrom) {
   EXPECT_NEAR(nees, metrics.at("nees.mean:target"), 1e-12);
 }
 
-// 2048 rows are halved at frame 2047 and again at 4094. From then on every fourth frame is
-// recorded.
+// When 2048 rows are stored, every second row is removed: at frame 2047 and again at frame 4094.
+// From then on only every fourth frame is recorded.
 TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
   const ErrorSeries all = Follow(1000).series, thinned = Follow(5000).series;
   ASSERT_EQ(thinned.timestamps.size(), 1250u);
@@ -70,7 +70,7 @@ TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
   EXPECT_NEAR(Seconds(thinned.timestamps.back()), 0.033 * 4996, 1e-6);
 }
 
-/// Adds the truth of lambda and of the depth rate.
+/// A source that also has the truth of lambda and of the depth rate.
 class WithAllTruth : public testing::SwingingTarget {
  public:
   using SwingingTarget::SwingingTarget;
@@ -111,7 +111,7 @@ TEST(ErrorRecorder, HasErrorsByTheirCramerRaoBound) {
     }
     EXPECT_NEAR(series.by_bound.at(series.blocks[i]), sum / 60.0, 1e-12);
   }
-  // The first bound uses the prior and one measurement of each sensor.
+  // The first bound combines the prior with one measurement of each sensor.
   const double h = -26.0 / (0.3 * 0.3);
   EXPECT_LT(series.bounds[0], 1.0 / (h * h));
 }

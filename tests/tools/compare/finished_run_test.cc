@@ -13,7 +13,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Writes the text to the file.
+/// Writes `text` to `file`.
 void Write(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file) << text;
 }
@@ -23,7 +23,7 @@ TEST(FinishedRun, FindsItsColumnsByColumnsJson) {
   Record(OptionsFor(folder / "out"));
   const internal::ComparedRun before = internal::ReadRun(folder / "out");
 
-  // A column of another quantity in front of all others but the time.
+  // Inserts a column of an unknown quantity after the time, before all other columns.
   const std::filesystem::path estimates = folder / "out/ekf/estimates.csv";
   std::string text;
   for (const std::string& line : Lines(estimates)) {

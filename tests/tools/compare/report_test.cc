@@ -12,7 +12,7 @@ bool Contains(const std::string& text, const std::string& part) {
 
 Spread Single(double value) { return {value, value, value, value}; }
 
-/// Comparison of one filter with `reference`.
+/// Returns a comparison of one filter with `reference`.
 Comparison Compared(const std::string& reference, const std::vector<std::string>& keys) {
   Comparison comparison;
   comparison.frames = 10;
@@ -53,7 +53,7 @@ TEST(CompareReport, NamesNoRowsIfNoneIsLeftOut) {
   EXPECT_FALSE(Contains(CompareReport(comparison, TableStyle::kText, ReportRows::kMain), "--all"));
 }
 
-// Three runs are too few for a conclusion, whatever their interval is; ten may suffice.
+// With fewer than ten runs the report says that there are too few, whatever their interval is.
 TEST(CompareReport, IntervalsOfFewRunsAreSaidToBeSo) {
   for (const std::int64_t runs : {3, 9, 10}) {
     Comparison comparison = Compared("truth", {"rmse:p.x"});

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A run of two estimators; the second one is the reference of the first.
+/// Returns a run with two estimators. The second estimator is the reference of the first.
 Comparison OneRun(double error, bool filter_diverged = false) {
   Comparison one;
   one.decomposed = "ekf";
@@ -31,7 +31,7 @@ Comparison OneRun(double error, bool filter_diverged = false) {
   return one;
 }
 
-// Runs in which a filter diverged do not count in the filter's numbers.
+// A run in which a filter diverged is not counted in the numbers of this filter.
 TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   const Comparison all = Summarise({OneRun(6.0, true), OneRun(1.0), OneRun(2.0)});
   EXPECT_EQ(all.runs, 3);
@@ -48,7 +48,7 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_EQ(all.decomposition[0].values.at("rejected").mean, 1.5);
 }
 
-// A failed estimator in one of the runs is reported.
+// If an estimator failed in one of the runs, the summary reports it.
 TEST(Summarise, OfSeedsHasTheStatusOfTheSweep) {
   Comparison failed = OneRun(1.0);
   failed.status = RunStatus::kFailed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The poses that an evaluation compares: equal times, after the requested alignment.
+// Tests which poses an evaluation compares: those with equal times, after the requested alignment.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -90,13 +90,13 @@ TEST(Align, RefusesWhatDeterminesNothing) {
 }
 
 TEST(Align, RefusesWhatDeterminesNoScale) {
-  // The two x coordinates are uncorrelated, so they determine no scale.
+  // The x coordinates of the two trajectories are uncorrelated, so they determine no scale.
   Trajectory reference = Curve(12), estimate = Curve(12);
   for (int i = 0; i < 12; ++i) {
     reference.positions.col(i) << (i % 2 == 0 ? -1.0 : 1.0), 0.0, 0.0;
     estimate.positions.col(i) << (i % 4 < 2 ? -1.0 : 1.0), 0.0, 0.0;
   }
-  for (const double off : {0.0, 0.1}) {  // with 0.1, rounding leaves a scale of 1e-17
+  for (const double off : {0.0, 0.1}) {  // with 0.1, rounding gives a scale of 1e-17
     estimate.positions.row(0).array() += off;
     for (const Alignment alignment : {Alignment::kSim3, Alignment::kScale}) {
       try {
@@ -125,12 +125,14 @@ Trajectory At(const std::vector<double>& seconds) {
 
 TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
   const Trajectory reference = At({0.0, 1.0, 2.0, 3.0, 4.0});
-  // 0.004 and 0.006 are both nearest to 0; 2.02 is too far away; 3.01 is just close enough.
+  // 0.004 and 0.006 are both nearest to 0. 2.02 is too far from 2, and 3.01 is just close enough to
+  // 3.
   const Matches matches = Associate(reference, At({0.004, 0.006, 2.02, 3.01}), 10'000'000, 0);
   EXPECT_EQ(matches.possible, 4);
   EXPECT_EQ(matches.reference, (std::vector<int>{0, 0, 3}));
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 3}));
-  // The search runs over the shorter trajectory, whichever of the two it is.
+  // Each pose of the shorter trajectory is matched, whichever of the two trajectories is the
+  // shorter.
   const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
   EXPECT_EQ(other.possible, 2);
   EXPECT_EQ(other.reference, (std::vector<int>{0, 1}));
@@ -138,14 +140,13 @@ TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
 }
 
 TEST(Associate, DuplicatesOfTheShorterAllPairAndOfTheLongerTheFirstDoes) {
-  // The smallest
-  // t - 1
-  // of the longer one occurs at the indices 1 and 2; the first is used.
+  // In the longer trajectory |t - 1| is smallest at the indices 1 and 2. Index 1 is used because it
+  // comes first.
   const Matches matches =
       Associate(At({0.0, 1.0, 1.0, 2.0, 3.0}), At({1.0, 1.0, 2.0}), 10'000'000, 0);
   EXPECT_EQ(matches.reference, (std::vector<int>{1, 1, 3}));
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2}));
-  // The same from above and from below.
+  // The first index is also used if the matched time is a little smaller or larger.
   const Trajectory longer = At({0.0, 1.0, 1.0, 2.0, 2.0});
   EXPECT_EQ(Associate(longer, At({0.996, 1.004, 2.004}), 10'000'000, 0).reference,
             (std::vector<int>{1, 1, 3}));
@@ -218,7 +219,7 @@ TEST(Associate, WithoutTimestampsByRow) {
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_THROW(Associate(bare, five, 0, 0), Error);
   EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
-  // KITTI files are matched by row if either file has no times.
+  // KITTI files are matched row by row if either of them has no times.
   Trajectory timed = Curve(4);
   timed.format = bare.format = five.format = TrajectoryFormat::kKitti;
   EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);

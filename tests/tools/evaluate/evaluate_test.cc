@@ -20,7 +20,7 @@ using Pairs = std::vector<std::pair<int, int>>;
 constexpr double kPi = 3.14159265358979323846;
 
 TEST(StatisticsOf, AreThoseOfWorkedNumbers) {
-  // mean 4, squares 9 + 1 + 4 + 100, squared deviations 1 + 9 + 4 + 36
+  // The mean is 4, the squares are 9 + 1 + 4 + 100, and the squared deviations are 1 + 9 + 4 + 36.
   const ErrorStatistics s = StatisticsOf({3.0, 1.0, 2.0, 10.0});
   EXPECT_DOUBLE_EQ(s.mean, 4.0);
   EXPECT_DOUBLE_EQ(s.median, 2.5);
@@ -49,7 +49,7 @@ TEST(Evaluate, AConstantErrorIsWhatEachRelationSays) {
   estimate.positions.colwise() += Vector3d(0.3, 0.0, -0.4);
   for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(angle);
   const Evaluation e = Evaluate(reference, estimate, AllRelations());
-  // |R - I|^2 = 2 (3 - 1 - 2 cos) ... = 8 sin^2(angle / 2)
+  // |R - I|^2 = 2 (3 - 1 - 2 cos(angle)) = 8 sin^2(angle / 2)
   const double rotation = std::sqrt(8.0) * std::sin(0.15);
   const double expected[] = {
       0.5, rotation, 0.3 * 180.0 / kPi, 0.3, std::sqrt(0.25 + rotation * rotation), 0.5};
@@ -60,7 +60,7 @@ TEST(Evaluate, AConstantErrorIsWhatEachRelationSays) {
     EXPECT_NEAR(e.absolute[r].statistics.std, 0.0, 1e-12);
     EXPECT_EQ(e.absolute[r].errors.size(), 20u);
   }
-  EXPECT_NEAR(e.relative[5].statistics.max, 0.0, 1e-12);  // equal distances
+  EXPECT_NEAR(e.relative[5].statistics.max, 0.0, 1e-12);  // the distances are equal
 }
 
 TEST(Evaluate, MatricesGiveTheSameRelativeErrors) {
@@ -96,7 +96,7 @@ TEST(Evaluate, MatricesGiveTheSameRelativeErrors) {
 }
 
 TEST(Evaluate, AConstantDriftIsTheRelativeError) {
-  // 2 % too long, and rotated by 0.001 rad too much from pose to pose.
+  // The estimate is 2 % too long. From pose to pose it is rotated by 0.001 rad too much.
   const Trajectory reference = Line(101, 0.5);
   Trajectory estimate = Line(101, 0.51);
   for (int i = 0; i <= 100; ++i) {
@@ -108,7 +108,8 @@ TEST(Evaluate, AConstantDriftIsTheRelativeError) {
   EXPECT_EQ(step.pairs.size(), 100u);
   EXPECT_NEAR(step.relative[0].statistics.rmse, 0.01, 1e-12);
   EXPECT_NEAR(step.relative[3].statistics.max, 0.001, 1e-12);
-  // along the estimate's path: pose 20 is the first at least that far away
+  // Distances are measured along the path of the estimate. Pose 20 is the first pose at least 10 m
+  // away.
   options.pairs.delta = 10.0;
   options.pairs.unit = DeltaUnit::kMetres;
   const Evaluation metres = Evaluate(reference, estimate, options);
@@ -128,7 +129,7 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
-  // Timestamps are exact: 0.3 s is exactly 0.3 s at any offset.
+  // Timestamps are exact: an interval of 0.3 s is found exactly, at any time.
   EXPECT_EQ(PairsOf(t, {0.3, DeltaUnit::kSeconds}), (Pairs{{0, 3}, {3, 6}, {6, 9}}));
   EXPECT_EQ(PairsOf(t, {0.7, DeltaUnit::kSeconds, true, 0.0}),
             (Pairs{{0, 7}, {1, 8}, {2, 9}, {3, 10}}));
@@ -149,7 +150,7 @@ TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
 TEST(PairsOf, RefusesMorePairsThanAnyoneReads) {
   PairOptions options{0.1, DeltaUnit::kDegrees, true, 1.0};
   EXPECT_EQ(PairsOf(Line(100, 0.0), options).size(), 100u * 99 / 2);
-  constexpr int kPoses = 4480;  // at rest, so 4480 * 4479 / 2 > 1e7 pairs
+  constexpr int kPoses = 4480;  // all poses are equal, so there are 4480 * 4479 / 2 > 1e7 pairs
   try {
     PairsOf(Line(kPoses, 0.0), options);
     ADD_FAILURE() << "no error";
@@ -178,8 +179,8 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   Trajectory estimate = reference;
   for (int i = 0; i < 40; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    // The error along one axis is 4 sigma in every fourth pose and 1 sigma in the others. The first
-    // pose is known exactly.
+    // The error along one axis is 4 sigma in every fourth pose and 1 sigma in the other poses. The
+    // first pose has an exact position.
     const double sigmas = i % 4 == 0 ? 4.0 : 1.0;
     Eigen::Matrix3d covariance = Vector3d(0.01, 0.04, 1.0).asDiagonal();
     estimate.positions(1, i) -= 0.2 * sigmas;
@@ -193,7 +194,7 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   ASSERT_TRUE(e.position_nees && e.orientation_nees);
   EXPECT_EQ(e.position_nees->dof, 3);
   EXPECT_EQ(e.position_nees->poses, 39);
-  // 9 values of 16 / 3 and 30 of 1 / 3; chi2(0.95, 3) = 7.8
+  // The NEES is 16 / 3 in 9 poses and 1 / 3 in 30 poses; chi2(0.95, 3) = 7.8.
   EXPECT_NEAR(e.position_nees->mean, (9.0 * 16.0 + 30.0) / 3.0 / 39.0, 1e-9);
   EXPECT_NEAR(e.position_nees->within95, 30.0 / 39.0, 1e-12);
   EXPECT_EQ(e.orientation_nees->poses, 40);
@@ -202,14 +203,15 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
 }
 
 TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
-  // x, y and the heading are uncertain in at least one pose; z, roll and pitch in none.
+  // x, y and the heading are uncertain in at least one pose. z, roll and pitch are known exactly in
+  // all poses.
   Trajectory estimate = Curve(10);
   Eigen::Matrix3d position = Eigen::Matrix3d::Zero(), orientation = position;
   position.topLeftCorner<2, 2>() << 0.05, 0.03, 0.03, 0.05;
   orientation(2, 2) = 0.0025;
   estimate.position_covariances.assign(10, position);
   estimate.orientation_covariances.assign(10, orientation);
-  estimate.position_covariances[0].setZero();  // known exactly
+  estimate.position_covariances[0].setZero();  // the position of this pose is known exactly
   for (int i = 0; i < 10; ++i) {
     estimate.positions.col(i) -= Vector3d(0.2, -0.2, 7.0);
     estimate.orientations[static_cast<std::size_t>(i)] *=
@@ -217,8 +219,8 @@ TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
   }
   const Evaluation e = Evaluate(Curve(10), estimate, {});
   ASSERT_TRUE(e.position_nees && e.orientation_nees);
-  // (0.2, -0.2) is along the eigenvector with eigenvalue 0.05 - 0.03 = 0.02: 0.08 / 0.02 = 4,
-  // divided by 2.
+  // (0.2, -0.2) is along the eigenvector with the eigenvalue 0.05 - 0.03 = 0.02. The NEES is
+  // 0.08 / 0.02 = 4, divided by 2 degrees of freedom.
   EXPECT_EQ(e.position_nees->dof, 2);
   EXPECT_EQ(e.position_nees->poses, 9);
   EXPECT_NEAR(e.position_nees->mean, 2.0, 1e-9);
@@ -276,12 +278,12 @@ TEST(Evaluate, ScaleAndItsDriftAreOfThePath) {
 TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   const testing::TemporaryFolder folder;
   std::string text = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
-  // r / s alternates between 1 and -1, so the products of neighbours are -1.
+  // r / s alternates between 1 and -1, so the product of neighbours is always -1.
   for (int i = 0; i < 10; ++i) {
     text += "0,a,range,,accepted,1,1,0,0,2," + std::string(i % 2 == 0 ? "2" : "-2") + "\n";
   }
   text += "0,a,range,,gated,1,100,0,0,2,20\n";
-  // Two landmarks, each with constant residuals.
+  // There are two landmarks, each with constant residuals.
   for (int i = 0; i < 10; ++i) {
     text += "0,b,pixel," + std::to_string(i % 2) + ",accepted,1,6,0,0,1," +
             std::to_string(1 - 2 * (i % 2)) + "\n";
@@ -302,7 +304,7 @@ TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   EXPECT_DOUBLE_EQ(all[1].white_within, 1.96 / 3.0);
   std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";
   EXPECT_THROW(ReadInnovations(folder / "innovations.csv"), Error);
-  // A dof above the number of columns, and above the range of an int.
+  // `dof` is larger than the number of columns, then larger than an int can represent.
   const std::string header = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
   for (const char* dof : {"2", "2147483648", "4294967297", "9223372036854775807"}) {
     std::ofstream(folder / "innovations.csv")

@@ -11,7 +11,8 @@
 namespace alidade {
 namespace {
 
-/// Results of other programs on public trajectories; skips if ALIDADE_DATA does not have them.
+/// Compares with results of other programs on public trajectories. The test is skipped if
+/// ALIDADE_DATA does not contain the trajectories.
 class PublicFigures : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -32,14 +33,14 @@ class PublicFigures : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-/// Returns six decimals, as in the published results.
+/// Returns `value` with six decimals, as in the published results.
 std::string Printed(double value) {
   char text[64];
   std::snprintf(text, sizeof text, "%.6f", value);
   return text;
 }
 
-/// Expects n, scale and RMSE (m) of the positions.
+/// Expects the number n, the scale and the RMSE (m) of the positions.
 void ExpectFigures(const Evaluation& evaluation, std::size_t n, const std::string& scale,
                    const std::string& rmse) {
   EXPECT_EQ(evaluation.absolute[0].errors.size(), n);

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using testing::Curve;
 
-/// Returns the evaluation of the curve, shifted by 5 cm, against the curve.
+/// Shifts a curve by 5 cm and returns its evaluation against the original curve.
 Evaluation Moved(Alignment alignment, const std::string& label, EvaluateOptions options = {}) {
   Trajectory estimate = Curve(30);
   estimate.positions.row(0).array() += 0.05;

@@ -19,13 +19,13 @@ class TrajectoryFiles : public ::testing::Test {
     fs::create_directories((folder_ / name).parent_path());
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
-  /// Reads a file with this text.
+  /// Returns the trajectory read from a file with this text.
   Trajectory Read(const std::string& text,
                   TrajectoryFormat format = TrajectoryFormat::kDetect) const {
     Write("poses.txt", text);
     return ReadTrajectory(folder_ / "poses.txt", format);
   }
-  /// Returns the error message of Read after the folder's path, or "" without an error.
+  /// Returns the error message of Read without the path of the folder, or "" if there is no error.
   std::string Refusal(const std::string& text,
                       TrajectoryFormat format = TrajectoryFormat::kDetect) const {
     try {
@@ -36,7 +36,8 @@ class TrajectoryFiles : public ::testing::Test {
     }
     return {};
   }
-  /// Returns the warnings for a file with this text, one a line, after the folder's path.
+  /// Returns the warnings for a file with this text, one in each line, without the path of the
+  /// folder.
   std::string WarningsOf(const std::string& text) const {
     std::string all;
     for (const std::string& warning : Read(text).warnings) {
@@ -82,7 +83,7 @@ TEST_F(TrajectoryFiles, TwentyColumnsAreTumWithCovariancesRotationFirst) {
 }
 
 TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
-  // A rotation of 90 degrees about z.
+  // The first pose is rotated by 90 degrees about z.
   const std::string rows = "0 -1 0 7 1 0 0 8 0 0 1 9\n1 0 0 0 0 1 0 0 0 0 1 0\n";
   const Trajectory bare = Read(rows);
   EXPECT_EQ(bare.format, TrajectoryFormat::kKitti);
@@ -97,7 +98,8 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   Write("poses_times.txt", "5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
   EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
-  // The error for a times.txt that several files share describes how to give this file its own.
+  // times.txt can belong to several files. The message tells how to give this file times of its
+  // own.
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
   EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
@@ -168,10 +170,10 @@ TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) 
   };
   for (const Case& c : {Case{"1311868163869700001", "1311868163903000001", "ns"},
                         {"0", "33333333", "ns"},
-                        {"3600000000000", "3600033300000", "ns"},  // an hour after its start
+                        {"3600000000000", "3600033300000", "ns"},  // one hour after the start
                         {"1311868163869700", "1311868163903000", "us"},
                         {"0", "33333", "us"},
-                        {"10800000000", "10800033300", "us"},  // three hours after its start
+                        {"10800000000", "10800033300", "us"},  // three hours after the start
                         {"1311868163869.7", "1311868163903", "ms"}}) {
     SCOPED_TRACE(c.first + ' ' + c.unit);
     const std::string text = "# t\n" + c.first + pose + c.second + pose;
@@ -182,9 +184,10 @@ TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) 
     const Trajectory t = Read(text);
     EXPECT_NEAR(1e-9 * static_cast<double>(t.timestamps[1] - t.timestamps[0]), 0.0333, 1e-4);
   }
-  EXPECT_EQ(Read("0" + pose + "1000000" + pose).timestamps[1], 1'000'000'000);  // us, each second
+  // Timestamps in us, one pose every second.
+  EXPECT_EQ(Read("0" + pose + "1000000" + pose).timestamps[1], 1'000'000'000);
   EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).timestamps[1],
-            1'311'868'168'869'000'000);  // ms, 5 s apart
+            1'311'868'168'869'000'000);  // in ms, 5 s apart
   EXPECT_EQ(Read("1311868163869700001" + pose).timestamps[0], 1311868163869700001);
   EXPECT_EQ(WarningsOf("1311868163.8697" + pose + "1311868200" + pose), "");
 }
@@ -205,7 +208,7 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   EXPECT_EQ(Refusal("1e20" + pose),
             "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as in TUM");
   EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);
-  // Differences of timestamps must not overflow either.
+  // The difference of two timestamps must not overflow either.
   EXPECT_EQ(
       Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose + "9000000000" +
               pose),
@@ -227,7 +230,8 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
   EXPECT_EQ(refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
             "poses.txt:2: the covariance of the orientation" + none +
                 "1e-09; expected a positive semi-definite matrix");
-  // A singular covariance is valid, and so is one rounded to six digits.
+  // A singular covariance is valid. So is a covariance that is negative only because it was rounded
+  // to six digits.
   EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }
@@ -250,7 +254,7 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
             "each timestamp once; all poses are kept\n");
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).timestamps.size(), 4u);
-  // Sorting keeps the order of poses with equal timestamps.
+  // Sorting keeps the order of poses that have equal timestamps.
   EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
             "poses.txt:2 t: is earlier than the previous timestamp: 1.000000 s; expected poses in "
             "the order of their timestamps; "
@@ -270,7 +274,8 @@ TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
             "poses.txt:1 qw: the first pose is the identity if the quaternion is read with w last; "
             "expected qw qx qy qz, as in EuRoC\n");
   EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
-  // a rotation of 180 degrees at another position
+  // This first pose has a rotation of 180 degrees, but it is not at the origin, so there is no
+  // warning.
   EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");
 }
 

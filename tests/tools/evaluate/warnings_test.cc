@@ -14,7 +14,7 @@ using testing::Curve;
 using testing::Inverse;
 using testing::Turn;
 
-/// Returns the warnings, one a line.
+/// Returns the warnings, one in each line.
 std::string WarningsOf(const Trajectory& reference, const Trajectory& estimate,
                        const EvaluateOptions& options = {}) {
   std::string all;
@@ -30,7 +30,7 @@ EvaluateOptions Aligned(Alignment alignment) {
   return options;
 }
 
-/// Adds errors of about 1 cm and 0.6 degrees, typical for an estimate.
+/// Adds errors of about 1 cm and 0.6 degrees, which are typical of an estimate.
 Trajectory Estimate(Trajectory t) {
   for (int i = 0; i < t.size(); ++i) {
     t.positions.col(i) += 0.01 * Vector3d(std::sin(5.0 * i), std::cos(3.0 * i), std::sin(7.0 * i));
@@ -107,7 +107,7 @@ TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
   Trajectory estimate = Estimate(Curve(60));
   for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(1.5);
   const std::string warnings = WarningsOf(Curve(60), estimate);
-  // 1.5 rad, up to the oscillating error
+  // The rotation is 1.5 rad, apart from the oscillating error.
   EXPECT_TRUE(
       warnings.starts_with("estimate.tum: all orientations differ by the same rotation of 85."))
       << warnings;
@@ -132,7 +132,7 @@ TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
 TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   Trajectory estimate = Estimate(Curve(60));
   Trajectory swapped = estimate;
-  // The result of reading a TUM file with the order qw qx qy qz.
+  // These quaternions result if a TUM file with the order qw qx qy qz is read.
   for (Eigen::Quaterniond& q : swapped.orientations) {
     q = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
   }
@@ -141,11 +141,11 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations agree to 0.")) << warnings;
   EXPECT_NE(warnings.find(" deg if quaternions are read with w first, and to "), std::string::npos);
   EXPECT_TRUE(warnings.ends_with(" deg as read; expected qx qy qz qw\n")) << warnings;
-  // The same for the reference.
+  // The same warning is given for the reference.
   swapped.name = "reference.tum";
   warnings = WarningsOf(swapped, Curve(60));
+  // These quaternions result if a EuRoC file with the order qx qy qz qw is read.
   EXPECT_TRUE(warnings.starts_with("reference.tum:7: the orientations agree to 0.")) << warnings;
-  // The result of reading a EuRoC file with w last.
   for (Eigen::Quaterniond& q : estimate.orientations) {
     q = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
   }

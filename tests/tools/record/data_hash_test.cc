@@ -50,12 +50,12 @@ TEST(DataHash, IsOfContentNotOfItsOrderOrSign) {
   SourceFrame turned = MakeFrame();
   std::swap(turned.measurements[0], turned.measurements[1]);
   EXPECT_EQ(HashOf({MakeFrame()}).measurements(), HashOf({turned}).measurements());
-  // The streams of another source, with the same names in a different order.
+  // Another source has the same streams in a different order.
   SourceFrame other = MakeFrame();
   other.measurements[0].stream = 1;
   other.measurements[1].stream = 0;
   EXPECT_EQ(HashOf({MakeFrame()}).measurements(), HashOf({other}, {{"b"}, {"a"}}).measurements());
-  // For two measurements of one stream their order matters.
+  // The order of two measurements of the same stream changes the hash.
   const SourceFrame twice = MakeFrame({{0, 1.0}, {0, 2.0}});
   const SourceFrame back = MakeFrame({{0, 2.0}, {0, 1.0}});
   EXPECT_NE(HashOf({twice}).measurements(), HashOf({back}).measurements());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The error of each element with truth, in errors.csv and in its figures.
+// Tests errors.csv and its figures, which contain the error of each element with truth.
 #include "alidade/record/errors_file.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,8 @@
 namespace alidade::testing {
 namespace {
 
-/// A camera with estimated position and orientation and a known heading, and a bias without truth.
+/// A camera with an estimated position and orientation and a known heading. It also has a bias,
+/// which has no truth.
 class ErrorsOfACamera : public ::testing::Test {
  protected:
   ErrorsOfACamera() {
@@ -32,21 +33,21 @@ class ErrorsOfACamera : public ::testing::Test {
 
   void AddBlocks() {
     const double position[] = {1.25, 2.0}, heading = 3.1;
-    // A rotation of 0.2 rad about x.
+    // The orientation is a rotation by 0.2 rad about x.
     const double orientation[] = {std::cos(0.1), std::sin(0.1), 0.0, 0.0};
     state_.Add(position_, position, Eigen::Vector2d(0.25, 4.0).asDiagonal().toDenseMatrix());
     state_.Add(orientation_, orientation, 1e-4 * Eigen::Matrix3d::Identity());
     state_.Add(heading_, &heading, Eigen::MatrixXd(0, 0));
   }
 
-  /// Adds a frame with the truth of position, orientation and heading.
+  /// Adds a frame with the truth of the position, the orientation and the heading.
   void Add(internal::ErrorsFile& file, bool has_position = true) {
     const std::vector<double> position = {1.0, 2.5};
     file.Add({FrameAt(0.5, {}),
               {has_position ? position : std::vector<double>(), {1.0, 0.0, 0.0, 0.0}, {-3.1}}},
              state_);
   }
-  /// The blocks with these truths.
+  /// Returns the layouts of the blocks. `truths` contains the index of the truth of each block.
   std::vector<internal::BlockLayout> Layouts(const std::vector<int>& truths) const {
     std::vector<internal::BlockLayout> layouts = internal::BlockLayoutsOf(system_, {});
     for (std::size_t i = 0; i < truths.size(); ++i) layouts.at(i).truth = truths[i];
@@ -63,7 +64,7 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   internal::OutputFolder out(folder / "out", false);
   internal::RunColumns columns;
   internal::ErrorsFile file(out, "ekf", Layouts({0, 1, 2, -1}), columns);
-  Add(file);  // no block has a value
+  Add(file);  // so far no block has a value
   EXPECT_FALSE(file.elements()[0].is_known);
   AddBlocks();
   Add(file);
@@ -79,9 +80,9 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_EQ(lines[1], "0.500000000,,,,,,,,,,,,");
   const std::vector<std::string> cells = Cells(lines[2]);
   ASSERT_EQ(cells.size(), 13u);
-  EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // m
+  EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // in m
   EXPECT_EQ(cells[3] + ' ' + cells[4], "0.5 2");
-  EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // rad, in the body
+  EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // in rad, in the frame of the body
   EXPECT_EQ(cells[6] + cells[7], "00");
   EXPECT_EQ(cells[9], "0.01");
   EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);  // wrapped to (-pi, pi]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The keys of the figures drawn by gnuplot.
+// Tests the keys (legends) of the figures that gnuplot draws.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kWidth = 960.0;
 
-/// Returns the positions of the texts in an svg file, in pixels: text -> x of each occurrence.
+/// Returns the x positions of the texts in an svg file, in pixels, for each text.
 std::map<std::string, std::vector<double>> TextsOf(const std::string& svg) {
   std::map<std::string, std::vector<double>> texts;
   const std::string open = "<text>", place = "translate(";
@@ -28,7 +28,7 @@ std::map<std::string, std::vector<double>> TextsOf(const std::string& svg) {
 
 class FigureKey : public ::testing::TestWithParam<int> {};
 
-// Next to every panel of the comparison are all estimators in one column.
+// In the comparison figure each panel has a key that lists all estimators in one column.
 TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
@@ -48,13 +48,14 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   const double column = texts["truth"].empty() ? 0.0 : texts["truth"][0];
   for (int i = 0; i < GetParam(); ++i) {
     const std::string name = "an_estimator_" + std::to_string(i);
-    ASSERT_EQ(texts[name].size(), 3u) << name;  // depth, its rate, inverse distance
+    // Each name occurs in the panels of the depth, its rate and the inverse distance.
+    ASSERT_EQ(texts[name].size(), 3u) << name;
     for (const double x : texts[name]) {
       EXPECT_NEAR(x, column, 1.0) << name;
       EXPECT_LT(x + 7.0 * static_cast<double>(name.size()), kWidth);
     }
   }
-  // One panel also has the measurements of two sensors.
+  // One panel also contains the measurements of two sensors.
   texts = TextsOf(Read(folder / "out/figures/measurements.svg"));
   for (int i = 0; i < GetParam(); ++i) {
     EXPECT_EQ(texts["an_estimator_" + std::to_string(i)].size(), 1u) << i;
@@ -62,7 +63,7 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   EXPECT_EQ(texts["truth"].size(), 2u);  // one for each stream
 }
 
-// The last panel is lower than the others by the height of the texts below its axis.
+// The last panel is lower than the others, because it also has texts below its axis.
 TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();

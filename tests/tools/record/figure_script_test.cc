@@ -20,7 +20,8 @@ TEST(FigureScript, CountsFromTheFirstSecondWhereTimestampsAreFarFromZero) {
 }
 
 TEST(FigureScript, TakesTheWholeRangeOfTimestamps) {
-  // The span of 1.82e10 s overflows a timestamp. A line bridges four hundredths of it.
+  // The timestamps span 1.82e10 s, which a Timestamp cannot represent. A line bridges gaps of up to
+  // 4 % of this span.
   const std::string script = ScriptOver(-9.1e9, 9.1e9);
   EXPECT_NE(script.find("t0 = 0.0\n"), std::string::npos) << script;
   EXPECT_NE(script.find("set xrange [-9100000000.000000000:9100000000.000000000]"),
@@ -39,7 +40,7 @@ TEST(FigurePages, LeaveOutNoPanelAndAreOfOneSize) {
   EXPECT_TRUE(pages(0).empty());
   ASSERT_EQ(pages(12).size(), 1u);
   EXPECT_EQ(pages(12)[0].title(), "ekf: state");
-  const std::vector<FigureScript> three = pages(25);  // 8 + 8 + 9
+  const std::vector<FigureScript> three = pages(25);  // pages with 8, 8 and 9 panels
   ASSERT_EQ(three.size(), 3u);
   EXPECT_EQ(three[0].name(), "ekf.state");
   EXPECT_EQ(three[1].name(), "ekf.state.2");

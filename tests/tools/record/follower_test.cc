@@ -8,7 +8,7 @@
 namespace alidade::testing {
 namespace {
 
-/// Returns the number with this key.
+/// Returns the number that belongs to `key` in a line of JSON.
 double NumberOf(const std::string& line, const std::string& key) {
   const std::size_t at = line.find('"' + key + "\":");
   if (at == std::string::npos) return std::nan("");
@@ -19,7 +19,7 @@ TEST(Follower, WritesEachEstimateAsSoonAsItIsMade) {
   Experiment experiment = MakeExperiment(5);
   std::vector<std::string> lines;
   Follower follower([&](std::string_view line) { lines.emplace_back(line); });
-  /// Checks the lines after each estimate; this observer comes after the follower.
+  /// Checks the lines after each estimate. The run calls this observer after the follower.
   struct After : RunObserver {
     explicit After(const std::vector<std::string>& all) : lines(all) {}
     void OnEstimate(int, const SourceFrame& frame, const State& state,

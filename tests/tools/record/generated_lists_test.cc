@@ -10,8 +10,8 @@
 #include "alidade/experiment/metric_table.h"
 #include "alidade/record/column_tables.h"
 
-/// The lists of metrics, events, outcomes and columns in the documentation are generated from the
-/// tables in the code. ALIDADE_UPDATE_DOCS=1 rewrites them.
+/// The lists of metrics, events, outcomes and columns in the documentation are generated from
+/// tables in the code. With ALIDADE_UPDATE_DOCS=1 the tests rewrite the lists.
 namespace alidade {
 namespace {
 
@@ -98,7 +98,7 @@ std::string Read(const std::string& page) {
   return text.str();
 }
 
-/// The list is between `<!-- list: NAME -->` and `<!-- end of list -->`.
+/// Expects that `page` contains `list` between `<!-- list: NAME -->` and `<!-- end of list -->`.
 void ExpectList(const std::string& page, const std::string& name, const std::string& list) {
   const std::string file = std::string(ALIDADE_SOURCE_DIR) + "/docs/" + page;
   const std::string begin = "<!-- list: " + name + " -->\n\n", end = "\n<!-- end of list -->";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The landmark files of a run.
+// Tests the files of a run that contain landmarks.
 #include "alidade/record/landmarks_file.h"
 
 #include <gtest/gtest.h>
@@ -18,10 +18,10 @@
 namespace alidade::testing {
 namespace {
 
-/// Four points next to a camera that moves right. A sensor measures their offsets.
+/// A camera moves to the right past four points. A sensor measures the offsets of the points.
 class Street : public Source {
  public:
-  /// With `outlier`, one measurement of landmark 3 has a large error.
+  /// If `outlier`, one measurement of landmark 3 has a large error.
   explicit Street(bool outlier = false) : outlier_(outlier) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
@@ -107,11 +107,11 @@ TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
     EXPECT_DOUBLE_EQ(std::stod(last[6 + i]), std::sqrt(estimate.covariance(e, e)));
   }
   EXPECT_EQ(last[9] + last[10], "");
-  // seen from frame 10 to 19; the first observation initialises it
+  // The landmark is measured in frames 10 to 19. The first of these measurements initialises it.
   EXPECT_EQ(last[11], "1.000000000");
   EXPECT_EQ(last[12], "1.900000000");
   EXPECT_EQ(last[13], "9");
-  EXPECT_EQ(last[14], "8");  // one was gated
+  EXPECT_EQ(last[14], "8");  // one of the 9 measurements was gated
   const std::array<double, 3> place = *Street().TrueLandmark(3);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::stod(last[15 + i]), place[i]);
   EXPECT_DOUBLE_EQ(std::stod(last[18]), estimate.covariance(0, 1));
@@ -120,7 +120,7 @@ TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
   EXPECT_EQ(last[21] + last[22], "kept");
 }
 
-/// Landmark 0 is measured once, removed, and seen again later.
+/// Landmark 0 is measured once, is removed, and is measured again later.
 class Passing : public Street {
  public:
   bool Next(SourceFrame& frame) override {
@@ -150,15 +150,16 @@ TEST(LandmarkRecords, TheMapHasThoseThatWereRemoved) {
   const RunResult result = RunInto(recorder, experiment);
   recorder.Finish(result);
   const std::vector<std::string> lines = Lines(folder / "out/ekf/landmarks.csv");
-  ASSERT_EQ(lines.size(), 6u);  // landmark 0 in two generations, and 1 to 3
+  ASSERT_EQ(lines.size(), 6u);  // the header, two generations of landmark 0, and landmarks 1 to 3
   const std::vector<std::string> before = Cells(lines[1]), after = Cells(lines[2]);
   EXPECT_EQ(before[0] + before[1] + before[21] + ' ' + before[22], "00removed 0.300000000");
   EXPECT_EQ(before[12], "0.000000000");
   EXPECT_NEAR(std::stod(before[3]), 1.0, 3.0 * std::stod(before[6]));
-  EXPECT_EQ(before[15], "1");  // its true position
+  EXPECT_EQ(before[15], "1");  // x of its true position
   EXPECT_EQ(after[0] + after[1] + after[21] + ' ' + after[22], "01kept ");
   EXPECT_EQ(after[11], "1.100000000");
-  // The map's metrics, and readers of the folder, have only the final landmarks.
+  // The metrics of the map contain only the landmarks at the end. The same holds for the map that a
+  // reader of the folder gets.
   const EstimatorResult& one = result.estimators.at(0);
   ASSERT_EQ(one.landmarks->size(), 4u);
   ASSERT_EQ(one.removed_landmarks.size(), 1u);
@@ -194,8 +195,8 @@ TEST(LandmarkRecords, PointsOfTheMapAreWrittenAsPly) {
             "1.5 -2 2 0.5 1 2 0 7\n");
 }
 
-// If a landmark was seen along one ray only, its position may be anywhere. The inverse distance
-// then has its own cells.
+// If a landmark was seen along one ray only, its distance is unknown. The inverse distance is then
+// written in cells of its own.
 TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
   LandmarkEstimate far_off;
   far_off.id = 7;
@@ -250,7 +251,8 @@ TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
   Experiment experiment = OnTheStreet();
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
-  // Calculated here from the rows of the last frame in innovations.csv, with four landmarks.
+  // The expected RMS is computed from the rows of the last frame in innovations.csv, which has four
+  // landmarks.
   const std::vector<std::string> innovations = Lines(folder / "out/ekf/innovations.csv");
   double sum = 0.0;
   for (std::size_t i = innovations.size() - 4; i < innovations.size(); ++i) {
@@ -261,7 +263,8 @@ TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
   }
   const std::vector<std::string> lines = Lines(folder / "out/ekf/reprojection.csv");
   EXPECT_EQ(lines[0], "t_s,sensor,landmarks,rms");
-  EXPECT_EQ(lines.size(), 20u);  // the first frame initialises the landmarks
+  // The header and 19 frames; the first frame only initialises the landmarks.
+  EXPECT_EQ(lines.size(), 20u);
   const std::vector<std::string> last = Cells(lines.back());
   EXPECT_EQ(last[0] + last[1] + last[2], "1.900000000tracks4");
   EXPECT_NEAR(std::stod(last[3]), std::sqrt(sum / 12.0), 1e-12);
@@ -304,7 +307,7 @@ TEST(LandmarkRecords, RemovedLandmarksAreDrawnPaler) {
           "(strcol('status') eq 'removed' ? column('x') : NaN):(column('y')) with points ls 20"),
       std::string::npos)
       << map;
-  // Error bars of the many removed landmarks of a drive would hide everything else.
+  // Removed landmarks have no error bars. On a long drive the bars would hide everything else.
   EXPECT_EQ(map.find("removed, +-3"), std::string::npos) << map;
 }
 
@@ -315,7 +318,8 @@ TEST(LandmarkRecords, TheMeasurementsOfOneTimestampAreNotJoinedByALine) {
   recorder.Finish(RunInto(recorder, experiment));
   const std::string script = Read(folder / "out/figures/measurements.gp");
   EXPECT_NE(script.find("with points ls 13 title 'measured'"), std::string::npos) << script;
-  EXPECT_EQ(script.find("predicted: "), std::string::npos) << script;  // it would be hidden
+  // A prediction would be hidden behind the points.
+  EXPECT_EQ(script.find("predicted: "), std::string::npos) << script;
 }
 
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
@@ -329,7 +333,7 @@ TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
     one.true_position = Eigen::Map<const Eigen::Vector3d>(p->data());
     one.position = 2.0 * (turn * one.true_position) + Eigen::Vector3d(1.0, -2.0, 0.5);
   }
-  map.emplace_back().id = 77;  // its true position is unknown
+  map.emplace_back().id = 77;  // the true position of this landmark is unknown
   map.back().position = Eigen::Vector3d(9, 9, 9);
   const auto metrics = internal::MapMetrics(map);
   EXPECT_GT(metrics.at("map.rmse"), 1.0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 98: a locale whose numbers have a comma changes nothing.
+// Fault 98 of tests/faults/README.md: a locale that writes numbers with a comma has no effect.
 #include <cstdio>
 
 #include "alidade/replay/replay.h"
@@ -54,7 +54,8 @@ TEST(CommaLocale, ChangesNoByteOfWhatIsWritten) {
   EXPECT_EQ(Read(folder / "comma/run/timing.json").find("\"wall_s\": 0,"), std::string::npos);
 }
 
-/// Returns the failure reason of a run of kConfig whose filter cannot step over the first gap.
+/// Runs kConfig with a filter that cannot step over the first gap. Returns the reason of the
+/// failure.
 std::string ReasonOfAFailure() {
   std::string text = kConfig;
   const std::string entry = "gate: 0.999";

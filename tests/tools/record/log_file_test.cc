@@ -22,7 +22,7 @@ std::string LogOf(const std::filesystem::path& folder) {
   return text.str();
 }
 
-/// Collects the warnings of its scope.
+/// Collects the warnings that are logged during its lifetime.
 struct Warnings {
   std::vector<std::string> texts;
   LogSubscription sink{LogLevel::kWarning,
@@ -58,8 +58,8 @@ TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
   EXPECT_TRUE(warnings.texts[0].ends_with("; the run continues without a log"));
 }
 
-// A limit of 4 bytes replaces a full disk. The buffer has 64 KiB: one message is written at the
-// end, but a thousand messages of 100 bytes exceed the buffer.
+// A file size limit of 4 bytes replaces a full disk. The buffer has 64 KiB: a single message is
+// written only at the end, but a thousand messages of 100 bytes exceed the buffer.
 TEST(LogFile, ThatCannotBeWrittenIsAWarning) {
   for (const int messages : {1, 1000}) {
     const testing::TemporaryFolder temporary;

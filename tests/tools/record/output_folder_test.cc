@@ -17,7 +17,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 using internal::OutputFile;
 using internal::OutputFolder;
 
-/// Returns the files and folders at any depth.
+/// Returns the paths of all files and folders in `folder`, at any depth.
 std::vector<std::string> EntriesOf(const fs::path& folder) {
   std::vector<std::string> entries;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -27,7 +27,7 @@ std::vector<std::string> EntriesOf(const fs::path& folder) {
   return entries;
 }
 
-/// Leaves the partial folder of a process that was killed after it had written a file.
+/// Leaves a partial folder as a process does that is killed after it has written a file.
 void LeavePartial(const fs::path& target, const std::string& text = "rows\n") {
   OutputFolder folder(target, false);
   folder.Write("ekf/a.csv", text);
@@ -74,7 +74,7 @@ TEST(OutputFolder, LeavesAnExistingFolderAlone) {
   EXPECT_EQ(Read(out / "ekf/a.csv"), "old\n");
 }
 
-// FAULTS 91, 92
+// Faults 91 and 92 of tests/faults/README.md.
 TEST(OutputFolder, LeavesAnExistingPartialFolderAlone) {
   const TemporaryFolder temporary;
   const fs::path out = temporary / "out";
@@ -188,7 +188,7 @@ TEST(OutputFolder, ForceSparesWhatIsNoRunFolder) {
   EXPECT_EQ(CodeOf([&] { OutputFolder(temporary / "home", true); }), 0) << "it is empty";
 }
 
-// Files from other writers, such as images and figures, belong to the folder, too.
+// Files that other writers added, such as images and figures, also belong to the folder.
 TEST(OutputFolder, ForceReplacesWhatWasAddedToIt) {
   const TemporaryFolder temporary;
   {
@@ -255,7 +255,8 @@ TEST(OutputFile, TakesNoMoreAfterAFailure) {
   EXPECT_EQ(text, "/dev/full: cannot write: No space left on device");
 }
 
-// FAULTS 87: a full disk or quota is not an error of permissions.
+// Fault 87 of tests/faults/README.md: a full disk or quota is not reported as an error of
+// permissions.
 TEST(OutputFile, WhatCannotBeCreatedHasTheCodeOfItsCause) {
   for (const auto& [error, code] :
        {std::pair(ENOSPC, 74), {EDQUOT, 74}, {EIO, 74}, {EACCES, 73}, {EROFS, 73}}) {
@@ -274,7 +275,7 @@ TEST(Recorder, SaysThatItIsRunning) {
   EXPECT_NE(ok.find("\"status\": \"ok\""), ok.npos) << ok;
 }
 
-// FAULTS 87: only one file is on a full disk.
+// Fault 87 of tests/faults/README.md: only one of the files is on a full disk.
 TEST(Recorder, AFullDiskKeepsTheRows) {
   const TemporaryFolder temporary;
   const fs::path partial = temporary / "out.partial";

@@ -46,7 +46,7 @@ TEST(FindPose, APlanarPoseIsAPositionOfTwoAndAnAngle) {
   }
   EXPECT_FALSE(FindPose({{"c.position", 2}, {"c.speed", 1}}));
   EXPECT_FALSE(FindPose({{"c.position", 2}, {"c.heading", 2}}));
-  // Names without an entry, as a truth may have.
+  // Names without a state entry are possible, for example the names of truths.
   const auto bare = FindPose({{"heading", 1}, {"position", 2}});
   ASSERT_TRUE(bare);
   EXPECT_EQ(bare->position, 1u);
@@ -56,7 +56,7 @@ TEST(FindPose, APlanarPoseIsAPositionOfTwoAndAnAngle) {
 
 TEST(PoseFile, APlanarPoseIsWrittenAsOneInSpace) {
   const testing::TemporaryFolder folder;
-  // A rotation of 90 degrees: qz = qw = sin 45 deg.
+  // The heading is 90 degrees: qz = qw = sin 45 deg.
   const double position[] = {1.0, -2.0}, heading[] = {std::acos(0.0)};
   Eigen::MatrixXd p(2, 2), r(1, 1);
   p << 6, 2, 2, 8;

@@ -59,12 +59,13 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
             std::string::npos);
   EXPECT_NE(script.find("title 'other: thing.depth'"), std::string::npos);
   EXPECT_NE(script.find("column('own.bias')"), std::string::npos);
-  // There is one truth and one panel: the depth that the other estimators call target.depth.
+  // Both names belong to the same truth, so there is one panel. It has the name that the other
+  // estimators use, target.depth.
   EXPECT_EQ(script.find("set label 1 'thing.depth'"), std::string::npos);
   EXPECT_NE(script.find("set label 1 'target.depth'"), std::string::npos);
 }
 
-/// An angle that grows by 1 rad per step.
+/// An angle that grows by 1 rad in each step.
 struct Spinning : Motion<0, Angle> {
   static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
   template <class T>
@@ -97,7 +98,7 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   }
 }
 
-/// The scripts of a run's figures; gnuplot need not be installed.
+/// Gives access to the scripts of the figures of a run. gnuplot need not be installed.
 class ScriptsOf {
  public:
   explicit ScriptsOf(Experiment& experiment) {
@@ -125,7 +126,7 @@ TEST(Recorder, ErrorsOfAllEstimatorsAreDrawnInOnePanel) {
                             "with lines ls 2 title 'alone'"}) {
     EXPECT_NE(script.find(curve), std::string::npos) << curve << '\n' << script;
   }
-  // it has no truth
+  // this block has no truth
   EXPECT_EQ(script.find("'template.inverse_distance'"), std::string::npos) << script;
   experiment = MakeExperiment();
   experiment.estimators.pop_back();
@@ -168,12 +169,12 @@ TEST(Recorder, AConstantBlockHasNoPanel) {
 TEST(Recorder, AGainHasItsUnit) {
   Experiment experiment = MakeExperiment();
   const std::string script = ScriptsOf(experiment)["ekf.gain"];
-  // A gain for a disparity in px, and one for a scale, which has no unit.
+  // The gain of a disparity is per px. The gain of a scale, which has no unit, is in m/s.
   EXPECT_NE(script.find("title 'target.depth_rate [(m/s)/px]'"), std::string::npos) << script;
   EXPECT_NE(script.find("title 'target.depth_rate [m/s]'"), std::string::npos) << script;
 }
 
-/// A target with streams that never have a measurement.
+/// A target with additional streams that never have a measurement.
 class SilentStreams : public SwingingTarget {
  public:
   SilentStreams() : SwingingTarget(60), streams_(SwingingTarget::streams()) {
@@ -241,7 +242,7 @@ TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
     experiment.estimators.push_back(std::move(more));
   }
   const int code = InChild([&] {
-    ::setenv("PATH", "/nowhere", 1);  // without gnuplot the test reads the script
+    ::setenv("PATH", "/nowhere", 1);  // gnuplot is not found; the test reads the script
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     recorder.Finish(RunInto(recorder, experiment));
   });
@@ -263,12 +264,12 @@ TEST(Recorder, DoesWithoutGnuplot) {
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
   EXPECT_EQ(SvgsOf(folder / "out"), Names{});
-  // for drawing on another machine
+  // The script is kept, so the figure can be drawn on another machine.
   EXPECT_TRUE(fs::exists(folder / "out/figures/alone.innovation.gp"));
 }
 
-/// Puts a gnuplot on PATH that draws the first figure and its PNG, then writes half of the next one
-/// and sleeps.
+/// Puts a slow gnuplot on PATH. It draws the first figure and its PNG, then writes half of the next
+/// figure and sleeps.
 void UseSlowGnuplot(const TemporaryFolder& folder) {
   const fs::path program = folder / "bin/gnuplot";
   fs::create_directory(program.parent_path());
@@ -282,8 +283,8 @@ void UseSlowGnuplot(const TemporaryFolder& folder) {
   ::setenv("PATH", (program.parent_path().string() + ":/usr/bin:/bin").c_str(), 1);
 }
 
-/// Records with the slow gnuplot in a child process; `note` is the expected note on missing
-/// figures.
+/// Records a run in a child process that uses the slow gnuplot. `note` is the expected note on the
+/// missing figures.
 int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const char* note) {
   return InChild([&] {
     UseSlowGnuplot(folder);
@@ -297,7 +298,7 @@ int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const
 TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
-  options.stop = [&] {  // once gnuplot sleeps
+  options.stop = [&] {  // stops as soon as gnuplot sleeps
     return fs::exists(folder / "out.partial/figures/comparison.svg");
   };
   EXPECT_EQ(RecordSlowly(folder, options, "1 of 14 figures drawn: the drawing was stopped"), 0);

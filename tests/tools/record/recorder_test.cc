@@ -45,7 +45,8 @@ TEST(Recorder, WritesEveryFile) {
                                                                          "timing.csv",
                                                                          "timing.json",
                                                                          "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 23u);  // no files outside the run's folder
+  // There are no files outside the folder of the run.
+  EXPECT_EQ(FilesIn(folder.path()).size(), 23u);
 }
 
 TEST(Recorder, ColumnsJsonHasTheHeaderOfEveryCsvFile) {
@@ -119,14 +120,14 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
   SourceFrame frame;
   ASSERT_TRUE(source.Next(frame));
   const std::vector<std::string> lines = Lines(folder / "out/implied_states.csv");
-  // only from the disparity: a scale alone does not determine a distance
+  // Only the disparity implies a state. A scale alone does not determine a distance.
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0], "t_s,sensor,target.depth");
   EXPECT_EQ(lines[1], "0.000000000,disparity," +
                           internal::NumberText(400.0 * 0.065 / frame.measurements[1].values[0]));
 }
 
-/// The estimator of a constructed report.
+/// An estimator for a report that the test constructs.
 class NoEstimator : public Estimator {
  public:
   void Start(Timestamp) override {}
@@ -141,7 +142,8 @@ class NoEstimator : public Estimator {
   UpdateReport report_;
 };
 
-/// A constructed report of one update: a block waits for its initial value, and one is fixed.
+/// A constructed report of one update. One block still waits for its initial value, and another
+/// block is fixed.
 struct HandMade {
   Experiment experiment;
   State state;
@@ -169,7 +171,8 @@ struct HandMade {
     state.Add(2, attitude, Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal().toDenseMatrix());
     experiment.estimators.push_back(std::move(named));
     static_cast<Frame&>(frame) =
-        testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, below the stereo sensor's range
+        // The disparity belongs to 0.289 m, which is below the range of the stereo sensor.
+        testing::FrameAt(5e-9, {{0, 90.0}});
     MeasurementReport accepted;
     accepted.sensor = 0;
     accepted.dof = 1;
@@ -220,7 +223,7 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
 
 TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   const TemporaryFolder folder;
-  Experiment experiment = MakeExperiment(6);  // a frame every 33 ms
+  Experiment experiment = MakeExperiment(6);  // the frames are 33 ms apart
   EstimatorSpec& ekf = experiment.estimators[0];
   ekf.problem.initial_time_s = 0.066;
   ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
@@ -232,7 +235,7 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   }
   EXPECT_EQ(timestamps, (std::vector<std::string>{"t_s", "0.066000000", "0.099000000",
                                                   "0.132000000", "0.165000000"}));
-  // 26 px m at 0.3 m
+  // The disparity is 26 px m divided by 0.3 m.
   EXPECT_EQ(Lines(folder / "out/ekf/innovations.csv")[1].substr(0, 46),
             "0.000000000,disparity,disparity,,stale,1,,86.6");
 }
@@ -240,7 +243,7 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
 TEST(Recorder, QuotesTextsInEvents) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"));
-  // The variation of the measurements is smaller than the noise of the filter.
+  // The measurements vary less than the filter assumes.
   const std::string events = Read(folder / "out/ekf/events.csv");
   EXPECT_TRUE(events.starts_with("t_s,kind,text\n,nis_bounds,\"NIS mean 0.")) << events;
   EXPECT_TRUE(
@@ -253,7 +256,8 @@ TEST(Recorder, TellsPluginsOfOneNameApart) {
   const TemporaryFolder folder;
   std::string expected = "\"plugins\": [";
   std::vector<fs::path> plugins;
-  for (const char* where : {"b", "a"}) {  // in the given order, independent of the folders' names
+  // The order of the plugins is kept; it is not the order of the folders' names.
+  for (const char* where : {"b", "a"}) {
     fs::create_directory(folder / where);
     const fs::path plugin = folder / where / "models.so";
     std::ofstream(plugin) << "bytes of " << where;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The displayed parts of a frame: its features, and the map from above.
+// Tests the parts of a displayed frame: its features, and the map from above.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -54,7 +54,8 @@ TEST(FeatureTrails, WhatIsNotSeenAnyMoreIsLostOnce) {
   EXPECT_TRUE(trails.Add(PixelsOf({}), nullptr).empty());
 }
 
-// A feature without a report is new until its first accepted measurement; afterwards it is unused.
+// A feature without a report is `new` until its first accepted measurement. Afterwards it is
+// `unused`.
 TEST(FeatureTrails, WithoutAReportAFeatureIsNewUntilItIsAccepted) {
   FeatureTrails trails;
   UpdateReport none, accepted;
@@ -80,7 +81,7 @@ TEST(FeatureTrails, ThePredictionIsHAndTheFirstTwoOfS) {
   UpdateReport report;
   AddReport(report, 4, Outcome::kAccepted);
   MeasurementReport& one = report.measurements()[0];
-  one.dof = 3;  // u, v and depth
+  one.dof = 3;  // the elements are u, v and the depth
   one.h = report.Copy(std::vector{11.0, 21.0, 5.0});
   one.s = report.Copy(std::vector{4.0, 1.0, 0.1, 1.0, 9.0, 0.2, 0.1, 0.2, 0.3});
   FeatureTrails trails;
@@ -100,7 +101,7 @@ TEST(FeatureTrails, WhatIsNoPixelIsNoFeature) {
 
 const Eigen::Matrix3d kNoTurn = Eigen::Matrix3d::Identity();
 
-// The camera looks along z, and y points down: from above, x points right and z up.
+// The camera looks along z, and its y axis points down. In the map, x points right and z points up.
 TEST(MapFromAbove, ACameraIsSeenFromAbove) {
   MapFromAbove above;
   Eigen::Matrix3d p;
@@ -116,7 +117,8 @@ TEST(MapFromAbove, ACameraIsSeenFromAbove) {
   EXPECT_EQ(map.position.yy, 9);
 }
 
-// The camera's y axis points along -z of the world, so z is up, and the camera looks along y.
+// The y axis of the camera points along -z of the world, so z is up in the world. The camera looks
+// along y.
 TEST(MapFromAbove, TheWorldMayHaveZUp) {
   Eigen::Matrix3d world_from_body;
   world_from_body << 1, 0, 0, 0, 0, 1, 0, -1, 0;
@@ -127,14 +129,15 @@ TEST(MapFromAbove, TheWorldMayHaveZUp) {
   EXPECT_EQ(above.map()->heading, (std::array<double, 2>{0.0, 1.0}));
 }
 
-// Of 101 landmarks, at x = 0 to 99 m and at 10 km, the farthest ones are outside of the view.
+// 100 landmarks are at x = 0 to 99 m, and one is at 10 km. The farthest landmarks are outside the
+// view.
 TEST(MapFromAbove, OneFarLandmarkDoesNotHideTheOthers) {
   std::vector<LandmarkEstimate> landmarks(101);
   for (int i = 0; i <= 100; ++i) {
     landmarks[static_cast<std::size_t>(i)].position = {i == 100 ? 1e4 : i, 0.0, 5.0};
     landmarks[static_cast<std::size_t>(i)].covariance.setIdentity();
   }
-  landmarks.emplace_back();  // not initialised yet
+  landmarks.emplace_back();  // a landmark that is not yet initialised
   MapFromAbove above;
   above.Add({0, 0, 0}, kNoTurn, kNoTurn, nullptr, landmarks);
   EXPECT_EQ(above.map()->landmarks.size(), 101u);
@@ -142,7 +145,7 @@ TEST(MapFromAbove, OneFarLandmarkDoesNotHideTheOthers) {
   EXPECT_LE(above.map()->bounds[1], 99.0);
   landmarks.resize(1);
   above.Add({0, 0, 0}, kNoTurn, kNoTurn, nullptr, landmarks);
-  EXPECT_GE(above.map()->bounds[1], 97.0);  // the view never shrinks
+  EXPECT_GE(above.map()->bounds[1], 97.0);  // the view never becomes smaller
 }
 
 }  // namespace

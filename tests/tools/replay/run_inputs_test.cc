@@ -49,7 +49,7 @@ TEST(RunInputs, NameWhatDiffers) {
   const std::string before = InputsOf(data, {plugin});
   EXPECT_EQ(Differences(before, InputsOf(data, {plugin})), std::vector<std::string>{});
   Written(folder / "own.so", "two");
-  // The SHA-256 hashes of `two` and `one`.
+  // The expected numbers are the SHA-256 hashes of the texts `two` and `one`.
   EXPECT_EQ(Differences(before, InputsOf(data, {plugin})),
             (std::vector<std::string>{"plugin own.so: now 3fc4ccfe7458..., was 7692c3ad3540..."}));
   EXPECT_EQ(Differences(before, InputsOf(data)),
@@ -91,7 +91,7 @@ TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
   EXPECT_EQ(text.find("/b.csv\"", first + 1), text.npos) << text;
 }
 
-// An unreadable file has no hash to compare.
+// A file that cannot be read has no hash, so it cannot be compared.
 TEST(RunInputs, AFileThatCannotBeReadIsAnError) {
   const testing::TemporaryFolder folder;
   std::string text;

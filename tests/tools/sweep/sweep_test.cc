@@ -15,7 +15,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Quantile, IsLinearBetweenOrderStatistics) {
-  // numpy.quantile([1, 2, 4, 8], q): h = 3 q
+  // The expected values are those of numpy.quantile([1, 2, 4, 8], q): h = 3 q.
   const std::vector<double> x = {1, 2, 4, 8};
   EXPECT_DOUBLE_EQ(Quantile(x, 0.0), 1.0);
   EXPECT_DOUBLE_EQ(Quantile(x, 0.05), 1.15);
@@ -33,7 +33,7 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
 
 using Metrics = std::map<std::string, double>;
 
-/// Returns the run `to` with additional metrics.
+/// Returns a copy of the run `to` with additional metrics.
 SweepRow Add(const SweepRow& to, const Metrics& more) {
   EstimatorResult one;
   one.name = to.name;
@@ -54,8 +54,8 @@ SweepRow Result(double rmse, bool diverged = false, bool inconsistent = false) {
   return Add(one, {{"rmse:x", rmse}});
 }
 
-/// Three runs that count, one of them inconsistent; two that diverged; and one that failed (and was
-/// inconsistent).
+/// Returns six runs. Three of them count, one of which is inconsistent. Two runs diverged, and one
+/// inconsistent run failed.
 SweepResult SixRuns() {
   SweepResult result;
   result.runs = 6;
@@ -88,7 +88,8 @@ TEST(Summarise, LeavesOutWhatIsNotANumber) {
   SweepRow& first = result.done[0].estimators[0];
   first = Add(first, {{"rmse:x", std::numeric_limits<double>::quiet_NaN()}});
   SweepRow& second = result.done[1].estimators[0];
-  second = Add(second, {{"rmse:a", 7.0}});  // in one run, and before the other runs' keys
+  // A metric of one run only, whose key comes before those of the other runs.
+  second = Add(second, {{"rmse:a", 7.0}});
   const std::vector<SweepSummary> summaries = Summarise(result);
   EXPECT_FALSE(summaries[0].metrics.contains("rmse:never"));
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 4.0);
@@ -115,7 +116,8 @@ TEST(SweepFolder, RunsHaveTheirValuesInTheColumnsOfAll) {
   EXPECT_EQ(lines[3], "3,ekf,true,false,7,100,,8");
 }
 
-// The results written at a stop cover only the runs before it, so a resumed sweep removes them.
+// The results written at a stop cover only the runs before the stop, so a resumed sweep removes
+// them.
 TEST(SweepFolder, AStoppedOneIsContinuedWithoutItsResults) {
   const testing::TemporaryFolder temporary;
   const Config config = Config::FromText("{}", "config.yaml");
@@ -165,7 +167,8 @@ TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
   for (SweepRun& run : result.done) {
     run.estimators[0] = Add(run.estimators[0], {{"nees.mean:x", 4.0}, {"nees.dof:x", 2.0}});
   }
-  // Three runs of two degrees of freedom: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6 = 2.408.
+  // Three runs have two degrees of freedom each: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6
+  // = 2.408.
   const std::string line =
       "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
       "overconfident\n";
@@ -185,7 +188,8 @@ TEST(SweepTable, FoldsAsAComparisonDoes) {
       run.estimators.back().name = name;
     }
   }
-  // 12 characters of the label and three times 29 are 99 characters; the fourth column goes below.
+  // The label has 12 characters and each column has 29, so three columns take 99 characters. The
+  // fourth column is printed below.
   const std::string table = TableOf(result);
   EXPECT_EQ(table.find('\n'), 99u) << table;
   EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;

@@ -46,8 +46,9 @@ struct InverseModel {
 
 /// Measurement that is the input of a sensor model.
 struct Observation {
-  const double* z = nullptr;      ///< ambient; null for a prediction
-  const double* known = nullptr;  ///< known numbers of the measurement; null if there are none
+  const double* z = nullptr;  ///< ambient; null for a prediction
+  const double* known =
+      nullptr;  ///< known numbers of the measurement; may be null if known_size() is 0
 };
 
 /// Sensor model z = h(roles) + n, n ~ N(0, L L'). m: tangent size of the measurement. All members
@@ -59,7 +60,7 @@ class SensorModel {
     std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> roles;
     Space measurement;
-    Space known = {};  ///< known numbers of each measurement; no name: there are none
+    Space known = {};  ///< known numbers of each measurement; name empty: not used
     InverseModel inverse = {};
     std::map<std::size_t, OwnedRole> owned =
         {};                     ///< by role, if the model defines prior and dynamics
@@ -163,7 +164,7 @@ class MotionModel {
     std::string name;    ///< name of the model
     std::string origin;  ///< path of the plugin; empty: not from a plugin
     std::vector<Space> blocks;
-    Space input = {};  ///< the control input; no name: there is none
+    Space input = {};  ///< the control input; name empty: not used
     int noise_size = 0;
     bool stationary = false;      ///< the blocks never change: Step need not be called
     bool discrete_noise = false;  ///< w is constant from one update to the next

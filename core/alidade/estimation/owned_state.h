@@ -5,7 +5,8 @@
 
 namespace alidade::internal {
 
-/// Returns the motion of a model parameter state, one block x of the geometry with prior mean mu:
+/// Returns the motion model of a model parameter state, which is one block x with the given
+/// geometry and the prior mean mu:
 ///
 ///   constant      x' = x
 ///   random walk   x' = x (+) w,                            w ~ N(0, L L' dt)
@@ -13,8 +14,8 @@ namespace alidade::internal {
 ///                                                          a = exp(-dt / tau)
 ///
 /// The name of the model is `constant`, `random_walk` or `gauss_markov`. L is the density of the
-/// driving continuous white noise, tau the time constant. The discretisation is exact for vectors
-/// and angles. [BarShalom2001] ch. 4.
+/// continuous white noise that drives the process, tau the time constant. The discretisation is
+/// exact for vectors and angles. Source: [BarShalom2001] ch. 4.
 SharedMotion OwnedMotion(const Geometry& geometry, const OwnedRole& owned);
 
 }  // namespace alidade::internal

@@ -27,7 +27,7 @@ namespace alidade::internal {
   s = innovation + m;
   R = {s + m * m, m * m};
   root = s + 2 * m * m;
-  // Detects elements that the model does not write.
+  // NaN shows whether the model writes all elements.
   std::fill(h, numbers.data() + numbers.size(), kNotANumber);
   H.assign(m * width, kNotANumber);
   for (std::size_t i = 0; i < sensor_place.columns.size(); ++i) {
@@ -51,7 +51,7 @@ namespace alidade::internal {
   return pending;
 }
 
-/// Appends the entry of a measurement to the report.
+/// Appends an entry for the measurement to the report.
 [[gnu::always_inline]] inline void PendingMeasurements::Report(const PendingMeasurement& pending,
                                                                Outcome outcome,
                                                                UpdateReport& report) {
@@ -60,13 +60,14 @@ namespace alidade::internal {
   entry.z = {pending.z, static_cast<std::size_t>(pending.place->ambient)};
 }
 
-/// Sets the pointers to the entries of the report. Called after the last entry was appended.
+/// Sets PendingMeasurement::report. Called after the last entry was appended, because the entries
+/// move in memory before.
 void PendingMeasurements::PointToReports(UpdateReport& report) {
   MeasurementReport* entry = report.measurements().data();
   for (PendingMeasurement& pending : all()) pending.report = entry++;
 }
 
-/// Returns kAccepted if the measurement can be used, else the reason.
+/// Returns kAccepted if the measurement can be used, else the reason why it cannot.
 [[gnu::always_inline]] inline Outcome PendingMeasurements::Check(
     const PendingMeasurement& pending) {
   const Measurement& m = *pending.measurement;
@@ -138,7 +139,7 @@ Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles) {
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work) {
   const Workspace::Use use(work);
   const Eigen::Map<const RowMajor> matrix(s, m, m);
-  Workspace::Matrix l = work.Take(m, m);  // L D, D on the diagonal
+  Workspace::Matrix l = work.Take(m, m);  // L D, with D on the diagonal
   Workspace::Vector y = work.Take(m);     // L^-1 r
   double sum = 0.0;
   for (int i = 0; i < m; ++i) {
@@ -177,7 +178,8 @@ void ChainJacobian(PendingMeasurement& pending, int column, int size, const doub
   const SensorBinding& sensor = *pending.binding;
   if (outcome == Outcome::kFailed) ReportPluginFailure(f, pending);
   char& is_reported = f.health.out_of_domain[static_cast<std::size_t>(pending.sensor)];
-  // A landmark outside the domain, such as behind the camera, is not a divergence.
+  // A landmark that is out of domain, such as behind the camera, does not mean that the filter
+  // diverged.
   if (outcome != Outcome::kOutOfDomain || pending.is_on_landmark() || is_reported != 0) return;
   is_reported = 1;
   std::vector<BlockId> blocks;

@@ -12,47 +12,49 @@
 #include "alidade/state/kernels.h"
 #include "alidade/state/workspace.h"
 
-/// The measurements of a frame before their update, with the results of their sensor models.
+/// The measurements of a frame that wait for their update, with the results of their sensor models.
 namespace alidade::internal {
 
-/// Measurement of one sensor before its update. m = dof, n = size of P.
+/// Measurement of one sensor that waits for its update. m: tangent size (dof), n: size of P.
 struct PendingMeasurement {
   const Measurement* measurement = nullptr;
   MeasurementReport* report = nullptr;
   int sensor = -1;
   const SensorBinding* binding = nullptr;
-  const SensorModel* model = nullptr;  ///< of the sensor, or for the representation of the landmark
-  const SensorPlace* place = nullptr;  ///< of the sensor, or `landmark_place`; set by Bind
+  /// Model of the sensor, or its model for the representation of the measured landmark.
+  const SensorModel* model = nullptr;
+  const SensorPlace* place = nullptr;  ///< place of the sensor, or &landmark_place; set by Bind
   SensorPlace landmark_place;          ///< includes the blocks of the measured landmark
-  std::vector<double> numbers;  ///< z, h, the innovation, S, R and L; the report points to them
+  std::vector<double> numbers;         ///< z, h, innovation, S, R and L; the report points to them
   double *z = nullptr, *h = nullptr, *innovation = nullptr, *s = nullptr;  ///< s: m x m, row-major
   std::span<double> R;                                                     ///< R, m x m, row-major
   double* root = nullptr;                                                  ///< L of R = L L'
-  std::vector<double> H;                       ///< m rows of the width of `place`, row-major
-  std::vector<double> gain;                    ///< K, as in the report
-  std::array<double*, kMaxRoles> jacobians{};  ///< by role: its first column in H
+  std::vector<double> H;                       ///< m rows of place->width columns, row-major
+  std::vector<double> gain;                    ///< K, in the order of the report
+  std::array<double*, kMaxRoles> jacobians{};  ///< by role: pointer to its first column in H
   Roles roles{};                               ///< the result of the last RolesAt
-  const double* roles_source = nullptr;        ///< the filter's x, if `roles` point into it
-  double weight = 1.0;                         ///< w of the robust loss; R is divided by it
-  MeasurementRows linearised;  ///< H, innovation, R and S, and their first column in the update
+  const double* roles_source = nullptr;        ///< values of the state, if `roles` point to them
+  double weight = 1.0;                         ///< w of the robust loss; R is divided by w
+  MeasurementRows linearised;  ///< H, innovation, R, S, and the first column in the update
 
-  /// Sets `place`, and the memory and pointers that depend on it.
+  /// Sets `place`, and the memory and pointers that depend on the place.
   void Bind(const SensorPlace& sensor_place);
   /// Returns whether the measured landmark is in the state.
   bool is_on_landmark() const { return place == &landmark_place; }
 };
 
-/// Pending measurements of a frame. The report points to their memory, which is reused for the next
-/// frame.
+/// Pending measurements of a frame. The report points to the memory of this object, which is reused
+/// for the next frame.
 class PendingMeasurements {
  public:
-  /// Collects the measurements of all sensors, in the order of the sensors, and appends their
-  /// entries to the report. The outcome is kAccepted, unless the measurement is not finite or
-  /// invalid for its sensor. If `common_outcome` is not kAccepted, it is the outcome of all
-  /// measurements, and no model is called.
+  /// Collects the measurements of all sensors, in the order of the sensors, and appends an entry
+  /// for each to the report. The outcome is kAccepted, unless the measurement is not finite or
+  /// invalid for its sensor. If `common_outcome` is not kAccepted, no model is called, and every
+  /// measurement gets this outcome.
   void Collect(const Frame& frame, const ProblemIndex& index, UpdateReport& report,
                Outcome common_outcome = Outcome::kAccepted);
-  /// Collects one measurement for one sensor with the outcome kAccepted; ignores its stream.
+  /// Collects one measurement for one sensor, with the outcome kAccepted. Ignores the stream of the
+  /// measurement.
   PendingMeasurement& CollectOne(const Measurement& measurement, int sensor,
                                  const ProblemIndex& index, UpdateReport& report);
   std::span<PendingMeasurement> all() {
@@ -67,15 +69,15 @@ class PendingMeasurements {
   Outcome CheckKnownAndCovariance(const PendingMeasurement& pending);
   bool IsCovariance(const std::vector<double>& covariance, int size);
 
-  std::vector<PendingMeasurement> rows_;  ///< the first count_ are in use
+  std::vector<PendingMeasurement> rows_;  ///< only the first count_ elements are used
   std::ptrdiff_t count_ = 0;
   // Reused memory.
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
   Scratch<Eigen::MatrixXd> root_;
 };
 
-/// Returns pointers to the values of the roles at x, valid until the next call. Known roles point
-/// to their values in `f`.
+/// Returns pointers to the values of the roles in x, valid until the next call. The pointers of
+/// known roles point to the values in f.state.
 inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pending,
                                     const std::vector<double>& x) {
   const double* const values = f.state.values().data();
@@ -84,10 +86,10 @@ inline const double* const* RolesAt(const FilterState& f, PendingMeasurement& pe
   pending.roles_source = x.data() == values ? values : nullptr;
   return pending.roles.data();
 }
-/// Computes h at x, ambient, into `h`.
+/// Computes h (ambient) at x and writes it to `h`.
 Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::vector<double>& x,
                   double* h);
-/// Computes h, H and R at the roles; h is in the report too.
+/// Computes h, H and R at the values of the roles. The report then points to h.
 [[gnu::always_inline]] inline Outcome LineariseAt(PendingMeasurement& pending,
                                                   const double* const* roles) {
   const SensorPlace& place = *pending.place;
@@ -105,22 +107,24 @@ Outcome PredictAt(const FilterState& f, PendingMeasurement& pending, const std::
   }
   return OutcomeOf(status);
 }
-/// Computes R at the roles, or copies the covariance of the measurement.
+/// Computes R at the values of the roles. If the measurement has a covariance, copies it to R
+/// instead.
 Outcome NoiseAt(PendingMeasurement& pending, const double* const* roles);
-/// Computes z (-) h for the last h; it is in the report too.
+/// Computes the innovation z (-) h for the last h. The report then points to the innovation.
 inline void ComputeInnovation(PendingMeasurement& pending) {
   pending.report->innovation = {pending.innovation, static_cast<std::size_t>(pending.place->dof)};
   pending.model->measurement().geometry.Minus(pending.z, pending.h, pending.innovation);
 }
-/// Sets H <- H J in the columns of one role; J is size x size, row-major.
+/// Sets H <- H J in the columns of one role. J is size x size, row-major.
 void ChainJacobian(PendingMeasurement& pending, int column, int size, const double* j,
                    Workspace& work);
 
-/// Returns r' S^-1 r, computed by S = L D L', m x m, row-major. NaN unless S is positive definite.
+/// Returns r' S^-1 r, or NaN if S is not positive definite. S is m x m, row-major, and factorised
+/// as L D L'.
 double SquaredMahalanobis(const double* s, const double* r, int m, Workspace& work);
 
-/// Reports that h could not be computed. If h is not defined, the filter counts as diverged; this
-/// is reported once until the sensor is accepted again.
+/// Reports that h could not be computed. If h is not defined, marks the filter as diverged. This is
+/// reported once, until a measurement of the sensor is accepted again.
 void ReportRefusal(FilterState& f, const PendingMeasurement& pending, Outcome outcome);
 void ReportPluginFailure(FilterState& f, const PendingMeasurement& pending);
 

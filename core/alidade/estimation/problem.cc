@@ -42,7 +42,7 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   if (initial.status == BlockStatus::kConstant) return prior;
   const int n = geometry.tangent;
   if (initial.covariance.size() > 0) {
-    constexpr double kRounding = 1e-11;  // over the largest variance
+    constexpr double kRounding = 1e-11;  // relative to the largest variance
     prior.covariance = initial.covariance;
     const bool fits = prior.covariance.rows() == n && prior.covariance.cols() == n &&
                       prior.covariance.allFinite() &&
@@ -68,7 +68,7 @@ Prior PriorOf(const InitialValue& initial, const Space& space, BlockId block,
   return prior;
 }
 
-/// Returns the index of the stream. Appends the stream if its name is new.
+/// Returns the index of the stream. If the name is new, appends the stream.
 int AddStream(Problem& problem, const StreamInfo& stream, const std::string& place) {
   const auto found = std::ranges::find(problem.streams, stream.name, &StreamInfo::name);
   if (found == problem.streams.end()) {
@@ -86,7 +86,7 @@ int AddStream(Problem& problem, const StreamInfo& stream, const std::string& pla
   return static_cast<int>(found - problem.streams.begin());
 }
 
-/// Checks that a block can fill a role.
+/// Throws an Error if the block of the binding cannot fill the role.
 void CheckRole(const Problem& problem, const Space& role, const RoleBinding& binding,
                const std::string& place) {
   const std::string geometry = internal::WithArticle(ToString(role.geometry));
@@ -166,13 +166,13 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
   const std::vector<Space>& spaces = model->blocks();
   for (const InitialValue& value : initial) {
     if (std::ranges::count(initial, value.block, &InitialValue::block) > 1) {
-      Fail(place, "two initial values of '" + value.block + "'; expected one");
+      Fail(place, "two initial values of '" + value.block + "'; expected only one");
     }
     if (std::ranges::count(spaces, value.block, &Space::name) == 0) {
       Fail(place, "no block '" + value.block + "'; expected " + internal::Join(NamesOf(spaces)));
     }
   }
-  std::vector<InitialValue> values;  // in the order of the model
+  std::vector<InitialValue> values;  // in the order of the model's blocks
   std::vector<Prior> added;
   for (const Space& space : spaces) {
     const auto found = std::ranges::find(initial, space.name, &InitialValue::block);
@@ -189,7 +189,7 @@ StateHandle Problem::AddState(const std::string& name, SharedMotion model,
   if (!input.stream.empty() && !model->has_input()) {
     Fail(place, "model '" + model->name() + "' has no control input; expected no `input`");
   }
-  Problem changed = *this;  // an exception leaves this problem unchanged
+  Problem changed = *this;  // so that an exception leaves this problem unchanged
   StateHandle handle{name, {}, -1};
   MotionBinding motion{name, std::move(model), {}, {}};
   for (std::size_t i = 0; i < spaces.size(); ++i) {
@@ -223,7 +223,7 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
   const auto landmark_roles = std::ranges::count_if(spaces, &Space::landmark);
   const auto block_roles = std::ssize(spaces) - landmark_roles;
   if (std::ssize(roles) > block_roles) {
-    Fail(place, std::to_string(roles.size()) + " blocks for its roles; expected " +
+    Fail(place, std::to_string(roles.size()) + " blocks for the roles; expected " +
                     std::to_string(block_roles) + ": " + internal::Join(NamesOf(spaces)));
   }
   roles.resize(spaces.size());
@@ -234,20 +234,21 @@ SensorHandle Problem::AddSensor(const std::string& name, SharedSensor model,
     if (!spaces[i].landmark() && !is_owned(i)) CheckRole(*this, spaces[i], roles[i], place);
     const BlockId block = roles[i].block;
     if (block < 0 || std::ranges::count(roles, block, &RoleBinding::block) < 2) continue;
-    Fail(place, "block '" + layout[block].name + "' fills two roles; expected one block for each");
+    Fail(place, "block '" + layout[block].name +
+                    "' fills two roles; expected a different block for each role");
   }
   for (const auto& entry : options.owned) {
     const std::size_t role = entry.first;
     if (role < spaces.size() && is_owned(role)) continue;
     Fail(place, "role " + std::to_string(role) +
-                    " in the option `owned` is not a state of the sensor; expected a role with "
+                    " in the option `owned` is not a model parameter state; expected a role with "
                     "the flag ALIDADE_ROLE_OWNED and without a block");
   }
   if (options.loss.kind != LossKind::kNone && !(options.loss.scale > 0.0)) {
     Fail(place, "the robust loss has the scale " + internal::RoundedText(options.loss.scale) +
                     "; expected > 0");
   }
-  Problem changed = *this;  // an exception leaves this problem unchanged
+  Problem changed = *this;  // so that an exception leaves this problem unchanged
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     if (!is_owned(i)) continue;
     const auto option = options.owned.find(i);
@@ -271,12 +272,12 @@ BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, con
                                 OwnedState state) {
   const std::string place = "sensor '" + sensor + "'";
   if (!state.initial.sensor.empty()) {
-    Fail(place,
-         "its state '" + role.name + "' cannot start from a measurement; expected mean and sigma");
+    Fail(place, "model parameter state '" + role.name +
+                    "' cannot start from a measurement; expected mean and sigma");
   }
   const std::string name = sensor + '.' + role.name;
   if (problem.layout.Find(name) >= 0) {
-    Fail(place, "its state '" + name + "' already exists; expected another name");
+    Fail(place, "model parameter state '" + name + "' already exists; expected another name");
   }
   Prior prior = PriorOf(state.initial, role, -1, place);
   const BlockStatus status = state.initial.status;
@@ -286,7 +287,7 @@ BlockId internal::AddOwnedState(Problem& problem, const std::string& sensor, con
   OwnedRole checked = state.process;
   const std::string defect = CheckOwned(role.geometry, checked);
   if (!defect.empty()) {
-    Fail(place, "the dynamics of its state '" + role.name + "' " + defect);
+    Fail(place, "the dynamics of the model parameter state '" + role.name + "' " + defect);
   }
   prior.block = problem.layout.Declare(name, sensor, role, status);
   problem.motions.push_back({sensor, OwnedMotion(role.geometry, state.process), {prior.block}});

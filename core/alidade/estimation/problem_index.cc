@@ -6,7 +6,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Appends a role with the offsets of its block. A known role has no columns in H.
+/// Appends a role with the offsets of its block. Known roles have no columns in H.
 void AddRole(SensorPlace& place, const Block& block, bool is_known, bool is_consider) {
   place.values.push_back(block.value_offset);
   place.is_known.push_back(is_known ? 1 : 0);
@@ -38,7 +38,8 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial) {
   return place;
 }
 
-/// Appends the range of a block with this geometry and this offset in x. Merges adjacent vectors.
+/// Appends the range of a block with this geometry and this offset in x. If the block and the
+/// previous range are adjacent vectors, extends that range.
 void AddRange(std::vector<MotionPlace::ValueRange>& ranges, const Geometry& geometry, int offset) {
   const bool is_curved = !geometry.is_vector();
   const bool is_adjacent = !ranges.empty() && !is_curved && ranges.back().geometry == nullptr &&

@@ -13,26 +13,26 @@ namespace alidade::internal {
 /// Pointers to the values of the roles of a sensor.
 using Roles = std::array<const double*, kMaxRoles>;
 
-/// Offsets of the roles of a sensor in x, P and H. The roles of a landmark come last, and get their
-/// offsets when a measurement names the landmark.
+/// Offsets of the roles of a sensor in x, P and H. The roles of a landmark come last. Their offsets
+/// are set when a measurement names the landmark.
 struct SensorPlace {
   int sensor = -1;  ///< index into Problem::sensors
   const SensorBinding* binding = nullptr;
-  std::vector<int> values;                 ///< by role: offset in x; -1: the role has no block
-  std::vector<char> is_known;              ///< by role: whether its mode is RoleMode::kKnown
-  std::vector<int> columns;                ///< by role: first column of its Jacobian in H; -1: zero
-  std::vector<int> strides;                ///< by role, for the model: `width`
-  std::vector<JacobianPart> parts;         ///< of a row of H, one for each role with a Jacobian
-  std::vector<int> rows;                   ///< of P, by column of H
-  std::vector<bool> is_consider;           ///< by part: whether its mode is RoleMode::kConsider
-  bool has_consider = false;               ///< whether any part is a consider state
+  std::vector<int> values;          ///< by role: offset in x; -1: the role has no block
+  std::vector<char> is_known;       ///< by role: whether its mode is RoleMode::kKnown
+  std::vector<int> columns;         ///< by role: first column of its Jacobian in H; -1: zero
+  std::vector<int> strides;         ///< by role: stride of its Jacobian for the model, `width`
+  std::vector<JacobianPart> parts;  ///< parts of a row of H: one for each role with a Jacobian
+  std::vector<int> rows;            ///< by column of H: row of P
+  std::vector<bool> is_consider;    ///< by part: whether its mode is RoleMode::kConsider
+  bool has_consider = false;        ///< whether any part is a consider state
   bool linearises_at_measurement = false;  ///< whether a role has JacobianAt::kMeasurement
   bool has_landmark = false;
-  int width = 0;             ///< columns of H
-  int ambient = 0, dof = 0;  ///< sizes of the measurement
+  int width = 0;             ///< number of columns of H
+  int ambient = 0, dof = 0;  ///< ambient and tangent size of the measurement
   int known_size = 0;        ///< number of known numbers of a measurement
 
-  /// Sets the offsets of the roles from `first` on to those of the blocks of a landmark.
+  /// Sets the offsets of the roles from `first` on to the offsets of the blocks of a landmark.
   void PutLandmark(std::size_t first, const StateLayout& layout,
                    const std::vector<BlockId>& blocks);
 };
@@ -42,23 +42,23 @@ struct MotionPlace {
   /// Range of adjacent values of x.
   struct ValueRange {
     int offset, size;
-    const Geometry* geometry;  ///< manifold to normalise to; null: a vector
+    const Geometry* geometry;  ///< manifold to which the values are normalised; null: a vector
   };
   std::vector<int> values;                      ///< by block: offset in x
-  std::vector<ValueRange> block_ranges;         ///< of all blocks
-  std::vector<ValueRange> non_constant_ranges;  ///< of the blocks that are not constant
+  std::vector<ValueRange> block_ranges;         ///< ranges of all blocks
+  std::vector<ValueRange> non_constant_ranges;  ///< ranges of the blocks that are not constant
   std::vector<int> at;                          ///< by row of F: row of P; -1: not in P
-  std::vector<int> rows;                        ///< the rows of P
+  std::vector<int> rows;                        ///< rows of P that belong to the blocks
   std::vector<int> present;                     ///< by element of `rows`: row of F
   bool holds = false;  ///< whether the noise is discrete, constant over an interval
 };
 
 /// Problem with its names resolved to indices: the stream of each sensor, and the offsets of the
-/// blocks of sensors and motion models. The offsets never change, not even those of blocks without
-/// a value. Landmarks come after them.
+/// blocks of sensors and motion models. The offsets are reserved for blocks without a value too, so
+/// they never change. The blocks of landmarks come after all other blocks.
 struct ProblemIndex {
   /// `source_streams` are the streams of the source, in the order of Measurement::stream.
-  /// ContractViolation if the stream of a sensor has another size than its measurement.
+  /// ContractViolation if the size of a stream differs from the size of its sensor's measurement.
   ProblemIndex(Problem indexed_problem, const std::vector<StreamInfo>& source_streams);
 
   const Problem problem;
@@ -66,7 +66,7 @@ struct ProblemIndex {
   const State initial;  ///< has memory for every block with a prior
   std::vector<SensorPlace> sensor_places;
   std::vector<MotionPlace> motion_places;
-  std::vector<int> stream_of_sensor;  ///< -1: the source has no stream of that name
+  std::vector<int> stream_of_sensor;  ///< by sensor: index of the stream; -1: not in the source
   bool has_consider = false;          ///< whether a role of a sensor is a consider state
 };
 

@@ -6,20 +6,21 @@
 
 namespace alidade::internal {
 
-/// Recovery of a filter: repairs P if rounding made it indefinite, and resets blocks if a sensor is
-/// rejected too often in a row. A copy is a snapshot.
+/// Recovery of a filter. Repairs P if rounding errors made it indefinite. Resets or inflates blocks
+/// if a sensor is rejected too often in a row. A copy is a snapshot.
 class Recovery {
  public:
   explicit Recovery(const EkfOptions& options) : options_(options) {}
 
-  /// Sets the negative pivots of the L D L' of P to zero, if P is not positive semi-definite (event
-  /// `repaired`). After max_covariance_repairs repairs the next one ends the filter. Called after
-  /// an update whose S was not positive definite.
+  /// Called after an update whose S was not positive definite. If P = L D L' is not positive
+  /// semi-definite, sets its negative pivots to zero (event `repaired`). Ends the filter if more
+  /// than max_covariance_repairs repairs are needed.
   void RepairCovariance(FilterState& f);
-  /// Resets the block that the measurement determines (event `rejection_recovery`). The covariance
-  /// of the other blocks of its motion model becomes an upper bound of prior and current
-  /// covariance. If a reset is not possible, inflates the covariance of the blocks of the sensor,
-  /// once until its next acceptance. Called when the sensor was rejected too often in a row.
+  /// Called when a sensor was rejected too often in a row. Resets the block that the measurement
+  /// determines (event `rejection_recovery`). Sets the covariance of the other blocks of the same
+  /// motion model to an upper bound of prior and current covariance. If a reset is not possible,
+  /// inflates the covariance of the sensor's blocks. This is done only once before a measurement of
+  /// the sensor is accepted again.
   void Recover(FilterState& f, PendingMeasurement& pending);
 
  private:

@@ -13,14 +13,14 @@ enum class LossKind {
   kCauchy,  ///< logarithmic beyond the scale
 };
 
-/// Robust loss rho of the Mahalanobis distance d >= 0 of a residual, with the scale k
-/// [Holland1977]. The weight w(d) = rho'(d) / d of a squared error results in the same gradient. A
-/// measurement with covariance R has the effect of a measurement with covariance R / w.
+/// Robust loss rho(d) of the Mahalanobis distance d >= 0 of a residual, with the scale k
+/// [Holland1977]. A squared error with the weight w(d) = rho'(d) / d has the same gradient. A
+/// measurement with the covariance R therefore acts like one with the covariance R / w.
 struct LossFunctions {
-  const char* name;  ///< in configs
+  const char* name;  ///< name in configs
   double (*rho)(double d, double k);
   double (*weight)(double d, double k);     ///< w(d), in [0, 1]
-  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: rho as a function of d^2
+  double (*curvature)(double d, double k);  ///< w'(d) / (2 d), d > 0: curvature of rho over d^2
 };
 
 /// Functions of all losses, indexed by LossKind.

@@ -11,34 +11,35 @@
 
 namespace alidade {
 
-/// Processed frame: its report, and a copy of the estimator after it. An estimator that has failed
-/// does not process further frames: their reports are empty.
+/// Processed frame, with its report and a copy of the estimator after the frame. An estimator that
+/// has failed does not process further frames. The reports of these frames are empty.
 struct ProcessedFrame {
   Frame frame;
   UpdateReport report;
   std::unique_ptr<Estimator> snapshot;
 };
 
-/// Latest frames of an estimator, with a copy of the estimator after each (Estimator::Clone).
-/// Implements the rollback of programs (Rollback) and of runs.
+/// Latest frames of an estimator, each with a copy of the estimator after the frame
+/// (Estimator::Clone). Used for the rollback in programs (Rollback) and in runs.
 class Snapshots {
  public:
-  /// Starts with a copy of an estimator before its first frame. ContractViolation if it cannot be
-  /// copied.
+  /// Starts with a copy of an estimator before its first frame. ContractViolation if the estimator
+  /// cannot be copied.
   explicit Snapshots(const Estimator& start);
 
   const std::deque<ProcessedFrame>& frames() const { return frames_; }
-  /// Returns the last released frame. Before the first Release, returns the initial estimator
-  /// without a frame.
+  /// Returns the frame that was released last. Before the first Release, returns the initial
+  /// estimator without a frame.
   const ProcessedFrame& released() const { return released_; }
-  /// Sets the estimator back to its copy before the frame `first`, and processes `frames`, which
+  /// Returns the estimator to its copy before the frame `first`, and processes `frames`, which
   /// replace that frame and all later ones. If `first` is frames().size(), `frames` are appended.
-  /// If the estimator throws, nothing is changed, except the estimator if `frames` are appended.
+  /// If the estimator throws, the snapshots are unchanged. The estimator is then also unchanged,
+  /// unless `frames` were to be appended.
   void Replace(std::size_t first, std::vector<Frame> frames, std::unique_ptr<Estimator>& estimator);
-  /// Releases the oldest frame: it can no longer be replaced. ContractViolation if frames() is
-  /// empty.
+  /// Releases the oldest frame, which can then no longer be replaced. ContractViolation if frames()
+  /// is empty.
   void Release();
-  /// Returns the copy of the estimator after released(). These snapshots are then unusable.
+  /// Returns the copy of the estimator after released(). This object must not be used afterwards.
   std::unique_ptr<Estimator> ReleasedEstimator() && { return std::move(released_.snapshot); }
 
  private:
@@ -49,11 +50,12 @@ class Snapshots {
 /// Rollback for out-of-sequence measurements: a filter that accepts frames in any order and
 /// processes them in the order of their timestamps.
 ///
-/// It stores the frames of the last `window_s` seconds, with a copy of the filter after each. If a
-/// frame is older than the newest one, the filter returns to the copy before it, and processes this
-/// frame and the later ones again. Its state then equals, bit by bit, the state after the same
-/// frames in order. Frames with equal timestamps are processed in their order of arrival. Movable,
-/// not copyable; a copy of filter() is independent.
+/// Rollback stores the frames of the last `window_s` seconds, each with a copy of the filter after
+/// it. If a new frame is older than the newest one, the filter returns to the copy before the new
+/// frame. It then processes the new frame, and the later ones again. The state then equals, bit by
+/// bit, the state after processing the same frames in order. Frames with equal timestamps are
+/// processed in their order of arrival. Rollback can be moved, but not copied. A copy of filter()
+/// is independent.
 class Rollback {
  public:
   /// Frames that a call processed, in the order of their timestamps. Valid until the next call.
@@ -74,12 +76,12 @@ class Rollback {
   /// Starts from a copy of `filter`. ContractViolation if window_s is negative or not a number.
   Rollback(const Filter& filter, double window_s);
 
-  /// Processes the frame. Returns it, followed by the later frames that were processed again. A
-  /// frame more than window_s older than the newest is rejected: its report is `stale`, with an
-  /// event, and the filter is unchanged.
+  /// Processes the frame. Returns the frame, followed by the later frames that were processed
+  /// again. A frame that is more than window_s older than the newest one is rejected: the filter is
+  /// unchanged, and the report has `stale` set and contains an event.
   Processed Process(Frame frame);
-  /// Calls Process with the readings of one timestamp. Errors: those of Filter::Push; the filter is
-  /// then unchanged.
+  /// Calls Process with the readings of one timestamp. Throws the errors of Filter::Push; the
+  /// filter is then unchanged.
   template <std::floating_point Seconds>
   Processed Push(Seconds t_s, const std::vector<Reading>& readings) = delete;
   Processed Push(Timestamp timestamp, const std::vector<Reading>& readings) {
@@ -92,9 +94,9 @@ class Rollback {
   Processed Reject(Frame frame);
 
   Timestamp window_;
-  std::unique_ptr<Estimator> filter_;  // a Filter, as are its copies
+  std::unique_ptr<Estimator> filter_;  // a Filter; so are its copies
   Snapshots snapshots_;
-  std::deque<ProcessedFrame> rejected_;  ///< by the last call
+  std::deque<ProcessedFrame> rejected_;  ///< frames that the last call rejected
 };
 
 namespace internal {

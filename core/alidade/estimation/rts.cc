@@ -11,14 +11,14 @@ namespace alidade {
 namespace internal {
 
 /// Backward step over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A + information. If the
-/// frame starts inside an interval, A has columns for w after those of x.
+/// frame starts inside an interval, A has columns for w after the columns for x.
 struct Adjoint {
   Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
   Eigen::VectorXd b;
   Eigen::MatrixXd information;
 
-  /// Applies the step to lambda and Lambda. `end_noise` is the number of their rows for w, after
-  /// those for x, at the end of the frame.
+  /// Applies the step to lambda and Lambda. At the end of the frame, both have `end_noise` rows for
+  /// w after the rows for x.
   void StepBack(Eigen::Index end_noise, Eigen::VectorXd& lambda,
                 Eigen::MatrixXd& lambda_matrix) const {
     const Eigen::Index n = a.rows(), start_noise = a.cols() - n;
@@ -31,7 +31,7 @@ struct Adjoint {
   }
 };
 
-/// EkfEquations that record their steps and updates as an adjoint.
+/// EkfEquations that also record each step and update as a backward step (Adjoint).
 class RecordingEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -47,7 +47,7 @@ class RecordingEquations : public UpdateMethod {
   }
   Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) override;
 
-  /// Starts the record of a new frame.
+  /// Starts recording a new frame.
   void StartFrame(const FilterState& f);
   const Adjoint& frame() const { return frame_; }
 
@@ -101,12 +101,12 @@ Outcome RecordingEquations::Correct(FilterState& f, std::span<PendingMeasurement
 
 }  // namespace internal
 
-/// Record of one frame of the forward pass, with the estimate of the filter after it.
+/// Record of one frame of the forward pass, with the estimate after the frame.
 struct RtsSmoother::ForwardFrame {
   internal::Adjoint adjoint;
   std::vector<double> x;
   Eigen::MatrixXd p;
-  Eigen::MatrixXd m;  ///< M inside an interval, else n x 0
+  Eigen::MatrixXd m;  ///< M if the frame ends inside an interval, else n x 0
   UpdateReport report;
 };
 
@@ -141,7 +141,7 @@ const UpdateReport& RtsSmoother::Process(const Frame& frame) {
     m = f.motions.NoiseColumns(&internal::Motions::Step::m, f.size(), work);
   forward_frames_.push_back(
       {equations_->frame(), f.state.values(), f.state.covariance().Dense(), m, f.report});
-  forward_frames_.back().report.events.clear();  // reported by Process
+  forward_frames_.back().report.events.clear();  // Process has reported them already
   return f.report;
 }
 
@@ -152,18 +152,19 @@ void RtsSmoother::Smooth(const Emit& emit) {
   std::vector<Event> events;
   State smoothed = state();
   for (auto frame = forward_frames_.rbegin(); frame != forward_frames_.rend(); ++frame) {
-    const Eigen::Index noises = lambda.size() - n;  // discrete noise, if the interval continues
-    Eigen::MatrixXd joint(n, n + noises);           // Cov(x, (x, w))
+    const Eigen::Index noises =
+        lambda.size() - n;                 // number of elements of w, if the interval continues
+    Eigen::MatrixXd joint(n, n + noises);  // Cov(x, (x, w))
     joint.leftCols(n) = frame->p;
     joint.rightCols(noises) = frame->m.leftCols(noises);
     const Eigen::MatrixXd p = frame->p - internal::Congruence(joint, information);
     const bool is_positive = (p.diagonal().array() >= 0.0).all();
     if (!is_positive) {
       events.push_back({timestamp(), EventKind::kNotPd,
-                        "a smoothed variance in frame " +
+                        "rounding made a smoothed variance in frame " +
                             std::to_string(forward_frames_.rend() - frame - 1) +
-                            " is negative because of rounding; the covariance of the filter "
-                            "replaces the smoothed one"});
+                            " negative; the covariance of the forward pass "
+                            "replaces the smoothed covariance"});
     }
     smoothed.values() = frame->x;
     smoothed.Retract((joint * lambda).eval().data(), frame->x);

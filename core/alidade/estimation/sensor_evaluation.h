@@ -4,21 +4,21 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem_index.h"
 
-/// Evaluation of sensor models at values x of the whole state, such as the estimate of a filter, an
-/// iterate, a sigma point or an iterate of a batch. m: tangent size of the measurement.
+/// Evaluation of sensor models at a value x of the whole state, such as an estimate, a sigma point
+/// or an iterate. m: tangent size of the measurement.
 namespace alidade::internal {
 
-/// Sets the pointers to the values of the roles of a sensor: in x, or in `known_roles` for known
-/// roles. The pointer of a role without a block is null.
+/// Sets the pointers to the values of the roles of a sensor. Known roles point into `known_roles`,
+/// the other ones into x. The pointer of a role without a block is null.
 void RolesAt(const SensorPlace& place, const double* x, const double* known_roles, Roles& roles);
 
-/// Destinations of an evaluation, row-major; null: not computed.
+/// Destinations of an evaluation, row-major. A quantity is not computed if its pointer is null.
 struct EvaluationOutput {
   double* h = nullptr;         ///< ambient
-  double* jacobian = nullptr;  ///< H, m rows of the width of the place; requires h
-  double* l = nullptr;         ///< of R = L L', m x m
+  double* jacobian = nullptr;  ///< H, m rows of SensorPlace::width columns; computed only with h
+  double* l = nullptr;         ///< L of R = L L', m x m
 };
-/// Evaluates a sensor model at the roles.
+/// Evaluates a sensor model at the values of the roles.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
                    const Measurement& measurement, const double* const* roles,
                    const EvaluationOutput& output);
@@ -38,8 +38,8 @@ inline void Square(const double* l, int m, double* r) {
   }
 }
 
-/// Computes R at the roles, or copies the covariance of the measurement, m x m, row-major. `l` is
-/// temporary memory of the same size.
+/// Computes R, m x m, row-major, at the values of the roles. If the measurement has a covariance,
+/// copies it to R instead. `l` is temporary memory of the same size.
 Outcome NoiseAt(const SensorModel& model, const SensorPlace& place, const Measurement& measurement,
                 const double* const* roles, double* l, double* r);
 

@@ -15,8 +15,8 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Replaces A, m x n, m >= n, by the factor R of A = Q R, in the upper triangle of the first n
-/// rows. The elements below it are unspecified. `work`: n numbers.
+/// Computes the factor R of A = Q R, for A of m x n, m >= n. Writes R to the upper triangle of the
+/// first n rows of A. All other elements of A are then unspecified. `work` is memory for n numbers.
 void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
   for (Eigen::Index k = 0; k < a.cols(); ++k) {
     const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
@@ -28,7 +28,7 @@ void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
   }
 }
 
-/// Computes `root`, n x n, with root root' = a a' + b b', for a n x n.
+/// Computes `root`, n x n, with root root' = a a' + b b'. The matrix a is n x n.
 void ComputeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
                  Eigen::MatrixXd& root) {
   const Workspace::Use use(f.work);
@@ -41,8 +41,8 @@ void ComputeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Ma
   root = tall.topRows(n).transpose();
 }
 
-/// Equations of SquareRootEkf: Jacobians from EkfEquations, and a root of P from which P is
-/// computed.
+/// Equations of SquareRootEkf. Uses the Jacobians of EkfEquations, stores a root of P, and computes
+/// P from the root.
 class SquareRootEquations : public UpdateMethod {
  public:
   std::unique_ptr<UpdateMethod> Clone() const override {
@@ -69,7 +69,7 @@ class SquareRootEquations : public UpdateMethod {
 
   EkfEquations ekf_;
   Eigen::MatrixXd root_;
-  Eigen::MatrixXd conditional_root_;    ///< B, during an interval of discrete noise
+  Eigen::MatrixXd conditional_root_;    ///< B; used in an interval of discrete noise
   std::vector<NoiseRoot> noise_roots_;  ///< by sensor; reused memory
 };
 
@@ -131,7 +131,8 @@ Outcome SquareRootEquations::Correct(FilterState& f, std::span<PendingMeasuremen
   const Workspace::Use use(f.work);
   const StackedMeasurements stacked = Stack(f, rows);
   const Eigen::Index n = root_.rows(), m = stacked.h.rows();
-  Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);  // array: transposed
+  Workspace::Matrix array = f.work.Take(m + n, m + n),
+                    hl = f.work.Take(m, n);  // array is the transposed array
   array.setZero();
   Eigen::Index offset = 0;
   for (const PendingMeasurement* pending : rows) {

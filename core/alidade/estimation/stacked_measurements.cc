@@ -6,7 +6,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Calls visit(measurement, offset) for each measurement; `offset` is its first of the m rows.
+/// Calls visit(measurement, offset) for each measurement. `offset` is the first row of the
+/// measurement.
 template <class Visit>
 void ForEachOffset(std::span<PendingMeasurement* const> rows, const Visit& visit) {
   Eigen::Index offset = 0;

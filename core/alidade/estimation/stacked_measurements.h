@@ -6,19 +6,20 @@
 
 #include "alidade/estimation/pending_measurements.h"
 
-/// Stacked matrices of the measurements of an update. m: sum of their dof, n: size of P.
+/// Stacked matrices of the measurements of an update. m: total tangent size of the measurements, n:
+/// size of P.
 namespace alidade::internal {
 
 /// Returns m.
 int TotalDof(std::span<PendingMeasurement* const> rows);
 
-/// Returns whether the gain is reported. It is not reported for sensors of landmarks, whose blocks
-/// are added and removed during a run.
+/// Returns whether the gain of a measurement is reported. The gain is not reported for sensors of
+/// landmarks, because their blocks are added and removed during a run.
 inline bool GainIsRecorded(const PendingMeasurement& pending) {
   return !pending.place->has_landmark;
 }
-/// Writes the columns of K to the reports. Calls copy(rows of P, column, count, destination) for
-/// each measurement.
+/// Writes the columns of K to the reports of the measurements. Calls copy(rows of P, column, count,
+/// destination) for each measurement.
 template <class Copy>
 void RecordGainBy(const FilterState& f, std::span<PendingMeasurement* const> rows,
                   const Copy& copy) {
@@ -35,7 +36,7 @@ void RecordGainBy(const FilterState& f, std::span<PendingMeasurement* const> row
     column += m;
   }
 }
-/// Writes the columns of the matrix K to the reports.
+/// Writes the columns of the matrix K to the reports of the measurements.
 void RecordGain(const FilterState& f, std::span<PendingMeasurement* const> rows,
                 const ConstMatrix& gain);
 
@@ -45,9 +46,9 @@ struct StackedMeasurements {
   Workspace::Vector innovation;  ///< m
 };
 
-/// Returns the stacked H, R and innovation, in f.work.
+/// Returns the stacked H, R and innovation, stored in f.work.
 StackedMeasurements Stack(FilterState& f, std::span<PendingMeasurement* const> rows);
-/// Return H, R or the innovation alone, in f.work.
+/// Each of these returns only H, only R or only the innovation, stored in f.work.
 Workspace::Matrix JacobianOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<PendingMeasurement* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<PendingMeasurement* const> rows);

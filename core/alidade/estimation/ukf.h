@@ -10,50 +10,51 @@ namespace alidade {
 
 /// Options of Ukf.
 struct UkfOptions {
-  /// The rounding error of the mean of values y is eps |y| / (2 alpha^2): 1e-8 |y| with this alpha.
+  /// Minimum of alpha. The rounding error of a mean of values y is eps |y| / (2 alpha^2), so 1e-8
+  /// |y| at the minimum.
   static constexpr double kMinAlpha = 1e-4;
 
-  EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` counts as kNone
+  EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` is ignored
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
-  double beta = 2.0;    ///< weight of the centre in the covariance, >= 0; 2: best for a Gaussian
-  double kappa = 0.0;   ///< spread beyond the number of directions, >= 0
+  double beta = 2.0;  ///< weight of the centre in the covariance, >= 0; 2 is optimal for a Gaussian
+  double kappa = 0.0;  ///< is added to the number of directions N in the spread, >= 0
 };
 
 /// Unscented Kalman filter: computes the moments of y = g(x), x ~ N(x0, A A'), from 2N + 1 sigma
-/// points. A comes from the pivoted L D L' of P, which may be singular.
+/// points. A is computed from the pivoted factorisation L D L' of P. P may be singular.
 ///
 ///   points     x0,  x0 (+) c a_i,  x0 (+) -c a_i        a_i: columns of A, i = 1 ... N
 ///   spread     c^2 = alpha^2 (N + kappa),   w = 1 / (2 c^2)
 ///   mean       y = g(x0) (+) m,   m = w sum f_i         f_i = g(x_i) (-) g(x0), at the mean
 ///   moments    Cov(y) = w sum f_i f_i' + (beta - alpha^2) m m',   Cov(x, y) = w sum dx_i f_i'
 ///
-/// This is the scaled transform without its large weight of the centre, which cancels. The mean on
-/// a manifold is computed by iteration.
+/// This equals the scaled transform. The large weight of the centre, which would cause rounding
+/// errors, cancels in these formulas. The mean on a manifold is computed by iteration.
 ///
-/// Process noise is augmented: N = n + noise inputs. Discrete noise w is constant over an interval.
-/// From its second step on, the points are those of (x, w) with Cov(x, w) = M, in the directions
-/// (b_i, 0), B B' = P - M M', and (m_j, e_j).
+/// The state is augmented by the process noise: N = n + number of noise inputs. Discrete noise w is
+/// constant over an interval. From the second step of an interval on, the points belong to (x, w)
+/// with Cov(x, w) = M. Their directions are (b_i, 0), with B B' = P - M M', and (m_j, e_j).
 ///
-/// R of a measurement is evaluated at x0; S = Cov(h) + R, K = Cov(x, h) S^-1. The new P is
-/// Cov(x - K h) + K R K', computed with dx_i - K f_i instead of f_i; if beta >= alpha^2 it is a sum
-/// of squares. With a robust loss, R / w replaces R. A joint update uses the smallest spread of its
-/// measurements; the reported h, S and NIS are those of the gate.
+/// In an update, S = Cov(h) + R and K = Cov(x, h) S^-1, with R evaluated at x0. The new P is Cov(x
+/// - K h) + K R K', computed with dx_i - K f_i instead of f_i. If beta >= alpha^2, this is a sum of
+/// squares. If the sensor has a robust loss, R / w replaces R. A joint update uses the smallest
+/// spread among its measurements. The reported h, S and NIS are those that the gate used.
 ///
-/// Sigma points may leave the domain of a model that is defined at x0, or be too far apart on a
-/// manifold to have a mean. Their spread is then halved until neither occurs (event `guarded`), as
-/// long as alpha is above 1e-4 because of rounding (UkfOptions::kMinAlpha). If that is not
-/// sufficient, a measurement is out of domain, and a step ends the filter. A sensor that is not
-/// defined at x0 is out of domain. If P is not positive semi-definite, negative pivots count
-/// as zero (event `repaired`).
+/// Sigma points may be out of domain although the model is defined at x0, or too far apart on a
+/// manifold to have a mean. The spread is then halved until neither occurs (event `guarded`).
+/// Halving stops before alpha falls below UkfOptions::kMinAlpha. If the smallest spread is still
+/// too large, a measurement is out of domain, and a step ends the filter. If h is not defined at
+/// x0, the measurement is out of domain. If P is not positive semi-definite, negative pivots are
+/// set to zero (event `repaired`).
 ///
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
 class Ukf : public Filter {
  public:
-  /// No consider blocks or roles, no blocks that start from a measurement, no roles with
-  /// `jacobian_at: measurement`, no rejection recovery, no landmarks.
+  /// Does not support consider blocks or roles, blocks that start from a measurement, roles with
+  /// `jacobian_at: measurement`, rejection recovery, or landmarks.
   static constexpr EstimatorCapabilities kCapabilities = {};
 
-  /// Errors: kBadConfig if `problem` asks for more than kCapabilities or an option is out of its
+  /// Throws Error kBadConfig if `problem` needs more than kCapabilities, or an option is out of
   /// range.
   Ukf(Problem problem, const UkfOptions& options, const std::vector<StreamInfo>& streams);
   explicit Ukf(const Problem& problem, const UkfOptions& options = {})

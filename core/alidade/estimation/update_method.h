@@ -8,33 +8,34 @@
 
 namespace alidade::internal {
 
-/// Propagation and correction equations of one type of Kalman filter: steps x and P, predicts a
-/// measurement, corrects x and P by measurements. Independent of gates and frames.
+/// Equations of one type of Kalman filter: propagate x and P, predict a measurement, correct x and
+/// P by measurements. Independent of gates and frames.
 class UpdateMethod {
  public:
   virtual ~UpdateMethod() = default;
-  /// Returns a copy of the method, with its own data.
+  /// Returns a copy of the method that shares no data with it.
   virtual std::unique_ptr<UpdateMethod> Clone() const = 0;
 
   /// Returns the square root of P if the method stores one, else null.
   virtual const Eigen::MatrixXd* Root() const { return nullptr; }
   /// Called once, before the first frame, with the initial x and P.
   virtual void Begin(FilterState& /*f*/) {}
-  /// Propagates x and P by dt_s. If it fails, both are unchanged and the error is returned.
+  /// Propagates x and P by dt_s. If this fails, returns the error and leaves x and P unchanged.
   virtual StepError Step(FilterState& f, double dt_s) = 0;
-  /// Starts an update by measurements of at most `capacity` rows in total.
+  /// Starts an update with measurements that have at most `capacity` rows in total.
   virtual void BeginUpdate(FilterState& /*f*/, int /*capacity*/) {}
-  /// Computes h, the innovation and R of one measurement at the state. Returns kAccepted, or the
-  /// reason for a failure, which it also reports as an event.
+  /// Computes h, the innovation and R of one measurement at the current state. Returns kAccepted or
+  /// the reason for a failure. A failure is also reported as an event.
   virtual Outcome Predict(FilterState& f, PendingMeasurement& pending) = 0;
-  /// Computes S of a measurement that Predict accepted, and writes it to its report. Returns the
-  /// NIS, or NaN unless S is finite and positive definite. The measurement uses the columns of the
-  /// update from linearised.column on, after those of the measurements accepted before it.
+  /// Computes S of a measurement that Predict accepted, and writes S to the report. Returns the
+  /// NIS, or NaN if S is not finite or not positive definite. The measurement uses the columns of
+  /// the update from linearised.column on, after the columns of the measurements accepted before.
   virtual double ComputeNis(FilterState& f, PendingMeasurement& pending) = 0;
-  /// Corrects x and P by one stacked update, in the order of ComputeNis. R and S include the robust
-  /// weights. Returns kAccepted and writes the gains to the reports (RecordGain). Otherwise x and P
-  /// are unchanged, and the reason is returned. The reason is also reported as an event, except
-  /// kNotPd and kNotFinite. The report of the measurement that caused it may have another outcome.
+  /// Corrects x and P by one stacked update, in the order of the calls of ComputeNis. R and S
+  /// include the robust weights. If the update succeeds, writes the gains to the reports
+  /// (RecordGain) and returns kAccepted. Otherwise leaves x and P unchanged and returns the reason.
+  /// Also reports the reason as an event, unless it is kNotPd or kNotFinite. The report of the
+  /// measurement that caused the failure may contain another outcome.
   virtual Outcome Correct(FilterState& f, std::span<PendingMeasurement* const> rows) = 0;
 };
 

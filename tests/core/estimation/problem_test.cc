@@ -168,7 +168,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto&) {
               p.AddState("b", Constant<1>(1), {{"value", 0.0, 1.0}, {"value", 1.0, 1.0}});
             }),
-            "state 'b': two initial values of 'value'; expected one");
+            "state 'b': two initial values of 'value'; expected only one");
   EXPECT_EQ(
       Refusal([](Problem& p, auto&) {
         p.AddState("b", Constant<3>(3),
@@ -185,7 +185,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"]}, {.owned = {{0, OwnedState::Of({})}}});
             }),
-            "sensor 's': role 0 in the option `owned` is not a state of the sensor; expected a "
+            "sensor 's': role 0 in the option `owned` is not a model parameter state; expected a "
             "role with the flag ALIDADE_ROLE_OWNED and without a block");
   EXPECT_EQ(Refusal([](Problem&, auto& target) { static_cast<void>(target["depth"]); }),
             "state 'target': no block 'depth'; expected position, velocity");
@@ -194,7 +194,7 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([&](Problem& p, auto& t) {
               p.AddSensor("s", stereo, {t["position"], t["velocity"]});
             }),
-            "sensor 's': 2 blocks for its roles; expected 1: depth");
+            "sensor 's': 2 blocks for the roles; expected 1: depth");
   EXPECT_EQ(Refusal([&](Problem& p, auto&) {
               const auto wide = p.AddState("wide", Constant<2>(2), {{"value", {0.0, 0.0}, 1.0}});
               p.AddSensor("s", stereo, {wide["value"]});
@@ -203,7 +203,8 @@ TEST(Problem, WhatDoesNotFitIsRefusedInWords) {
   EXPECT_EQ(Refusal([](Problem& p, auto& t) {
               p.AddSensor("s", Scale2d::FromPixels(300.0, 1.0), {t["position"], t["position"]});
             }),
-            "sensor 's': block 'target.position' fills two roles; expected one block for each");
+            "sensor 's': block 'target.position' fills two roles; expected a different block for "
+            "each role");
   EXPECT_EQ(
       Refusal([&](Problem& p, auto& t) {
         p.AddSensor("a", stereo, {t["position"]}, {.stream = "camera"});

@@ -39,6 +39,7 @@ enum class Outcome {
 
 /// Properties of an outcome.
 struct OutcomeInfo {
+  Outcome outcome;
   const char* name;     ///< name in files
   const char* meaning;  ///< a phrase for the documentation
   /// Whether the outcome counts as a rejection for rejection recovery. An outcome `not_finite`
@@ -50,37 +51,54 @@ struct OutcomeInfo {
 /// Properties of all outcomes, indexed by Outcome. To add an outcome, add a value to Outcome and an
 /// entry here.
 inline constexpr std::array kOutcomes = {
-    OutcomeInfo{.name = "accepted",
+    OutcomeInfo{.outcome = Outcome::kAccepted,
+                .name = "accepted",
                 .meaning = "the update used it (also the value before the frame is processed)"},
-    OutcomeInfo{.name = "initialised",
+    OutcomeInfo{.outcome = Outcome::kInitialised,
+                .name = "initialised",
                 .meaning = "it initialised a block and was not used for an update",
                 .is_initialisation = true},
-    OutcomeInfo{.name = "gated",
+    OutcomeInfo{.outcome = Outcome::kGated,
+                .name = "gated",
                 .meaning = "the gate or the outlier rejection rejected it",
                 .is_rejection = true,
                 .is_gated = true},
-    OutcomeInfo{.name = "out_of_domain",
+    OutcomeInfo{.outcome = Outcome::kOutOfDomain,
+                .name = "out_of_domain",
                 .meaning = "h is not defined at the prediction",
                 .is_rejection = true},
     OutcomeInfo{
+        .outcome = Outcome::kInvalid,
         .name = "invalid",
         .meaning = "it is beyond the limits of the sensor, or its covariance is not a covariance"},
-    OutcomeInfo{.name = "not_finite",
+    OutcomeInfo{.outcome = Outcome::kNotFinite,
+                .name = "not_finite",
                 .meaning = "z, h, H, R, S or the update is not finite; an update was rolled back",
                 .is_rejection = true},
     OutcomeInfo{
+        .outcome = Outcome::kNotPd,
         .name = "not_pd",
         .meaning = "S or P would not have been positive definite; the update was rolled back",
         .is_rejection = true},
-    OutcomeInfo{.name = "stale", .meaning = "it is older than the state"},
-    OutcomeInfo{.name = "not_ready",
+    OutcomeInfo{
+        .outcome = Outcome::kStale, .name = "stale", .meaning = "it is older than the state"},
+    OutcomeInfo{.outcome = Outcome::kNotReady,
+                .name = "not_ready",
                 .meaning = "a required block has no value yet",
                 .is_initialisation = true},
-    OutcomeInfo{.name = "failed", .meaning = "the plugin failed"},
-    OutcomeInfo{.name = "ended",
+    OutcomeInfo{.outcome = Outcome::kFailed, .name = "failed", .meaning = "the plugin failed"},
+    OutcomeInfo{.outcome = Outcome::kEnded,
+                .name = "ended",
                 .meaning = "it was not processed, because the estimator had already ended"},
 };
-static_assert(kOutcomes.size() == static_cast<std::size_t>(Outcome::kEnded) + 1);
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < kOutcomes.size(); ++i) {
+        if (kOutcomes[i].outcome != static_cast<Outcome>(i)) return false;
+      }
+      return kOutcomes.back().outcome == Outcome::kEnded;
+    }(),
+    "one row for each outcome, in the order of Outcome");
 /// Returns the properties of an outcome.
 inline const OutcomeInfo& InfoOf(Outcome outcome) {
   return kOutcomes[static_cast<std::size_t>(outcome)];

@@ -6,6 +6,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text.h"
 #include "alidade/experiment/map_metrics.h"
+#include "alidade/experiment/metric_key.h"
 #include "alidade/experiment/run_log.h"
 
 namespace alidade::internal {
@@ -31,12 +32,12 @@ void AddUnitEvents(const Problem& problem, const Metrics& metrics, EstimatorResu
 void AddConsistencyEvents(EstimatorResult& result) {
   const auto add_events = [&](EventKind event, const std::string& kind, const std::string& name,
                               const std::string& subject_kind) {
-    const std::string prefix = kind + ".mean:";
-    for (const auto& [key, mean] : result.metrics) {
-      if (!key.starts_with(prefix)) continue;
-      const std::string subject = key.substr(prefix.size());
-      const auto low = result.metrics.find(kind + ".low:" + subject);
-      const auto high = result.metrics.find(kind + ".high:" + subject);
+    for (const auto& [text, mean] : result.metrics) {
+      const MetricKey key = MetricKey::Parse(text);
+      if (key.name != kind + ".mean" || !key.segment.empty()) continue;
+      const std::string& subject = key.subject;
+      const auto low = result.metrics.find(MetricKey{kind + ".low", subject, ""}.text());
+      const auto high = result.metrics.find(MetricKey{kind + ".high", subject, ""}.text());
       if (low == result.metrics.end() || high == result.metrics.end()) continue;
       if (mean >= low->second && mean <= high->second) continue;
       result.events.push_back({kNoTimestamp, event,
@@ -65,10 +66,10 @@ void AddUnusedEvents(const Problem& problem, EstimatorResult& result) {
   for (const SensorBinding& sensor : problem.sensors) {
     std::int64_t used_count = 0, total = 0;
     std::vector<std::string> unused_counts;
-    for (const auto& [key, count] : result.counts) {
-      const std::size_t colon = key.find(':');
-      const std::string outcome = key.substr(0, colon);
-      if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
+    for (const auto& [text, count] : result.counts) {
+      const MetricKey key = MetricKey::Parse(text);
+      const std::string& outcome = key.name;
+      if (key.subject != sensor.name || outcome == "inputs") continue;
       total += count;
       if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
         used_count += count;

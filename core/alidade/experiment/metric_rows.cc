@@ -21,14 +21,11 @@ namespace alidade {
 namespace internal {
 namespace {
 
-/// Returns the entry of kMetrics for a key; null if the table has no such metric.
-const MetricInfo* InfoOf(const MetricKey& key) { return FindMetric(key.name); }
-
 /// Returns the sort key of a metric. Shown metrics come first, in the order of kMetrics, and the
 /// whole run comes before segments. The last criterion is the name.
 auto Rank(const std::string& text) {
   const MetricKey key = MetricKey::Parse(text);
-  const MetricInfo* const metric = InfoOf(key);
+  const MetricInfo* const metric = FindMetric(key.name);
   const std::size_t index = metric != nullptr && metric->is_shown
                                 ? static_cast<std::size_t>(metric - kMetrics.data())
                                 : kMetrics.size();
@@ -119,7 +116,7 @@ double LargestRmse(const RunResult& result, const std::string& unit) {
 
 /// Returns the unit of a metric in a table, with the factor of its values.
 ScaledUnit ScaledUnitOf(const RunResult& result, const MetricKey& key) {
-  const MetricInfo* const metric = InfoOf(key);
+  const MetricInfo* const metric = FindMetric(key.name);
   if (metric == nullptr) return {};
   switch (metric->unit) {
     case MetricUnit::kSubject: {
@@ -173,7 +170,7 @@ bool IsExact(const RunResult& result, const std::string& subject) {
 
 /// Returns true if tables show the metric. comparison.csv contains all metrics.
 bool IsShown(const RunResult& result, const MetricKey& key) {
-  const MetricInfo* const metric = InfoOf(key);
+  const MetricInfo* const metric = FindMetric(key.name);
   if (metric == nullptr || IsExact(result, key.subject)) return false;
   return key.segment.empty() ? metric->is_shown : metric->is_shown_by_segment;
 }
@@ -190,7 +187,7 @@ std::vector<TableRow> SelectRows(const RunResult& result, const Predicate& is_in
   for (const std::string& text : OrderedCounts(result)) {
     if (!is_included(text)) continue;
     const MetricKey key = MetricKey::Parse(text);
-    TableRow row{key.name + ' ' + (key.subject.empty() ? key.name : key.subject), {}};
+    TableRow row{key.name + (key.subject.empty() ? "" : ' ' + key.subject), {}};
     for (const EstimatorResult& estimator : result.estimators) {
       const auto count = estimator.counts.find(text);
       row.cells.push_back(count == estimator.counts.end() ? "-" : std::to_string(count->second));
@@ -217,7 +214,7 @@ int PriorityOf(const MetricKey& key) {
   constexpr int kAcceptedPriority = 4;
   if (!key.segment.empty()) return 0;
   if (key.name == ToString(Outcome::kAccepted)) return kAcceptedPriority;
-  const MetricInfo* const metric = InfoOf(key);
+  const MetricInfo* const metric = FindMetric(key.name);
   return metric == nullptr ? 0 : metric->priority;
 }
 

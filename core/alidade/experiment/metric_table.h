@@ -375,16 +375,27 @@ inline constexpr std::array kMetrics = {
                .is_shown = true},
 };
 
-/// Returns the index of a metric in kMetrics; kMetrics.size() if no metric has that name.
-constexpr std::size_t IndexOfMetric(std::string_view name) {
-  std::size_t index = 0;
-  while (index < kMetrics.size() && name != kMetrics[index].name) ++index;
-  return index;
-}
 /// Returns the entry of a metric; null if no metric has that name.
 constexpr const MetricInfo* FindMetric(std::string_view name) {
-  const std::size_t index = IndexOfMetric(name);
-  return index < kMetrics.size() ? &kMetrics[index] : nullptr;
+  for (const MetricInfo& metric : kMetrics) {
+    if (name == metric.name) return &metric;
+  }
+  return nullptr;
 }
+
+static_assert(
+    [] {
+      for (const MetricInfo& metric : kMetrics) {
+        const bool is_of_block = metric.block != nullptr, is_of_owner = metric.owner != nullptr;
+        const bool is_of_sensor = metric.sensor != nullptr || metric.implied != nullptr;
+        if (FindMetric(metric.name) != &metric) return false;
+        if (is_of_block + is_of_owner + is_of_sensor > 1) return false;
+        if (is_of_block && metric.subject != MetricSubject::kBlock) return false;
+        if (is_of_owner && metric.subject != MetricSubject::kOwner) return false;
+        if (is_of_sensor && metric.subject != MetricSubject::kSensor) return false;
+      }
+      return true;
+    }(),
+    "names are unique, and a sampled metric has one sample function, which fits its subject");
 
 }  // namespace alidade

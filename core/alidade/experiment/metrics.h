@@ -11,47 +11,24 @@
 
 namespace alidade {
 
-/// Metrics of one estimator, accumulated frame by frame.
+/// Metrics of one estimator, accumulated frame by frame: the entries of kMetrics, but for those of
+/// the map (MapMetrics) and of comparisons.
 ///
-///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
-///   lag_ms:BLOCK        delay after truth as Lag() computes it; > 0 is late. Only for scalar
-///                       blocks with a truth that changes and steps within 5 % of their mean. Uses
-///                       the first 100 000 timestamps
-///   coverage95:BLOCK    share of timestamps with |e| <= 1.96 sigma (scalar blocks)
-///   implied.rmse:SENSOR     RMSE of the state that single measurements of the sensor imply without
-///                           a filter (ImpliedState), unit of the block. All measurements count,
-///                           including gated ones
-///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
-///                       jointly; timestamps at which C is singular or not finite are omitted
-///   nees.low:OWNER, nees.high:OWNER  bounds: nees.mean of a consistent filter lies between
-///                       them with probability 0.95 [BarShalom2001, sec. 5.4]. Errors of a run are
-///                       correlated over time: n timestamps count as n / tau independent samples,
-///                       tau the integrated autocorrelation time of the NEES; n is 10 000 at most
-///   nees.dof:OWNER      number of error elements in the NEES, mean over the timestamps
-///   nees.within95:OWNER share of those timestamps with e' C^-1 e <= chi2(0.95, dof)
-///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
-///   nis.low:SENSOR, nis.high:SENSOR  the same bounds for nis.mean. Innovations are white, but
-///                       those of one frame share the error of the prediction and count as one
-///                       sample
-///   final_error:BLOCK   |e| at the last timestamp
-///   trajectory.sim3.rmse   RMSE of the position from which landmarks are observed, m, after the
-///                       similarity that minimises it [Umeyama1991]
-///   trajectory.sim3.scale  scale of that similarity; true = scale x estimate
-///   reprojection:SENSOR     for landmarks, in the unit of the measurement: the rms of the
-///                           accepted innovations of a frame, median over the run's last half
-///   settling_frames:SENSOR  number of frames until that rms stays at this level, as SettlingOf()
-///                           counts them; infinite if it never stays there
+/// e = x_true (-) x is the error, in the tangent at the estimate. C = P + T is its covariance, and
+/// T = diag(StreamInfo::sigma^2) is that of the truth, which does not depend on the filter.
+/// An exact truth has T = 0. Timestamps at which C is singular or not finite have no NEES.
 ///
-/// C = P + T is the covariance of e, and T = diag(StreamInfo::sigma^2) is the covariance of the
-/// truth, which is independent of the filter. sigma^2 is the diagonal of C. An exact truth has
-/// T = 0.
-/// The metrics rmse, implied.rmse, coverage95, nees.mean, nees.within95 and nis.mean are also
-/// computed for each segment, with a key that ends in `@SEGMENT`. Counts are `OUTCOME:SENSOR`,
-/// `inputs:ENTRY` for control inputs, and for landmarks `landmarks.initialised`, `.deleted`,
-/// `.converted`, `.negative`, `.hypotheses`, `.rescued`. A truth has the name of its block,
-/// `target.depth`, or the last component of that name if only one block has it.
-/// A frame older than the state, for example before `initial_time_s`, changes only the counts.
-/// A metric without samples is omitted. An estimate that is not finite makes its rmse infinite.
+/// The lag needs a scalar block, a truth that changes, and steps within 5 % of their mean. It uses
+/// the first 100 000 timestamps (Lag). The bounds of the mean NEES allow for the correlation of the
+/// errors over time: n timestamps, at most 10 000, count as n / tau samples. tau is the integrated
+/// autocorrelation time of the NEES. Innovations are white, but those of one frame share the error
+/// of the prediction and count as one sample [BarShalom2001, sec. 5.4].
+///
+/// Counts are `OUTCOME:SENSOR`, `inputs:ENTRY` for control inputs, and for landmarks
+/// `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`, `.rescued`.
+/// A truth has the name of its block, `target.depth`, or the last component of that name if only
+/// one block has it. A frame older than the state (before `initial_time_s`, say) changes only
+/// the counts. A metric without samples is omitted.
 class Metrics {
  public:
   /// `truths` are the truths of the source, or the blocks of the reference estimator.

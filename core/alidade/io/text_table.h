@@ -30,7 +30,7 @@ Table MakeTable(const std::vector<std::string>& names, const std::vector<TableRo
                 const std::string& corner = "");
 
 enum class TableFormat {
-  kText,      ///< columns that do not fit into 100 characters continue in a table below
+  kText,      ///< aligns only the first column to the left; wide tables continue below
   kMarkdown,  ///< special characters are escaped
   kLatex,     ///< a `tabular` environment, which needs no package; special characters are escaped
 };

@@ -90,7 +90,7 @@ struct UnitLength {
   static void Normalise(double* x) {
     constexpr double kRounding = 4e-16;
     const double norm = Norm(x);
-    if (!(std::abs(norm - 1.0) > kRounding)) return;
+    if (!std::isfinite(norm) || std::abs(norm - 1.0) <= kRounding) return;
     for (int i = 0; i < N; ++i) x[i] = norm == 0.0 ? G::kIdentity[i] : x[i] * (1.0 / norm);
   }
   /// Returns | |x| - 1 |.
@@ -343,7 +343,9 @@ namespace detail {
 template <class G, class = void>
 struct HasTransport : std::false_type {};
 template <class G>
-struct HasTransport<G, std::void_t<decltype(&G::Transport)>> : std::true_type {};
+struct HasTransport<G, std::void_t<decltype(G::Transport(
+                           static_cast<const double*>(nullptr), static_cast<const double*>(nullptr),
+                           static_cast<double*>(nullptr)))>> : std::true_type {};
 
 }  // namespace detail
 

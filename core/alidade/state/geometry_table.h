@@ -67,11 +67,15 @@ struct TypedRow : GeometryRow {
       for (int i = 0; i < G::kAmbient; ++i) y[i] = sum[i];
     };
     minus = [](const double* y, const double* x, double* d) { G::Minus(y, x, d); };
-    normalise = G::Normalise;
-    if constexpr (requires { &G::Distance; }) distance = G::Distance;
-    if constexpr (kHasTransport<G>) transport = G::Transport;
-    if constexpr (requires { &G::PlusJacobian; }) {
-      plus_jacobian = G::PlusJacobian;
+    normalise = [](double* x) { G::Normalise(x); };
+    if constexpr (requires(const double* x) { G::Distance(x); }) {
+      distance = [](const double* x) -> double { return G::Distance(x); };
+    }
+    if constexpr (kHasTransport<G>) {
+      transport = [](const double* x, const double* y, double* j) { G::Transport(x, y, j); };
+    }
+    if constexpr (requires(const double* x, double* j) { G::PlusJacobian(x, x, j); }) {
+      plus_jacobian = [](const double* x, const double* d, double* j) { G::PlusJacobian(x, d, j); };
     } else {
       plus_jacobian = DifferentiatePlus<G>;
     }
@@ -105,6 +109,7 @@ inline constexpr auto kGeometryRows = std::apply(
 /// Largest number of tangent elements of a geometry of fixed size.
 inline constexpr int kMaxTangent =
     std::apply([](const auto&... rows) { return std::max({rows.tangent...}); }, kGeometries);
+static_assert(kMaxTangent <= 32, "GeometryRow::angular has 32 bits");
 
 }  // namespace detail
 

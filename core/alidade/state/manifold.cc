@@ -72,7 +72,8 @@ bool Geometry::has_transport() const {
 bool Geometry::IsAngular(int i) const {
   bool is_angle = false;
   ForEachPart([&](const Geometry& part, int, int t) {
-    if (i >= t && i < t + part.tangent) is_angle = (part.row_->angular >> (i - t) & 1U) != 0;
+    if (part.is_vector() || i < t || i >= t + part.tangent) return;
+    is_angle = (part.row_->angular >> (i - t) & 1U) != 0;
   });
   return is_angle;
 }
@@ -124,9 +125,10 @@ void Geometry::Normalise(double* x) const {
   });
 }
 
-void WrapAngles(const Geometry& geometry, double* x) {
+void internal::WrapParts(const Geometry& geometry, double* x) {
   geometry.ForEachPart([&](const Geometry& part, int a, int) {
-    if (part.is_angle()) x[a] = Angle::Wrap(x[a]);
+    // Without a distance every x is a point, so that Normalise only wraps angles.
+    if (!part.is_vector() && part.row().distance == nullptr) part.Normalise(x + a);
   });
 }
 

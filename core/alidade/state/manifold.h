@@ -99,8 +99,13 @@ void PlusJacobian(const Geometry& geometry, const double* x, const double* d, do
 /// Returns the distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and
 /// quaternions, the largest distance of a part for products.
 double DistanceFrom(const Geometry& geometry, const double* x);
-/// Wraps each part of x that is an angle.
-void WrapAngles(const Geometry& geometry, double* x);
+namespace internal {
+void WrapParts(const Geometry& geometry, double* x);
+}
+/// Wraps the angles of x. Does not change unit vectors and quaternions.
+inline void WrapAngles(const Geometry& geometry, double* x) {
+  if (!geometry.is_vector()) internal::WrapParts(geometry, x);
+}
 
 /// Returns the name of a geometry: `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`,
 /// `product(vector(3), unit_quaternion)`.

@@ -169,6 +169,16 @@ TEST(MainRows, HaveTheErrorOfTheMapBeforeThatAfterAlignment) {
   EXPECT_EQ(std::next(map)->label, "map.sim3.rmse [mm]");
 }
 
+TEST(MetricRows, LabelACountWithoutASubjectByItsName) {
+  RunResult result;
+  result.estimators = {Named("ekf", {})};
+  result.estimators[0].counts = {{"landmarks.deleted", 3}, {"accepted:stereo", 7}};
+  const std::vector<internal::TableRow> rows = internal::MetricRows(result);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].label, "accepted stereo");
+  EXPECT_EQ(rows[1].label, "landmarks.deleted");
+}
+
 TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {
   RunResult result;
   result.estimators = {Named("ekf", {{"rmse:target.depth", 0.5}, {"lag_ms:target.depth", 1.0}})};

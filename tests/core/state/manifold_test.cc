@@ -351,6 +351,19 @@ TEST(Geometry, NormaliseGivesTheNearestPoint) {
   EXPECT_NEAR(angle, 7.0 - 2.0 * kPi, 1e-15);
 }
 
+TEST(Geometry, AVectorOfAnySizeHasNoAngles) {
+  const Geometry geometry = Geometry::Vector(40);
+  for (int i = 0; i < 40; ++i) EXPECT_FALSE(geometry.IsAngular(i)) << i;
+  EXPECT_FALSE(geometry.is_angular());
+  EXPECT_TRUE(Geometry::UnitVector().is_angular());
+}
+
+TEST(Geometry, NormaliseDoesNotChangeAValueWhoseLengthIsNotFinite) {
+  double far[3] = {1e200, 1e200, 0.0};
+  Geometry::UnitVector().Normalise(far);
+  EXPECT_EQ(far[0], 1e200);
+}
+
 TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
   for (const GeometryRow* row : detail::kGeometryRows) {
     if (row->ambient == 0) continue;  // the model determines the size

@@ -98,14 +98,14 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   ASSERT_EQ(comparison.decomposition.size(), 3u);
   EXPECT_EQ(comparison.decomposed, "ekf");
   const DecompositionStep& linearisation = comparison.decomposition[0];
-  EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf full_information");
+  EXPECT_EQ(linearisation.estimator + ' ' + linearisation.reference, "ekf full_information");
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.x"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.v"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd.sigmas:p"), 1e-9);
   EXPECT_NEAR(linearisation.ratios.at("rmse:p.x").value(), 1.0, 1e-9);
 
   const DecompositionStep& smoothing = comparison.decomposition[1];
-  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "ekf rts");
+  EXPECT_EQ(smoothing.estimator + ' ' + smoothing.reference, "ekf rts");
   const auto rmse = [&run = run](std::size_t e) {
     return run.estimators[e].metrics.at("rmse:p.x");
   };
@@ -113,7 +113,7 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   EXPECT_NEAR(smoothing.ratios.at("rmse:p.x").value(), rmse(0) / rmse(1), 1e-12);
 
   const DecompositionStep& rejected = comparison.decomposition[2];
-  EXPECT_EQ(rejected.from + ' ' + rejected.to, "accepted batch");
+  EXPECT_EQ(rejected.estimator + ' ' + rejected.reference, "accepted batch");
   EXPECT_EQ(ValueOf(rejected.values, "rejected"), 0.0);
   EXPECT_LT(ValueOf(rejected.values, "rmsd:p.x"), 1e-12);
 
@@ -128,7 +128,7 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
 TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
   const DecompositionStep smoothing =
       CompareLinear(false, {}, EstimatorKind::kSlidingWindow).comparison.decomposition[1];
-  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "full_information accepted");
+  EXPECT_EQ(smoothing.estimator + ' ' + smoothing.reference, "full_information accepted");
 }
 
 // At the last frame the filter and the batch have the same data.

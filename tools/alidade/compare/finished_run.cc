@@ -295,7 +295,8 @@ ComparedRun ReadRun(const fs::path& folder) {
     candidate.result.wall_s = timing.At("estimators").At(name).At("wall_s").Number();
     candidate.series.blocks = ReadBlocks(entry);
     candidate.series.joint = false;
-    candidate.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
+    candidate.had_rejection_recovery =
+        entry.At("events").Find(ToString(EventKind::kRejectionRecovery)).has_value();
     const std::string estimates = name + "/estimates.csv";
     const EstimateCells cells =
         FindCells(columns.At(estimates), candidate.series.blocks, columns_file);

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "alidade/base/statistics.h"
+#include "alidade/estimation/estimator.h"
 #include "alidade/evaluate/evaluate.h"
 #include "alidade/io/number_rows.h"
 
@@ -89,7 +90,9 @@ std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& f
   std::map<std::int64_t, double> limits;  // chi2(0.95, dof)
   while (rows.Next()) {
     rows.ExpectColumns(width, "as in the header");
-    if (rows.text(columns.outcome) != "accepted" || rows.text(columns.nis).empty()) continue;
+    if (rows.text(columns.outcome) != ToString(Outcome::kAccepted) ||
+        rows.text(columns.nis).empty())
+      continue;
     AddRow(rows, columns, limits, sensors[std::string(rows.text(columns.sensor))]);
   }
   std::vector<InnovationStatistics> statistics;

@@ -46,7 +46,8 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Adds a file to the folder. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Writes comparison.csv, timing.json, figures, report.html and run.json, and renames the folder.
+  /// Completes the folder: closes the files of the frames, writes all other files, run.json last,
+  /// and renames the folder.
   /// If a figure or the report cannot be written, it completes the folder without them and throws
   /// the error.
   void Finish(const RunResult& result);

@@ -16,10 +16,11 @@ inline double Mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-/// Returns the 95 % bootstrap interval of the mean of n independent values [Efron1993, ch. 13]. Its
-/// ends are the 2.5 and 97.5 % quantiles of the means of `draws` samples of n values each, drawn
-/// with replacement. For differences of two methods on the same series it is the paired bootstrap
-/// over the series. For small n the interval is too narrow, by about sqrt((n - 1) / n).
+/// Returns the 95 % bootstrap interval of the mean of n independent values [Efron1993, ch. 13]. The
+/// ends of the interval are the 2.5 and 97.5 % quantiles of the means of `draws` samples of n
+/// values, drawn with replacement. For differences of two methods on the same series, this is the
+/// paired bootstrap over the series. For small n the interval is too narrow, by a factor of about
+/// sqrt((n - 1) / n).
 inline Interval BootstrapOfMean(const std::vector<double>& values, int draws = 20000,
                                 std::uint64_t seed = 1) {
   Random random(seed);

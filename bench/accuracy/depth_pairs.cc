@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The real depth filter, tuned on every second series and reported on the others, compared with
-// stereo alone, the last value and the line d = c s:
+// Accuracy of the depth filter on real series, compared with stereo alone, the last value and the
+// line d = c s. Parameters are tuned on every second series; results are reported for the others:
 //
 //   accuracy_depth_pairs examples/07_depth_pairs/config.yaml FOLDER_OF_SERIES
 //
 // docs/experiments.md, "Real series of depth", states the tuned parameters, the series, the
-// criterion and the columns. Exit code 1 if a parameter is at the edge of its grid.
+// criterion and the columns. The exit code is 1 if a tuned parameter is at the edge of its grid.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -30,7 +30,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 using Names = std::vector<std::string>;
 using RmseByEstimator = std::map<std::string, double>;
 
-/// Parameter and its values, ascending.
+/// Parameter, with its values in ascending order.
 struct Axis {
   std::string key;
   Names values;
@@ -48,7 +48,8 @@ const std::vector<Axis> kStereoGrid = {
       "16", "32"}},
     {"estimators.stereo_only.overrides.sensors.stereo.sigma_px",
      {"0.025", "0.05", "0.1", "0.2", "0.4", "0.8", "1.6", "3.2"}}};
-constexpr double kShownLagsS[] = {0.1, 0.4, 0.8, 1.2};  // of the drift of the scale
+// Lags for which the drift of the scale is printed.
+constexpr double kShownLagsS[] = {0.1, 0.4, 0.8, 1.2};
 
 /// Program arguments and common data of all runs.
 struct Bench {
@@ -63,8 +64,8 @@ struct Bench {
     return alidade::BuildExperiment(config, host);
   }
 
-  /// Returns the RMSE of depth of each estimator: masked in the blind half, else over the whole
-  /// series.
+  /// Returns the RMSE of the depth of each estimator. If `masked` is true, it is that of the blind
+  /// half of the series, else that of the whole series.
   RmseByEstimator Rmse(const std::string& series, const Settings& settings, bool masked) const {
     alidade::Experiment experiment = Make(series, settings, masked);
     RmseByEstimator rmse;
@@ -75,7 +76,7 @@ struct Bench {
     return rmse;
   }
 
-  /// Returns the data of the masked run, with the calibration in the header of the series.
+  /// Returns the data of the masked run, including the calibration from the header of the series.
   PairSeries Read(const std::string& file) const {
     const alidade::Experiment experiment = Make(file, {}, true);
     return alidade::bench::ReadPairSeries(*experiment.source, std::filesystem::path(file).stem());
@@ -125,7 +126,7 @@ Choice Choose(const Bench& bench, const std::string& estimator, const std::vecto
   return best;
 }
 
-/// Chooses the settings of the fused filter and of stereo alone on some series.
+/// Chooses the settings of the fused filter and of stereo alone, by their RMSE on the given series.
 Choice ChooseAll(const Bench& bench, const Names& series) {
   Choice choice = Choose(bench, "fused", kFusedGrid, series);
   const Choice stereo = Choose(bench, "stereo_only", kStereoGrid, series);
@@ -139,7 +140,7 @@ double Median(std::vector<double> values) {
   return alidade::Quantile(values, 0.5);
 }
 
-/// Table of RMSE [m] with a last row of medians.
+/// Printed table of RMSE [m]. The last row contains the medians.
 class Table {
  public:
   explicit Table(Names columns) : columns_(std::move(columns)), values_(columns_.size()) {
@@ -169,7 +170,8 @@ class Table {
   std::vector<std::vector<double>> values_;
 };
 
-/// Prints RMSE and baselines of each series. Returns log(RMSE of fused / RMSE of the line), masked.
+/// Prints the RMSE of the estimators and the baselines for each series. Returns log(RMSE of fused /
+/// RMSE of the line) of each masked series.
 std::vector<double> Report(const char* title, const Bench& bench, const Settings& settings,
                            const Names& files) {
   std::printf("\n%s:\n", title);
@@ -196,7 +198,7 @@ void PrintDifference(const char* title, const std::vector<double>& differences) 
               differences.size(), Mean(differences), interval.low, interval.high);
 }
 
-/// Prints the white noise of both sensors and the drift of the scale.
+/// Prints the standard deviation of the white noise of both sensors, and the drift of the scale.
 void ReportNoise(const Bench& bench, const Names& files) {
   double disparity = 0.0, log_scale = 0.0;
   std::printf("\nrms growth of log(s Z), %%, over\n");

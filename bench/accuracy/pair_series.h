@@ -8,7 +8,7 @@
 
 namespace alidade::bench {
 
-/// Row of a series: two image points at one depth.
+/// Row of a series: measurements of two image points at one depth.
 struct PairRow {
   double t_s;
   double disparity_px;
@@ -16,7 +16,8 @@ struct PairRow {
   double depth_m;  ///< reference depth
 };
 
-/// Approach to a target. Stereo sees the first `seen_count` rows; the others are the blind half.
+/// Series of an approach to a target. Stereo measures in the first `seen_count` rows. The other
+/// rows are the blind half.
 struct PairSeries {
   std::string name;
   double bf_px_m = 0.0;  ///< focal length times baseline, from the header of the series
@@ -24,11 +25,12 @@ struct PairSeries {
   std::size_t seen_count = 0;
 };
 
-/// Returns the slope c [px] of the line d = c s, by least squares over the rows that stereo sees:
+/// Returns the slope c [px] of the line d = c s, by least squares over the rows in which stereo
+/// measures:
 ///
 ///   c = sum d s / sum s^2
 ///
-/// Without noise c = f B / Z0, with the depth Z0 of the first row.
+/// Without noise c is f B / Z0, with the depth Z0 of the first row.
 inline double LineSlope(const PairSeries& series) {
   double ds = 0.0, ss = 0.0;
   for (std::size_t i = 0; i < series.seen_count; ++i) {
@@ -38,7 +40,7 @@ inline double LineSlope(const PairSeries& series) {
   return ds / ss;
 }
 
-/// Returns the RMSE [m] of the depth Z = k / s in the blind half, k in m.
+/// Returns the RMSE [m] of the depth Z = k / s in the blind half, with k in m.
 inline double BlindRmse(const PairSeries& series, double k_m) {
   double sum = 0.0;
   for (std::size_t i = series.seen_count; i < series.rows.size(); ++i) {
@@ -48,21 +50,22 @@ inline double BlindRmse(const PairSeries& series, double k_m) {
   return std::sqrt(sum / static_cast<double>(series.rows.size() - series.seen_count));
 }
 
-/// Returns the RMSE [m] in the blind half of the depth that d = c s predicts, Z = f B / (c s).
+/// Returns the RMSE [m], in the blind half, of the depth that the line d = c s predicts: Z = f B /
+/// (c s).
 inline double LineRmse(const PairSeries& series) {
   return BlindRmse(series, series.bf_px_m / LineSlope(series));
 }
 
-/// Returns the RMSE [m] in the blind half of Z = Za sa / s, with the reference depth Za and the
-/// scale sa of the last row that stereo sees. This is the error that the drift of the scale adds to
-/// an exact depth.
+/// Returns the RMSE [m], in the blind half, of the depth Z = Za sa / s. Za is the reference depth
+/// and sa the scale of the last row in which stereo measures. This is the error that the drift of
+/// the scale adds to an exact depth.
 inline double AnchoredRmse(const PairSeries& series) {
   const PairRow& last = series.rows[series.seen_count - 1];
   return BlindRmse(series, last.depth_m * last.scale);
 }
 
-/// Returns the RMSE [m] in the blind half of Z = k / s for the best k, computed from the reference
-/// there: no constant lambda has a smaller error.
+/// Returns the RMSE [m], in the blind half, of the depth Z = k / s for the best k. This k follows
+/// from the reference depths of the blind half. No constant lambda has a smaller error.
 inline double BestConstantRmse(const PairSeries& series) {
   double z_over_s = 0.0, one_over_ss = 0.0;
   for (std::size_t i = series.seen_count; i < series.rows.size(); ++i) {
@@ -74,8 +77,8 @@ inline double BestConstantRmse(const PairSeries& series) {
 }
 
 /// Returns the mean square [-] of the growth of log(s Z) over `lag` rows. s Z is the constant Z0 if
-/// both points have the same depth and exact tracks. A random walk has lag times the value of lag
-/// 1, a drift at a constant rate lag^2 times.
+/// both points have the same depth and exact tracks. For a random walk the result is proportional
+/// to lag; for a drift at a constant rate it is proportional to lag^2.
 inline double DriftVariance(const PairSeries& series, std::size_t lag) {
   const std::vector<PairRow>& rows = series.rows;
   double sum = 0.0;
@@ -87,8 +90,9 @@ inline double DriftVariance(const PairSeries& series, std::size_t lag) {
   return sum / static_cast<double>(rows.size() - lag);
 }
 
-/// Returns the variance of the white noise of value(row) from second differences over the rows that
-/// stereo sees, which a ramp does not change: mean (y[i-1] - 2 y[i] + y[i+1])^2 / 6.
+/// Returns the variance of the white noise of y = value(row), over the rows in which stereo
+/// measures. Computes it from second differences, which a ramp does not change: mean (y[i-1] - 2
+/// y[i] + y[i+1])^2 / 6.
 template <class Value>
 double WhiteVariance(const PairSeries& series, const Value& value) {
   double sum = 0.0;

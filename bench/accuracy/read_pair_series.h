@@ -9,8 +9,9 @@
 
 namespace alidade::bench {
 
-/// Reads all rows of a source with the streams `disparity` and `inverse_scale`, depth as its first
-/// truth, and f B in its calibration. `seen_count` ends with the last disparity.
+/// Reads all rows of a source. The source must have the streams `disparity` and `inverse_scale`,
+/// the depth as its first true value, and f B in its calibration. `seen_count` counts the rows up
+/// to the last disparity.
 inline PairSeries ReadPairSeries(Source& source, const std::string& name) {
   PairSeries series{name, 0.0, {}, 0};
   const Config calibration = source.Calibration().value();

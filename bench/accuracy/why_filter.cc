@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy and cost of a filter and of the batch, in the manner of [Strasdat2012]: the same
-// trajectory with different numbers of points and of frames.
+// Accuracy and cost of a filter and of the batch, compared as in [Strasdat2012]: on the same
+// trajectory, with different numbers of points and frames.
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //
-// writes FOLDER/why_filter.csv and FOLDER/figures/why_filter.svg, over the seeds 1001, 1002, ...:
+// This command runs the seeds 1001, 1002, ... It writes FOLDER/figures/why_filter.svg and
+// FOLDER/why_filter.csv, with the columns
 //
 //   rmse      sqrt(mean |e|^2) of the position at the last frame
 //   bits      mean of E = 1/2 log2(det C_0 / det C), with the 6 x 6 covariance C of the last pose,
@@ -28,19 +29,19 @@
 
 namespace {
 
-constexpr int kAllFrames = 150;      // of the trajectory
-constexpr double kAllRateHz = 30.0;  // with all of them
+constexpr int kAllFrames = 150;      // of the whole trajectory
+constexpr double kAllRateHz = 30.0;  // frame rate with kAllFrames
 const std::vector<int> kFrames = {10, 19, 38, 75, kAllFrames};
 const std::vector<int> kPoints = {10, 20, 40, 80};
 const std::vector<std::string> kEstimators = {"ekf", "batch"};
 
 /// Result of one run of one estimator.
 struct Outcome {
-  bool is_valid = false;  ///< neither failed nor diverged
+  bool is_valid = false;  ///< true if the run neither failed nor diverged
   double error_m = 0.0, log2_det = 0.0, cpu_ns = 0.0;
 };
 
-/// Returns log2 det of the covariance of position and orientation.
+/// Returns log2(det C) of the covariance C of position and orientation.
 double Log2Det(const alidade::State& state) {
   const alidade::StateLayout& layout = state.layout();
   const int p = layout[layout.Find("cam.position")].tangent_offset;
@@ -51,9 +52,8 @@ double Log2Det(const alidade::State& state) {
   return 2.0 * c.llt().matrixLLT().diagonal().array().log2().sum();
 }
 
-/// Returns the config with the given numbers of points and frames. The noise of the motion is
-/// scaled so that the uncertainty of the velocity after a second does not depend on the number of
-/// steps.
+/// Returns the config with the given numbers of points and frames. Scales the noise of the motion,
+/// so that the uncertainty of the velocity after a second does not depend on the number of steps.
 alidade::Config ConfigOf(const std::string& file, int points, int frames, int seed) {
   alidade::Config config = alidade::Config::FromFile(file);
   const auto set = [&](const char* key, double value) {
@@ -62,7 +62,7 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   config.Set("source.seed", std::to_string(seed), "bench");
   config.Set("source.points.count", std::to_string(points), "bench");
   config.Set("source.max_frames", std::to_string(frames), "bench");
-  const double fraction = (frames - 1.0) / (kAllFrames - 1.0);  // of the number of steps
+  const double fraction = (frames - 1.0) / (kAllFrames - 1.0);  // number of steps, relative to all
   set("source.rate_hz", kAllRateHz * fraction);
   for (const char* key : {"linear_acceleration", "angular_acceleration"}) {
     const std::string path = std::string("state.cam.noise.") + key;
@@ -72,7 +72,8 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   return config;
 }
 
-/// Runs an estimator over frames that were simulated before, so that only its own time is measured.
+/// Runs an estimator on frames that were simulated in advance. Only the time of the estimator is
+/// measured.
 Outcome RunOne(alidade::EstimatorSpec& spec, const std::vector<alidade::SourceFrame>& frames,
                std::size_t truth) {
   Outcome outcome;
@@ -99,7 +100,7 @@ Outcome RunOne(alidade::EstimatorSpec& spec, const std::vector<alidade::SourceFr
   return outcome;
 }
 
-/// Runs all estimators. Returns the outcomes by name.
+/// Runs all estimators. Returns the outcome of each estimator by its name.
 std::map<std::string, Outcome> RunAll(const alidade::Config& config,
                                       const alidade::PluginHost& host) {
   alidade::Experiment experiment = alidade::BuildExperiment(config, host);
@@ -194,7 +195,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
   }
 }
 
-/// Draws a curve for each number of points; its marks are numbers of frames.
+/// Draws a curve for each number of points, with a mark for each number of frames.
 void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
   using alidade::internal::FigureScript;
   FigureScript script("why_filter", "accuracy against cost: filter and batch",

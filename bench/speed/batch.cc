@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of the sparse batch: a camera with 12 unknowns per frame and 40 observations
-// per frame. Tracks have 20 to 40 frames, a tenth of them 80 to 120. Depth is known to 1 m at the
-// first observation, the noise has rank 6 of 12, and the first pose is exact. The peer is Ceres
-// with hand-written costs for the same observations, with analytic Jacobians and with noise of full
-// rank (white acceleration), which Ceres needs: it has the same structure, and only its time is
+// Time of an iteration of the sparse batch, for a camera with 12 unknowns and 40 observations per
+// frame. Tracks have 20 to 40 frames; a tenth of the tracks have 80 to 120. Depth is known to 1 m
+// at the first observation, the noise has rank 6 of 12, and the first pose is exact. The peer is
+// Ceres with hand-written costs for the same observations, with analytic Jacobians. Ceres needs
+// noise of full rank (white acceleration). Its problem has the same structure, and only the time is
 // compared.
 //
 //   bench_batch [--frames N]... [--iterations N]
 //
 //   ratio batch/ceres VALUE     iteration of the batch / iteration of the faster solver of Ceres
-//   exponent VALUE              of the time of an iteration over the number of frames
+//   exponent VALUE              growth of the time of an iteration with the number of frames
 #include <ceres/cost_function.h>
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
@@ -80,7 +80,7 @@ Vector3d Log(const Quaterniond& q) {
                   : Vector3d(2.0 * sign * std::atan2(n, sign * q.w()) / n * q.vec());
 }
 
-/// Simulated data of both solvers, with a start near the truth.
+/// Simulated data for both solvers, with a start near the truth.
 struct Scene {
   std::vector<Pose> truth, start;
   std::vector<Vector3d> landmarks;
@@ -149,7 +149,7 @@ struct Scene {
   }
 };
 
-// The batch.
+// Functions for the batch.
 
 Problem BuildProblem(const Scene& scene) {
   Problem problem;
@@ -289,9 +289,10 @@ Times TimeBatch(const Scene& scene, int iterations) {
   return times;
 }
 
-// The peer.
+// Functions for the peer, Ceres.
 
-/// Manifold of r and q by tangents. A cost writes d/d(tangent) into the first six columns.
+/// Manifold of position and orientation. A cost writes the derivative with respect to the tangent
+/// into the first six columns.
 struct PoseManifold : ceres::Manifold {
   int AmbientSize() const override { return 7; }
   int TangentSize() const override { return 6; }
@@ -342,7 +343,8 @@ struct Observation : ceres::SizedCostFunction<kRows, 7, 3> {
   }
 };
 
-/// White acceleration with Q of full rank. d Exp is taken at zero, because only the time matters.
+/// Cost of a step with white acceleration, with Q of full rank. The derivative of Exp is that at
+/// zero, because only the time of the cost matters.
 struct Step : ceres::SizedCostFunction<12, 7, 6, 7, 6> {
   Matrix12d whiten;
   Step() {
@@ -392,7 +394,7 @@ struct VelocityPrior : ceres::SizedCostFunction<6, 6> {
   }
 };
 
-/// Returns the CPU seconds of an iteration.
+/// Returns the CPU time of an iteration, s.
 double TimeCeres(const Scene& scene, ceres::LinearSolverType type, int iterations) {
   std::vector<std::array<double, 7>> poses;
   std::vector<Vector6d> velocities;

@@ -6,15 +6,16 @@
 #include <numbers>
 #include <vector>
 
-/// Work of all contenders: the depth filter of [Ekf2017] with state (Z, Zdot, lambda): prediction,
-/// disparity B F / Z with 1 px, inverse scale lambda Z with noise propagated from 1 px on a
-/// template of 300 px. Start: Z 0.35 +- 0.1 m, Zdot 0 +- 0.5 m/s, lambda 3.3 +- 0.5 1/m.
+/// Work of all contenders: a step of the depth filter of [Ekf2017] with the state (Z, Zdot,
+/// lambda). A step consists of a prediction and two measurements. The disparity is B F / Z with 1
+/// px of noise. The inverse scale is lambda Z with noise propagated from 1 px on a template of 300
+/// px. The filter starts from Z 0.35 +- 0.1 m, Zdot 0 +- 0.5 m/s, lambda 3.3 +- 0.5 1/m.
 namespace alidade::bench {
 
 inline constexpr double kDt = 0.033;            ///< s
 inline constexpr double kBf = 26.0;             ///< px m
-inline constexpr double kAcceleration = 1.0;    ///< m/s^2, sigma
-inline constexpr double kRelative = 2.0 / 300;  ///< sigma of the inverse scale s / s^3
+inline constexpr double kAcceleration = 1.0;    ///< sigma, m/s^2
+inline constexpr double kRelative = 2.0 / 300;  ///< sigma of the inverse scale s, divided by s^3
 
 /// Periodic measurements of a target that oscillates about 0.3 m.
 struct TargetMeasurements {
@@ -38,7 +39,7 @@ class Peer {
   virtual double depth() const = 0;
 };
 
-// Each function has its own source file, which is built if its library is installed.
+// Each function has a separate source file. The file is built if the library is installed.
 std::unique_ptr<Peer> MakeOpenCv();
 std::unique_ptr<Peer> MakeBfl();
 std::unique_ptr<Peer> MakeMrpt();

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// CPU time per frame of monocular SLAM from images, relative to the optical flow of OpenCV alone,
+// CPU time per frame of monocular SLAM from images, relative to that of the optical flow of OpenCV:
 // cv::calcOpticalFlowPyrLK on the same features in the same images:
 //
 //   bench_image_tracks examples/25_slam_images
 //
-// The images are those of the example, which this program draws and stores as files. The source
-// `image_tracks` reads them for the EKF of the example, with and without guidance by it. The parts
-// of the source are measured by separate calls. The remaining time belongs to the alignment and to
-// the search for new features.
+// This program draws the images of the example and stores them as files. The source `image_tracks`
+// reads them for the EKF of the example, with and without guidance by this EKF. The parts of the
+// source are measured by separate calls. The remaining time is that of the alignment and of the
+// search for new features.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
@@ -43,7 +43,7 @@ std::string FileOf(const fs::path& folder, int number) {
   return (folder / name).string();
 }
 
-/// Reads an image as the source `image_tracks` does.
+/// Reads an image in the same way as the source `image_tracks`.
 cv::Mat ReadImage(const std::string& name) {
   const std::string bytes = internal::ReadFile(
       name, [&](ExitCode code, int) { throw Error(code, name + ": cannot be read"); });
@@ -62,8 +62,8 @@ struct Part {
     work();
     ns[frame].push_back(CpuNs() - start);
   }
-  /// Returns the mean over frames of the medians over rounds. Frames differ, because some of them
-  /// are not searched for features.
+  /// Returns the mean over all frames of the median time over all rounds. The times of frames
+  /// differ, because some frames are not searched for features.
   double Mean() const {
     double sum = 0.0;
     for (const auto& [frame, times] : ns) {
@@ -78,7 +78,7 @@ struct Part {
 /// CPU times of a frame, and of cv::calcOpticalFlowPyrLK on the features of the previous frame.
 class Times {
  public:
-  /// Processes the images of a folder once: each part in turn, frame by frame.
+  /// Processes the images of a folder once, frame by frame. Measures each part in turn.
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
     is_guided_ = experiment.guide != nullptr;
@@ -94,7 +94,8 @@ class Times {
     Timestamp step = 0;
     const auto size = static_cast<int>(experiment.source->size());
     for (int k = 0; k < size; ++k) {
-      // The first image is omitted: it has no features to track, and its search is longer.
+      // The first image is omitted, because it has no features to track and its search for features
+      // takes longer.
       Times unused;
       Times& times = k == 0 ? unused : *this;
       times.read_.Measure(k, [&] { image = ReadImage(FileOf(folder, k)); });
@@ -164,7 +165,7 @@ class Times {
   }
 
  private:
-  /// Measures the optical flow as PyramidFlow does it.
+  /// Measures the parts of the optical flow in the way that PyramidFlow computes it.
   void Flow(int k, const std::vector<cv::Mat>& last, const std::vector<cv::Mat>& next,
             const std::vector<cv::Point2f>& start, std::vector<cv::Point2f>& end) {
     const cv::TermCriteria stop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01};

@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
-/// Timing of contenders in turn: one short chunk of each, repeatedly, so that disturbances of the
-/// machine affect all of them equally. Only ratios are meaningful.
+/// Timing of contenders in turn. One short chunk of each contender is run, repeatedly. Disturbances
+/// of the machine therefore affect all contenders equally. Only ratios of times are meaningful.
 namespace alidade::bench {
 
 struct Contender {
   std::string name;
-  std::function<void()> chunk;  ///< about 0.4 ms
+  std::function<void()> chunk;  ///< work to time, about 0.4 ms
   double steps = 1.0;           ///< steps in a chunk
-  std::vector<double> ns;       ///< CPU time of a step, for each chunk
+  std::vector<double> ns;       ///< CPU time per step of each chunk
 
-  /// Returns the q-quantile of the time of a step.
+  /// Returns the q-quantile of the time per step.
   double Quantile(double q) const {
     std::vector<double> sorted = ns;
     std::sort(sorted.begin(), sorted.end());
@@ -42,7 +42,8 @@ inline void Interleave(std::vector<Contender>& contenders, int rounds) {
   }
 }
 
-/// Prints the times of the contenders relative to the first one: 1st percentile and median.
+/// Prints the 1st percentile and the median of the times of the contenders, relative to the first
+/// contender.
 inline void PrintTable(const std::vector<Contender>& contenders) {
   std::printf("%-36s %8s %8s\n", "relative to the first, CPU time", "p01", "median");
   for (const Contender& contender : contenders) {
@@ -52,7 +53,7 @@ inline void PrintTable(const std::vector<Contender>& contenders) {
   }
 }
 
-/// Prints `ratio A/B VALUE` of the 1st percentiles.
+/// Prints `ratio NAME VALUE`. VALUE is the 1st percentile of `a`, divided by that of `b`.
 inline void PrintRatio(const std::string& name, const Contender& a, const Contender& b) {
   std::printf("ratio %s %.3f\n", name.c_str(), a.Quantile(0.01) / b.Quantile(0.01));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a frame of the EKF that measures 20 of 1000 landmarks, with an estimated bias and with a
-// considered bias, relative to P - W W' of the same size alone.
+// Time of a frame in which the EKF measures 20 of 1000 landmarks. The bias of the sensor is either
+// estimated or considered. The times are relative to that of P - W W' alone, of the same size.
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>

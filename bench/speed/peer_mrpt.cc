@@ -6,7 +6,8 @@
 namespace alidade::bench {
 namespace {
 
-/// Filter of MRPT with both measurements as one observation of two numbers, its fastest way.
+/// Filter of MRPT. Both measurements form one observation of two numbers, which is the fastest way
+/// in MRPT.
 class Mrpt : public Peer, public mrpt::bayes::CKalmanFilterCapable<3, 2, 0, 0> {
  public:
   Mrpt() {

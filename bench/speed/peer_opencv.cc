@@ -6,8 +6,8 @@
 namespace alidade::bench {
 namespace {
 
-/// cv::KalmanFilter as an extended Kalman filter: H at the prediction, z + H x - h(x) in place of
-/// z, and one correction for each sensor.
+/// cv::KalmanFilter used as an extended Kalman filter. H is evaluated at the prediction, z + H x -
+/// h(x) replaces z, and each sensor has a correction of its own.
 class OpenCv : public Peer {
  public:
   OpenCv() : filter_(3, 1, 0, CV_64F), z_(1, 1, CV_64F) {

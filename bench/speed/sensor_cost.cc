@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of an iteration of Ceres on one bundle adjustment. Its costs are made from a sensor model;
-// the reference is cost functions written by hand. 50 cameras, 2000 points, 20 000 pixels.
+// Time of an iteration of Ceres on a bundle adjustment with costs made from a sensor model. The
+// reference is the same problem with cost functions written by hand. It has 50 cameras, 2000 points
+// and 20 000 pixels.
 #include "plugins/ceres/bundle/sensor_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
@@ -34,9 +35,9 @@ using ceres_batch::GeometryManifold;
 using ceres_batch::SensorCost;
 
 constexpr double kFocal = 500.0;  // px
-constexpr int kPose = 7;          // position, world_from_cam
+constexpr int kPose = 7;          // size of position and world_from_cam
 
-/// z = f (hx, hy) / hz,  h = R_CW (p - r): model without analytic Jacobians.
+/// Model z = f (hx, hy) / hz,  h = R_CW (p - r), without analytic Jacobians.
 struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position"}, Quantity{"orientation"},
                                      Quantity{"point"}};
@@ -47,7 +48,7 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
     T h[3];
     UnitQuaternion::RotateBack(orientation, offset, h);
     if (!(h[2] > T(0.0))) return false;
-    const T inverse = 1.0 / h[2];  // as in the Jacobian: a compiler divides once for both
+    const T inverse = 1.0 / h[2];  // the same expression is in the Jacobian: one division
     z[0] = kFocal * (h[0] * inverse);
     z[1] = kFocal * (h[1] * inverse);
     return true;
@@ -58,8 +59,8 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   }
 };
 
-/// Computes a row of dz/dh with respect to all roles, as the authors of a model and of a cost write
-/// it.
+/// Computes a row of the Jacobian with respect to all roles. The authors of a model and of a cost
+/// write it in the same way.
 inline void Row(const double* orientation, const double* h, double ax, double ay, double x,
                 double y, double* J_r, double* J_q, double* J_p) {
   const double a[3] = {ax, ay, -(ax * x + ay * y)};
@@ -84,7 +85,7 @@ struct PinholeAnalytic : Pinhole {
   }
 };
 
-/// r = z - h, written by hand for this manifold: [J | 0].
+/// Cost r = z - h, written by hand for GeometryManifold: the Jacobian is [J | 0].
 class HandWrittenCost final : public ceres::SizedCostFunction<2, kPose, 3> {
  public:
   explicit HandWrittenCost(const double* z) : u_(z[0]), v_(z[1]) {}
@@ -114,7 +115,7 @@ class HandWrittenCost final : public ceres::SizedCostFunction<2, kPose, 3> {
   double u_, v_;
 };
 
-/// r = z - h as users of Ceres write it.
+/// Cost r = z - h, written as users of Ceres do, with automatic differentiation.
 struct Functor {
   double u, v;
   template <class T>
@@ -131,7 +132,8 @@ struct Functor {
   }
 };
 
-/// Cameras on a circle that look at points in a ball. Values start 1 % off the truth; noise 0.5 px.
+/// Cameras on a circle that look at points in a box. Points start 1 % off the truth. The noise is
+/// 0.5 px.
 struct Scene {
   static constexpr int kCameras = 50, kPoints = 2000, kViewsPerPoint = 10;
   struct Pixel {
@@ -170,7 +172,7 @@ struct Scene {
   }
 };
 
-/// Problem with one way to make costs, and with its own values.
+/// Bundle adjustment with one way to make costs. It has its own copy of all values.
 class Adjustment {
  public:
   using MakeCost = std::function<ceres::CostFunction*(const double* z)>;
@@ -190,9 +192,9 @@ class Adjustment {
     problem_.SetParameterBlockConstant(poses_.data());
   }
 
-  /// Runs three iterations from the start, and returns ms of CPU time per iteration. More
-  /// iterations would reach the minimum, at which rounding decides whether a step succeeds and
-  /// needs Jacobians.
+  /// Runs three iterations from the start. Returns the CPU time per iteration, ms. More iterations
+  /// would reach the minimum. Rounding would then decide whether a step succeeds and needs
+  /// Jacobians.
   double Iterate() {
     poses_ = scene_.poses;
     points_ = scene_.points;
@@ -216,7 +218,7 @@ class Adjustment {
     jacobian_evaluations_ = summary.num_jacobian_evaluations;
     return ms / static_cast<double>(summary.iterations.size() - 1);
   }
-  /// Evaluates residuals and Jacobians of all pixels once, and returns ns per pixel.
+  /// Evaluates residuals and Jacobians of all pixels once. Returns the CPU time per pixel, ns.
   double Evaluate() {
     double r[2], pose[2 * kPose], point[6];
     double* jacobians[] = {pose, point};
@@ -247,7 +249,7 @@ double QuantileOf(std::vector<double> values, double q) {
   return Quantile(values, q);
 }
 
-/// Contenders: each way to make costs, and its peer.
+/// Contenders: each way to make costs, with the peer of each.
 struct Contenders {
   PinholeAnalytic analytic;
   Pinhole automatic;
@@ -269,7 +271,7 @@ struct Contenders {
   }
   struct Contender {
     const char* name;
-    std::size_t peer;  ///< the contender it is compared with
+    std::size_t peer;  ///< index of the contender to compare with
     Adjustment::MakeCost make;
     Adjustment::MakeManifold manifold;
   };
@@ -295,9 +297,9 @@ struct Contenders {
 
 /// Times of one contender.
 struct Times {
-  std::vector<double> ms;      ///< of an iteration
-  std::vector<double> ns;      ///< of an evaluation
-  std::vector<double> ratios;  ///< of iterations, relative to the peer
+  std::vector<double> ms;      ///< times of an iteration
+  std::vector<double> ns;      ///< times of an evaluation
+  std::vector<double> ratios;  ///< times of iterations, relative to the peer
 };
 
 int Main(int rounds) {
@@ -315,7 +317,8 @@ int Main(int rounds) {
     };
     for (int round = 0; round < rounds; ++round) {
       for (std::size_t i = 0; i < times.size(); ++i) {
-        // Two iterations between two of the peer, so that changes of the machine's speed cancel.
+        // Times two solves between two solves of the peer, so that changes of the machine's speed
+        // cancel.
         const double peer_before = iterate(contenders.all[i].peer), first = iterate(i),
                      second = iterate(i);
         times[i].ratios.push_back((first + second) /

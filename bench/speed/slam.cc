@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of a whole frame of the EKF at the size of SLAM: a camera with 13 numbers and N landmarks in
-// inverse depth, some of which are observed, compared with
+// Time of a whole frame of the EKF at the size of SLAM. The state is a camera with 13 numbers, and
+// N landmarks in inverse depth. Some landmarks are observed. The time is compared with
 //
 //   peak      the operations of the update alone, at the rate at which this processor multiplies
-//             and adds, measured in turn with frames and nothing else
+//             and adds; this rate is measured in turn with frames and nothing else
 //   mrpt      mrpt::bayes::CKalmanFilterCapable, if it is installed, up to 300 landmarks
 //   textbook  the update with dense H in Eigen, as compiled by this build: K = P H' S^-1,
 //             P = (I - K H) P
 //   joseph    the same with P = (I - K H) P (I - K H)' + K R K'
-//   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, if it is installed, without
-//             the other parts of a frame. OPENBLAS_CORETYPE selects the type of a processor that
-//             OpenBLAS does not detect.
+//   openblas  the factor of S, W = P H' L^-T and P - W W' by OpenBLAS, if it is installed; the
+//             other parts of a frame are omitted. OPENBLAS_CORETYPE selects the type of a
+//             processor that OpenBLAS does not detect.
 //
-// The others are also measured in turn with frames, so that frames find the caches emptied by them.
+// The others are also measured in turn with frames. The data of the frames are then displaced from
+// the caches.
 //
-// Then it prints the exponents of time over the number of states: for a step, for a frame that
-// measures 20 landmarks, and for removing a landmark and initialising another.
+// The program then prints the exponents of time over the number of states. It does so for a step,
+// for a frame that measures 20 landmarks, and for the exchange of a landmark for a new one.
 //
 //   bench_slam [--size N/observed ...] [--no-exponents]
 #include <CLI/CLI.hpp>
@@ -79,8 +80,8 @@ sensors:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// Filter, and frames of a camera that oscillates in front of a box of points. Each frame observes
-/// the next `observed` points.
+/// Filter with frames of a camera that oscillates in front of a box of points. Each frame observes
+/// the next `observed` points in turn.
 class Slam {
  public:
   Slam(const PluginHost& host, const Config& config, int landmarks, int observed)
@@ -129,13 +130,14 @@ class Slam {
   long measured_ = 0, used_count_ = 0;
 };
 
-/// Returns the number of multiplications and additions of an update of n states by m rows whose H
-/// has 12 numbers each: P H', S, its factor, W = P H' L^-T, the lower triangle of P - W W'.
+/// Returns the number of multiplications and additions of an update of n states by m rows. H has 12
+/// numbers in each row. The update computes P H', S, the factor of S, W = P H' L^-T and the lower
+/// triangle of P - W W'.
 double UpdateOperations(double n, double m) {
   return 2.0 * 12.0 * n * m + 12.0 * m * m + m * m * m / 3.0 + n * m * m + n * n * m;
 }
 
-/// Multiplications and additions in registers.
+/// Contender of multiplications and additions in registers, without memory access.
 template <int kLanes>
 struct Multiply {
   using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
@@ -173,7 +175,7 @@ Peak PeakOf(const std::string& kernels) {
   return {};
 }
 
-/// Update as in textbooks.
+/// Update of n states by m rows with dense matrices, as in textbooks.
 struct Dense {
   Eigen::MatrixXd p, h, r;
   Dense(long n, long m)
@@ -196,7 +198,7 @@ struct Dense {
 };
 
 #ifdef ALIDADE_BENCH_OPENBLAS
-/// Update of n states by m rows: the factor, the division and the product.
+/// Update of n states by m rows with OpenBLAS: the factor of S, W = P H' L^-T and P - W W'.
 struct OpenBlas {
   Eigen::MatrixXd p, pht, s, w, l;
   OpenBlas(long n, long m)
@@ -282,7 +284,8 @@ void CompareSize(const PluginHost& host, const Config& config, const std::string
   volatile double sink = 0.0;
   std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
                                        {"frame", [&] { slam(); }, 1.0, {}}};
-  // Without peers: their dense matrices would empty the caches.
+  // This part runs without the peers, because their dense matrices would displace the data of the
+  // filter from the caches.
   Interleave(contenders, 4 * rounds);
   const double peak_ns = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
                          peak.operations * contenders[0].Quantile(0.01);
@@ -302,7 +305,7 @@ void CompareSize(const PluginHost& host, const Config& config, const std::string
   }
 }
 
-/// Prints the slope of log(time) over log(states), by least squares.
+/// Prints the exponent: the slope of log(time) over log(states), by least squares.
 void PrintExponent(const char* name, const std::vector<long>& states,
                    const std::vector<Contender>& contenders) {
   const auto count = static_cast<double>(states.size());

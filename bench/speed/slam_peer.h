@@ -5,16 +5,16 @@
 
 namespace alidade::bench {
 
-/// EKF of another library with 12 rows for the camera and 6 for each landmark in its covariance.
-/// Its models are constants, which take no time: only its own arithmetic is measured.
+/// EKF of another library. Its covariance has 12 rows for the camera and 6 rows for each landmark.
+/// Its models are constants and take no time. Only the arithmetic of the library is measured.
 class SlamPeer {
  public:
   virtual ~SlamPeer() = default;
-  /// Runs a prediction, and an update by two numbers of each observed landmark.
+  /// Runs a prediction, and an update with two numbers for each observed landmark.
   virtual void Frame() = 0;
 };
 
-// Built if the library is installed. Uses the faster one of its modes of updating.
+// Creates the EKF of MRPT with its fastest method of updating. Built if MRPT is installed.
 std::unique_ptr<SlamPeer> MakeMrptSlam(int landmarks, int observed);
 
 }  // namespace alidade::bench

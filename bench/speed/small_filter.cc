@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of one step of a small filter: a prediction and two scalar measurements with gates, relative
-// to hand-unrolled code. The other libraries have no gates. See depth_step.h.
+// Time of one step of a small filter, relative to hand-unrolled code. A step is a prediction and
+// two scalar measurements with gates, see depth_step.h. The filters of other libraries have no
+// gates.
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 
@@ -21,7 +22,7 @@ namespace {
 
 constexpr double kGate = 0.999;
 
-/// Baseline: every operation unrolled by hand, a form that is tedious to write.
+/// Baseline, with every operation unrolled by hand. Such code is tedious to write.
 class HandUnrolled {
  public:
   void Step(double disparity, double inverse_scale) {
@@ -53,7 +54,7 @@ class HandUnrolled {
     const double al = plz_ * lambda_ + pll_ * z_;
     Correct(az, av, al, 1.0 / (az * lambda_ + al * z_ + sigma * sigma), inverse_scale - s);
   }
-  /// Corrects the state, given a = P H', 1/S and the innovation.
+  /// Corrects the state. The elements of a = P H', 1/S and the innovation r are given.
   void Correct(double az, double av, double al, double inverse_s, double r) {
     if (!(r * r * inverse_s <= gate_)) return;
     const double k = r * inverse_s;
@@ -113,7 +114,7 @@ class FixedEigen {
   Eigen::Matrix3d f_, q_, p_ = Eigen::Matrix3d::Zero();
 };
 
-/// Shipped models composed at compile time.
+/// Filter of shipped models, composed at compile time.
 class StaticFilter {
  public:
   StaticFilter() {
@@ -136,7 +137,7 @@ class StaticFilter {
       ConstantVelocity<1, false>(kAcceleration), Constant<1>(1)};
 };
 
-/// Filter engine: its input are frames, its output reports of all measurements.
+/// Filter engine. Its input is a frame; its output is a report with all measurements.
 class Engine {
  public:
   explicit Engine(Problem problem) {
@@ -160,7 +161,7 @@ class Engine {
   Frame frame_;
 };
 
-/// Returns the problem with models behind the plugin ABI, as a config composes them.
+/// Returns the problem with models behind the plugin ABI, composed as for a config.
 Problem PluginProblem() {
   Problem problem = testing::DepthFilter();
   problem.motions[0].model =
@@ -173,7 +174,8 @@ Problem PluginProblem() {
   return problem;
 }
 
-/// Makes a contender whose chunk takes about 0.4 ms. Appends its depth at the end of one period.
+/// Makes a contender whose chunk takes about 0.4 ms. Appends to `depths` its depth after one
+/// period.
 template <class Filter>
 Contender MakeContender(const std::string& name, std::shared_ptr<Filter> filter,
                         const TargetMeasurements& target, std::vector<double>& depths) {
@@ -223,7 +225,8 @@ int Main(int rounds) {
 #if defined(ALIDADE_BENCH_MRPT)
   add_peer("mrpt", "MRPT, one observation of two numbers", MakeMrpt());
 #endif
-  // All solve the same problem, but joint and sequential updates linearise at different points.
+  // All contenders solve the same problem. Depths may differ by 1 mm, because joint and sequential
+  // updates linearise at different points.
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     if (std::abs(depths[i] - depths[0]) < 1e-3) continue;
     std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the baseline at %.9f m\n",

@@ -7,11 +7,13 @@
 #include <string>
 #include <vector>
 
-/// Cost of a BAL or Bundler file, computed from its text by the definition of the formats:
+/// Computation of the cost of a BAL or Bundler file from its text, by the definition of the
+/// formats:
 ///
 ///   P = R X + t,   p = -P / P_z,   p' = f (1 + k1 |p|^2 + k2 |p|^4) p
 ///
-/// over all observations, for either sign of P_z. It shares no code with the code under test.
+/// The cost is the sum over all observations, for either sign of P_z. This file shares no code with
+/// the code under test.
 namespace alidade::testing {
 
 struct FormulaCost {
@@ -26,7 +28,7 @@ struct FormulaCamera {
   std::array<double, 3> t{}, lens{};
 };
 
-/// Rodrigues' formula: I + sin(a) K + (1 - cos(a)) K^2.
+/// Returns the rotation matrix by Rodrigues' formula: I + sin(a) K + (1 - cos(a)) K^2.
 inline std::array<double, 9> RotationOf(const std::array<double, 3>& w) {
   const double angle = std::hypot(w[0], w[1], w[2]);
   if (angle == 0.0) return {1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -15,11 +15,11 @@
 /// Generated bundles, for tests.
 namespace alidade::testing {
 
-/// Returns deterministic noise: a product of sines, the same in every run.
+/// Returns sample `i` of deterministic noise, a product of a sine and a cosine.
 inline double Wave(int i) { return std::sin(1.7 * i + 0.3) * std::cos(0.9 * i); }
 
-/// Returns the true problem: `cameras` on an arc around `points` in a box 6 m ahead, measured
-/// without noise.
+/// Returns a problem at its true values, with observations without noise. The `cameras` are on an
+/// arc around the `points`, which are in a box 6 m ahead.
 inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   BundleFile file;
   BundleProblem& problem = file.problem;
@@ -49,9 +49,9 @@ inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   return file;
 }
 
-/// Returns cameras side by side with points in front of them and, for one point in four, behind
-/// them. The noise is about half a pixel and the same in every run. The sensor is the projective
-/// camera of BAL.
+/// Returns a problem of cameras side by side. One point in four is behind the cameras, the others
+/// are in front. The noise is about half a pixel, and is the same in every run. The sensor is the
+/// projective camera of BAL.
 inline BundleFile BundleOnBothSides(int cameras = 8, int points = 60) {
   BundleFile file;
   BundleProblem& problem = file.problem;
@@ -93,7 +93,7 @@ inline void AddOutliers(BundleProblem& problem) {
     problem.observations[i].z[0] += 80.0;
 }
 
-/// Returns the median distance of the other cameras from the first.
+/// Returns the median distance of the other cameras from the first camera.
 inline double MedianDistance(const std::vector<std::array<double, 3>>& positions) {
   std::vector<double> distances;
   for (std::size_t i = 1; i < positions.size(); ++i) {
@@ -105,8 +105,8 @@ inline double MedianDistance(const std::vector<std::array<double, 3>>& positions
   return distances[distances.size() / 2];
 }
 
-/// Moves all cameras but the first, and the points, by about 5 cm and 0.01 rad, and changes the
-/// focal lengths by 1 %.
+/// Moves all points, and all cameras except the first, by up to 5 cm. Turns these cameras by up to
+/// 0.01 rad. Changes the focal lengths by up to 1 %.
 inline void Disturb(BundleProblem& problem) {
   int i = 0;
   for (auto& camera : problem.cameras) {

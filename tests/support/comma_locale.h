@@ -11,8 +11,8 @@
 
 namespace alidade::testing {
 
-/// Locale in which C and C++ write `1,5` for 1.5, active during the lifetime of the object. It is
-/// built with localedef, so that it need not be installed.
+/// Locale in which C and C++ write `1,5` for 1.5. It is active during the lifetime of the object.
+/// The object builds the locale with localedef; no such locale has to be installed.
 class CommaLocale {
  public:
   CommaLocale() : before_(std::setlocale(LC_ALL, nullptr)) {
@@ -34,7 +34,7 @@ class CommaLocale {
   CommaLocale(const CommaLocale&) = delete;
   CommaLocale& operator=(const CommaLocale&) = delete;
 
-  /// Whether the locale could be built.
+  /// Returns true if the locale could be built.
   bool active() const { return active_; }
 
  private:

@@ -8,7 +8,7 @@
 
 #include "alidade/config/config.h"
 
-/// Configs from text, for tests.
+/// Functions for tests that make configs from text.
 namespace alidade::testing {
 
 inline Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }

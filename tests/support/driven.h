@@ -5,10 +5,10 @@
 
 #include "alidade/model/model.h"
 
-/// Small models with a control input, and sensors for them, for tests.
+/// Small motion models with a control input, and sensors for these models. For tests.
 namespace alidade::testing {
 
-/// Position on a line, driven by its velocity.
+/// Position on a line. The control input is its velocity.
 ///
 ///   model      x' = x + (u + w) dt,   w ~ N(0, sigma^2 / dt):  Var(x') = Var(x) + sigma^2 dt
 ///
@@ -33,7 +33,7 @@ struct Driven : Motion<1, Vec<1>> {
   }
 };
 
-/// Body driven by its accelerometer; its orientation is known only by a prior.
+/// Body with an accelerometer as the control input. Only a prior determines its orientation.
 ///
 ///   model      p' = p + v dt,  v' = v + (R(q) u + g) dt,  q' = q Exp(w sqrt(dt))
 ///
@@ -66,7 +66,8 @@ struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
   }
 };
 
-/// Body driven by an inertial unit, whose biases walk at random: 15 tangent elements.
+/// Body with an inertial unit as the control input. The biases of the unit perform a random walk.
+/// The state has 15 tangent elements.
 ///
 ///   model      p' = p + v dt,   v' = v + (R(q) (f - b_f + w_f) + g) dt
 ///              q' = q Exp((omega - b_omega + w_omega) dt),   b' = b + w_b dt
@@ -75,8 +76,8 @@ struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
 ///   p, v            3      m, m/s        world  position, velocity
 ///   q               4      -             -      world_from_body
 ///   b_f, b_omega    3      m/s^2, rad/s  body   biases
-///   f, omega        3      m/s^2, rad/s  body   specific force, angular velocity: the input
-///   w               12     -             -      white, of densities kDensities
+///   f, omega        3      m/s^2, rad/s  body   specific force and angular velocity, the input
+///   w               12     -             -      white noise of densities kDensities
 struct Inertial : Motion<12, Vec<3>, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
       Quantity{"position", "m", "", "x,y,z"}, Quantity{"velocity", "m/s", "", "x,y,z"},
@@ -108,7 +109,7 @@ struct Inertial : Motion<12, Vec<3>, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   }
 };
 
-/// z = x + n
+/// Sensor z = x + n.
 struct Position3 : Sensor<Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position", "", "", "x,y,z"}};
   static constexpr Quantity kMeasurement{"position", "", "", "x,y,z"};
@@ -123,7 +124,7 @@ struct Position3 : Sensor<Vec<3>, Vec<3>> {
   }
 };
 
-/// Vehicle in the plane, driven by its odometry, with a mast.
+/// Vehicle in the plane, with a mast. The control input is its odometry.
 ///
 ///   model      p' = p + v (cos h, sin h) dt,  h' = h + omega dt + w sqrt(dt),  mast' = mast
 struct Unicycle : Motion<1, Vec<2>, Angle, Vec<2>> {
@@ -144,7 +145,7 @@ struct Unicycle : Motion<1, Vec<2>, Angle, Vec<2>> {
   void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.01 * std::sqrt(dt_s); }
 };
 
-/// z = p + R(h) mast + n: a satellite receiver on the mast.
+/// Satellite receiver on the mast: z = p + R(h) mast + n.
 struct OnMast : Sensor<Vec<2>, Vec<2>, Angle, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y"},
                                      Quantity{"heading", "rad"}, Quantity{"mast", "m", "", "x,y"}};

@@ -10,11 +10,11 @@
 #include "alidade/estimation/ekf.h"
 #include "support/landmark_sensors.h"
 
-/// Small problems with landmarks composed in C++, for tests.
+/// Small problems with landmarks, composed in C++. For tests.
 namespace alidade::testing {
 
-/// Returns a problem with block `cam.position`, whose prior has the standard deviation `sigma_0`,
-/// and sensor `tracks`.
+/// Returns a problem with the block `cam.position` and the sensor `tracks`. The prior of the block
+/// has the standard deviation `sigma_0`.
 template <class Model>
 Problem MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
   Problem problem;
@@ -63,14 +63,14 @@ inline Ekf EkfOf(const Problem& problem, const EkfOptions& options = {}) {
   return {problem, options, {{"tracks", problem.sensors[0].model->measurement().geometry.ambient}}};
 }
 
-/// Returns the outcome of the measurement of a landmark, kFailed if the report has no such
-/// measurement.
+/// Returns the outcome of the measurement of a landmark. Returns kFailed if the report does not
+/// contain this measurement.
 inline Outcome OutcomeFor(const UpdateReport& report, std::int64_t id) {
   const auto found = std::ranges::find(report.measurements(), id, &MeasurementReport::landmark);
   return found == report.measurements().end() ? Outcome::kFailed : found->outcome;
 }
 
-/// Returns the estimate of a landmark, null if it does not exist.
+/// Returns the estimate of a landmark, or null if the landmark does not exist.
 inline const LandmarkEstimate* Find(const std::vector<LandmarkEstimate>& landmarks,
                                     std::int64_t id) {
   const auto found = std::ranges::find(landmarks, id, &LandmarkEstimate::id);

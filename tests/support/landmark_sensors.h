@@ -7,10 +7,11 @@
 #include "alidade/model/model.h"
 #include "alidade/model/plugin_abi.h"
 
-/// Camera that walks at random without rotation, and sensors of landmarks in each representation.
+/// Camera that performs a random walk without rotation, and sensors of landmarks in each
+/// representation. For tests.
 namespace alidade::testing {
 
-/// r' = r + sigma sqrt(dt) w
+/// Random walk r' = r + sigma sqrt(dt) w.
 struct Walk : Motion<3, Vec<3>> {
   static constexpr std::array kBlocks{Quantity{"position", "m", "", "x,y,z"}};
   double sigma = 0.1;
@@ -27,7 +28,7 @@ struct Walk : Motion<3, Vec<3>> {
 constexpr Quantity kPosition{"position", "m", "", "x,y,z"};
 constexpr unsigned kOfLandmark = ALIDADE_ROLE_LANDMARK;
 
-/// z = p - r: linear, so the Kalman filter is exact.
+/// Sensor z = p - r. It is linear, so the Kalman filter is exact.
 struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{kPosition,
                                      Quantity{"landmark", "m", "", "x,y,z", kOfLandmark}};
@@ -51,7 +52,7 @@ struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>> {
   }
 };
 
-/// z = (hx, hy) / hz in camera axes, which are parallel to the world axes.
+/// Projection z = (hx, hy) / hz. The camera axes are parallel to the world axes.
 struct Pinhole {
   static constexpr Quantity kMeasurement{"pixel", "", "", "u,v"};
   double sigma = 0.01;
@@ -63,7 +64,7 @@ struct Pinhole {
   }
 };
 
-/// h = rho (a - r) + m(theta, phi)
+/// Inverse-depth sensor: h = rho (a - r) + m(theta, phi).
 struct InverseDepthPixels : Sensor<Vec<2>, Vec<3>, Vec<6>>, Pinhole {
   static constexpr std::array kRoles{
       kPosition, Quantity{"landmark", "", "", "x0,y0,z0,theta,phi,rho", kOfLandmark}};
@@ -93,7 +94,7 @@ struct InverseDepthPixels : Sensor<Vec<2>, Vec<3>, Vec<6>>, Pinhole {
   }
 };
 
-/// h = rho (a - r) + m
+/// Sensor of an anchored landmark: h = rho (a - r) + m.
 template <unsigned kShared>
 struct AnchoredPixels : Sensor<Vec<2>, Vec<3>, Vec<3>, UnitVector, Vec<1>>, Pinhole {
   static constexpr std::array kRoles{kPosition,
@@ -124,7 +125,7 @@ struct AnchoredPixels : Sensor<Vec<2>, Vec<3>, Vec<3>, UnitVector, Vec<1>>, Pinh
   }
 };
 
-/// h = p - r
+/// Sensor of a landmark as a point: h = p - r.
 struct XyzPixels : Sensor<Vec<2>, Vec<3>, Vec<3>>, Pinhole {
   static constexpr std::array kRoles{kPosition,
                                      Quantity{"landmark", "m", "", "x,y,z", kOfLandmark}};

@@ -12,7 +12,7 @@ namespace alidade::testing {
 
 using Vec3 = std::array<double, 3>;
 
-/// Returns a camera with a radtan lens, 640 x 480 px.
+/// Returns a camera with a radtan lens and 640 x 480 px.
 inline Camera Lens() {
   return Camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0},
                 {0.0012, -0.0007});
@@ -46,7 +46,7 @@ Blocks CutIntoBlocks(const double* y) {
   return blocks;
 }
 
-/// Returns the landmark a + m / rho, with m of unit length.
+/// Returns the landmark at the point a + m / rho of a ray. m has unit length.
 template <class Representation>
 Blocks LandmarkOn(const Ray<double>& ray) {
   double y[detail::Blocks<Representation>::kAmbient];
@@ -54,7 +54,7 @@ Blocks LandmarkOn(const Ray<double>& ray) {
   return CutIntoBlocks<Representation>(y);
 }
 
-/// Returns the landmark at `point` whose anchor is `anchor`.
+/// Returns the landmark at `point` with the given anchor.
 template <class Representation>
 Blocks LandmarkAt(const Vec3& anchor, const Vec3& point) {
   Vec3 m;
@@ -76,14 +76,16 @@ inline std::vector<double> Predicted(const SharedSensor& sensor, const Blocks& r
   return z;
 }
 
-/// Compares the Jacobians of Predict with numeric ones.
+/// Compares the Jacobians of Predict with numeric Jacobians.
 inline void ExpectTrueJacobians(const SharedSensor& sensor, const Blocks& roles) {
-  // Error: h^4 times fifth derivatives of pixels, at most 1e4 of the Jacobians.
+  // The numeric error is h^4 times fifth derivatives of pixels. These are at most 1e4 times the
+  // Jacobians.
   ExpectSame(SensorJacobian(sensor, roles), NumericSensorJacobian(sensor, roles), 10 * kNumeric);
 }
 
-/// Checks that Initialise inverts Predict, and compares its Jacobians with numeric ones. `from` has
-/// the position, the orientation, z and, if the sensor needs it, the prior.
+/// Checks that Initialise inverts Predict. Compares the Jacobians of Initialise with numeric
+/// Jacobians. `from` contains the position, the orientation and z. If the sensor needs a prior, it
+/// is the last element.
 inline void ExpectTrueInverse(const SharedSensor& sensor, const Blocks& from) {
   std::vector<Space> spaces{sensor->roles()[0], sensor->roles()[1], sensor->measurement()};
   spaces.resize(from.size());

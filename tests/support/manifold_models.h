@@ -6,10 +6,10 @@
 
 #include "alidade/model/model.h"
 
-/// Models of one block of any geometry G, for tests.
+/// Models of a single block with any geometry G. For tests.
 namespace alidade::testing {
 
-/// x' = x (+) w, a random walk: w ~ N(0, kSigma^2 dt I), kSigma in tangent units / sqrt(s).
+/// Random walk x' = x (+) w, w ~ N(0, kSigma^2 dt I), with kSigma in tangent units / sqrt(s).
 template <class G, double kSigma>
 struct ManifoldWalk : Motion<G::kTangent, G> {
   static constexpr std::array kBlocks{Quantity{"x"}};
@@ -22,7 +22,7 @@ struct ManifoldWalk : Motion<G::kTangent, G> {
   }
 };
 
-/// z = x (+) n, n ~ N(0, kSigma^2 I).
+/// Sensor z = x (+) n, n ~ N(0, kSigma^2 I).
 template <class G, double kSigma>
 struct ManifoldSensor : Sensor<G, G> {
   static constexpr std::array kRoles{Quantity{"x"}};

@@ -11,13 +11,13 @@
 #include "alidade/plugin/plugin_models.h"
 #include "alidade/testing/jacobians.h"
 
-/// Checks that tests of models share, through the plugin ABI.
+/// Checks that several tests of models use. They call the models through the plugin ABI.
 namespace alidade::testing {
 
 inline constexpr double kPoison = 1e302;
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-// Tolerance of numeric Jacobians: h^4 = 1e-12 times derivatives of order 1e2, and rounding error /
-// h = 1e-13.
+// Tolerance of numeric Jacobians. The error is h^4 = 1e-12 times derivatives of about 1e2. The
+// rounding error is 1e-13 after division by h.
 inline constexpr double kNumeric = 1e-9;
 
 inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& b,
@@ -28,7 +28,7 @@ inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& 
   }
 }
 
-/// Compares F and G of a step with noise w with numeric ones.
+/// Compares F and G of a step with numeric Jacobians. The step has the noise w.
 inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                 const std::vector<double>& w, double dt_s) {
   const StepResult out = StepWithJacobians(motion, x, u, w.data(), dt_s),
@@ -38,7 +38,7 @@ inline void ExpectTrueJacobians(const SharedMotion& motion, const Blocks& x, con
   ExpectSame(out.g, numeric.g, kNumeric);
 }
 
-/// Returns L L' of the process noise, n_w x n_w.
+/// Returns the covariance L L' of the process noise, n_w x n_w.
 inline std::vector<double> Covariance(const SharedMotion& motion, const Blocks& x, double dt_s,
                                       const double* u = nullptr) {
   const int n = motion->noise_size();
@@ -52,8 +52,8 @@ inline std::vector<double> Covariance(const SharedMotion& motion, const Blocks& 
   return q;
 }
 
-/// A step without noise as matrices: F, and N = G Lq with Lq evaluated at `noise_of` over
-/// noise_dt_s.
+/// Linearised step without noise: F, and N = G Lq. Lq is evaluated at the state `noise_of` for the
+/// duration noise_dt_s.
 struct NoisyStep {
   Blocks next;
   Eigen::MatrixXd f, n;
@@ -69,8 +69,8 @@ inline NoisyStep StepWithNoise(const SharedMotion& motion, const Blocks& x, cons
           Eigen::Map<const Rows>(step.g.data(), n, n_w) * l};
 }
 
-/// Returns the relative difference between the noise of two steps and that of one step over both,
-/// for the noise kind that the model declares.
+/// Returns the relative difference between the noise of two steps and that of one step over both
+/// durations. It is computed for the noise kind that the model declares.
 inline double DefectOfParts(const SharedMotion& motion, const Blocks& x, const double* u,
                             double first_s, double second_s) {
   const double both_s = first_s + second_s;

@@ -12,7 +12,8 @@
 
 namespace alidade::testing {
 
-/// Host that reads parameters from a map: runs models through the plugin ABI without a plugin file.
+/// Host that reads parameters from a map. It runs models through the plugin ABI without a plugin
+/// file.
 class MapHost {
  public:
   using Values = std::map<std::string, std::vector<double>>;

@@ -39,8 +39,8 @@ inline bool Contains(const std::string& text, const std::string& part) {
 
 /// Result of a finished program.
 struct Outcome {
-  int code = -1;   ///< exit code, -1 if a signal ended the program
-  int signal = 0;  ///< signal that ended the program, 0 if none
+  int code = -1;   ///< exit code; -1 if a signal ended the program
+  int signal = 0;  ///< signal that ended the program; 0 if it exited
   std::string out, err;
 };
 
@@ -72,15 +72,16 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
 reference: truth
 )";
 
-/// Config with stereo only, whose data come from a table.
+/// Config with the stereo sensor only, and data from a table.
 inline const std::string kTableConfig =
     kTargetConfig + kStereoConfig +
     R"(source: {type: csv, path: table.csv, streams: {disparity: d}}
 estimators: {ekf: {type: ekf}}
 )";
 
-/// Runs the program of this build in a temporary folder with `config.yaml` and `table.yaml`. The
-/// folder is called `config`, so that the first of them writes to `runs/config`.
+/// Test that runs the program of this build in a temporary folder with `config.yaml` and
+/// `table.yaml`. The name of the folder is `config`. A run of config.yaml therefore writes to
+/// `runs/config`.
 class ProgramTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -95,12 +96,13 @@ class ProgramTest : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
   std::string Read(const std::string& name) const { return ReadText(folder_ / name); }
-  /// Reads a JSON file whose root is an object; JSON is also YAML.
+  /// Reads a JSON file whose root is an object. The reader of configs can read it, because JSON is
+  /// also YAML.
   Config Json(const std::string& name) const { return Config::FromText(Read(name), name); }
   bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
 
-  /// Starts `alidade ARGUMENTS...` with its output redirected to files. If `before_` is set, a
-  /// shell first runs it, for example to set limits or to redirect.
+  /// Starts `alidade ARGUMENTS...`, with the output redirected to files. If `before_` is not empty,
+  /// a shell runs this command first, for example to set limits or to redirect.
   pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
     arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
     if (!before_.empty()) {
@@ -137,8 +139,8 @@ class ProgramTest : public ::testing::Test {
     return Wait(Start(std::move(arguments), out));
   }
 
-  /// Returns `arguments` extended by an initial state 0.3 m away that approaches the camera with 5
-  /// m/s.
+  /// Returns `arguments`, extended by an initial state that makes the filter diverge: 0.3 m away,
+  /// approaching the camera at 5 m/s.
   static Arguments Diverging(Arguments arguments) {
     arguments.insert(arguments.end(),
                      {"--set", "state.target.initial.depth_rate={mean: -5, sigma: 0}", "--set",
@@ -146,7 +148,7 @@ class ProgramTest : public ::testing::Test {
     return arguments;
   }
 
-  /// Waits until `condition` holds, at most 20 s.
+  /// Waits until `condition` holds, for at most 20 s. Returns false if it does not hold by then.
   template <class Condition>
   static bool Eventually(const Condition& condition) {
     for (int i = 0; i < 2000; ++i) {

@@ -14,7 +14,7 @@
 #include "support/systems.h"
 #include "support/temporary_folder.h"
 
-/// A small run to record, and functions that read the resulting folder; for tests.
+/// Small run to record, and functions that read the resulting folder. For tests.
 namespace alidade::testing {
 
 namespace fs = std::filesystem;
@@ -46,8 +46,8 @@ inline std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-/// Target at depth 0.3 + 0.1 sin(0.4 * 2 pi t), measured with a small deterministic error; its
-/// disparity only in every other frame.
+/// Source with a target at the depth 0.3 + 0.1 sin(0.4 * 2 pi t). It is measured with a small
+/// deterministic error. Only every other frame contains the disparity.
 class SwingingTarget : public Source {
  public:
   explicit SwingingTarget(int frames) : frames_(frames) {}
@@ -103,7 +103,7 @@ inline Recorder::Options OptionsFor(const fs::path& folder, bool force = false,
   return {folder, force, figures, "alidade run swing.yaml"};
 }
 
-/// Runs the experiment with `recorder` as its observer.
+/// Runs the experiment with `recorder` as the observer.
 inline RunResult RunInto(Recorder& recorder, Experiment& experiment) {
   RunOptions options;
   options.observers = {&recorder};
@@ -120,7 +120,8 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   recorder.Finish(result);
 }
 
-/// Returns the exit code of the error that `call` throws, 0 if none; `text` receives its message.
+/// Returns the exit code of the error that `call` throws, or 0 if it throws none. `text` receives
+/// the message of the error.
 template <class Call>
 int CodeOf(const Call& call, std::string* text = nullptr) {
   try {
@@ -132,7 +133,8 @@ int CodeOf(const Call& call, std::string* text = nullptr) {
   return 0;
 }
 
-/// Returns the exit code of `call` in a child process, 128 + n if signal n ended it.
+/// Runs `call` in a child process. Returns the exit code of this process, or 128 + n if signal n
+/// ended it.
 template <class Call>
 int InChild(const Call& call) {
   const pid_t child = ::fork();

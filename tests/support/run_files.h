@@ -10,7 +10,7 @@
 /// Comparison of run folders.
 namespace alidade::testing {
 
-/// Returns the content of every file that contains no wall-clock time, by name.
+/// Returns the content of each file without wall-clock times, by the name of the file.
 inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -21,7 +21,8 @@ inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   return files;
 }
 
-/// Expects the same files with the same content; a failure names the file that differs.
+/// Expects both folders to have the same files with the same content. A failure names the file that
+/// differs.
 inline void ExpectSameFiles(const fs::path& folder, const fs::path& expected) {
   const auto files = RunFiles(folder), others = RunFiles(expected);
   EXPECT_GT(others.size(), 4u);

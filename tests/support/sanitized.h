@@ -3,8 +3,8 @@
 
 namespace alidade::testing {
 
-/// Whether this is a sanitizer build, in which memory use, run time and the exit after a crash
-/// differ from those of a normal build.
+/// True in a sanitizer build. Memory use, run time and the exit after a crash then differ from
+/// those of a normal build.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kSanitized = true;
 #else

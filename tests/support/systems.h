@@ -11,10 +11,10 @@
 #include "alidade/testing/frames.h"
 #include "motion_models/constant_velocity.h"
 
-/// Small problems composed in C++, for tests.
+/// Small problems, composed in C++. For tests.
 namespace alidade::testing {
 
-/// z = gain x + n: linear, so the Kalman filter is exact.
+/// Sensor z = gain x + n. It is linear, so the Kalman filter is exact.
 struct Linear : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}};
   static constexpr Quantity kMeasurement{"z", "m"};
@@ -37,10 +37,10 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// Models used by most tests, compiled once.
+// Models that most tests use. They are compiled only once, in systems.cc.
 SharedSensor LinearSensor(double gain, double sigma);
 SharedMotion ConstantMotion(int size, double random_walk = 0.0);
-/// Returns constant velocity on one axis, with discrete noise.
+/// Returns a constant-velocity model on one axis, with discrete noise.
 SharedMotion ConstantVelocityMotion(double acceleration);
 
 struct GivenPrior {
@@ -51,12 +51,12 @@ struct GivenPrior {
 /// Adds a state entry whose scalar blocks have the given priors.
 void AddMotion(Problem& problem, const std::string& name, const SharedMotion& model,
                const std::vector<GivenPrior>& priors);
-/// Adds a sensor that reads the stream with its own name.
+/// Adds a sensor. It reads the stream that has the same name.
 void AddSensor(Problem& problem, const std::string& name, const SharedSensor& model,
                const std::vector<std::string>& blocks);
 
-/// Constant velocity with a random acceleration that is constant within a step and independent
-/// between steps.
+/// Constant-velocity model with a random acceleration. The acceleration is constant within a step
+/// and independent between steps.
 struct Jolted : ConstantVelocity<1, false> {
   using ConstantVelocity<1, false>::ConstantVelocity;
   NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
@@ -64,19 +64,19 @@ struct Jolted : ConstantVelocity<1, false> {
 
 /// Returns a problem of a point with the motion model Jolted: blocks `p.x`, `p.v`.
 Problem MovingPoint(double acceleration = 1.0);
-/// Returns MovingPoint with an acceleration that is constant between two updates.
+/// Returns the problem of MovingPoint() with an acceleration that is constant between two updates.
 Problem HeldPoint(double acceleration = 1.0);
 
-/// Returns the depth filter: blocks `target.depth`, `target.depth_rate`,
-/// `template.inverse_distance`; sensors `disparity` (BF = 26 px m, 1 px) and `inverse_scale` (300
-/// px, 1 px).
+/// Returns the problem of the depth filter. Its blocks are `target.depth`, `target.depth_rate` and
+/// `template.inverse_distance`. Its sensors are `disparity` (BF = 26 px m, sigma 1 px) and
+/// `inverse_scale` (template 300 px, sigma 1 px).
 Problem DepthFilter();
 
-/// Returns the problem with the status of block `name` replaced; if `name` is empty, of every
-/// block.
+/// Returns the problem with a new status of block `name`. If `name` is empty, every block gets the
+/// status.
 Problem WithStatus(Problem problem, const std::string& name, BlockStatus status);
 
-/// z = sqrt(5 - x), NaN for x > 5, as is its Jacobian.
+/// Sensor z = sqrt(5 - x). z and its Jacobian are NaN for x > 5.
 struct Broken : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -92,8 +92,8 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-/// Returns a problem of an orientation that walks at random, with a prior of 0.1 rad, measured to
-/// 0.05 rad.
+/// Returns a problem of an orientation that performs a random walk. The sigmas are 0.1 rad for the
+/// prior and 0.05 rad for the sensor.
 Problem WalkingOrientation();
 
 }  // namespace alidade::testing

@@ -10,7 +10,7 @@
 
 namespace alidade::testing {
 
-/// Unique temporary folder, deleted with the object: tests run in parallel.
+/// Temporary folder with a unique name, because tests run in parallel. The destructor deletes it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

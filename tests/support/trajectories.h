@@ -6,11 +6,11 @@
 
 #include "alidade/evaluate/evaluate.h"
 
-/// Generated trajectories, for tests of their evaluation.
+/// Generated trajectories, for tests of the evaluation of trajectories.
 namespace alidade::testing {
 
-/// Returns `poses` poses, 0.1 s apart from 100 s on, on a curve in space with a changing
-/// orientation.
+/// Returns a trajectory on a curve in space, with a changing orientation. It has `poses` poses
+/// every 0.1 s, the first at 100 s.
 inline Trajectory Curve(int poses) {
   Trajectory t;
   t.name = "curve.tum";
@@ -26,7 +26,8 @@ inline Trajectory Curve(int poses) {
   return t;
 }
 
-/// Returns a straight line along x with steps of `step_m` each 0.1 s, without rotation.
+/// Returns a trajectory on a straight line along x, without rotation. It moves by `step_m` every
+/// 0.1 s.
 inline Trajectory Line(int poses, double step_m) {
   Trajectory t = Curve(poses);
   for (int i = 0; i < poses; ++i) {

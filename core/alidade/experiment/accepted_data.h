@@ -7,9 +7,9 @@
 
 namespace alidade::internal {
 
-/// Returns `frame` with only the measurements that an estimator of `problem` accepted, or with
-/// which it initialised a state, according to its `report`. Each stream must belong to one sensor
-/// only.
+/// Returns `frame` with only the measurements that an estimator accepted or used to initialise a
+/// state. `problem` and `report` are those of the estimator. At most one sensor may read each
+/// stream.
 Frame AcceptedMeasurements(const Frame& frame, const std::vector<StreamInfo>& streams,
                            const Problem& problem, const UpdateReport& report);
 

@@ -15,36 +15,38 @@
 
 namespace alidade::internal {
 
-/// Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller covariance,
-/// for the true trajectory of the run (the parametric bound of [Bergman1999], ch. 4). With F, G, Q,
-/// H, R at the true state x_k of each timestamp, and P_0 of the prior,
+/// Cramer-Rao bound of a filter: no unbiased estimate from the same data has a smaller covariance.
+/// The bound is that of the true trajectory of the run (the parametric bound of [Bergman1999], ch.
+/// 4). It starts from P_0 of the prior. F, G, Q, H and R are evaluated at the true state x_k of
+/// each timestamp:
 ///
 ///   P- = F P F' + G Q G',   P = (P-^-1 + H' R^-1 H)^-1
 ///
 /// These are the equations of Ekf. The class therefore runs an Ekf without gate and loss, and sets
-/// its state to truth before and after each step. The measured values only determine which
-/// measurements are valid, and the covariance of blocks that start from a measurement.
+/// the state of this filter to truth before and after each step. The measured values have only two
+/// effects: they determine which measurements are valid, and the covariance of blocks that start
+/// from a measurement.
 ///
 /// Landmarks are also set to truth, in their own representation, with the true camera position. In
-/// a problem with landmarks, h at truth replaces each valid measurement. Updates then do not move
-/// the state, and landmarks are initialised with the Jacobians at truth. A prior of the inverse
-/// distance contributes its sigma, but not its mean.
+/// a problem with landmarks, the prediction h at truth replaces each valid measurement. Updates
+/// then do not move the state, and landmarks are initialised with the Jacobians at truth. Of a
+/// prior of the inverse distance, only the sigma has an effect, not the mean.
 class CramerRaoBound {
  public:
-  /// Returns the true position of the landmark with this id, m, if it is known.
+  /// Function that returns the true position in m of the landmark with this id, if it is known.
   using TrueLandmark = std::function<std::optional<std::array<double, 3>>(std::int64_t id)>;
 
-  /// Returns why a problem has no bound, as text after `no Cramer-Rao bound: `, or "" if it has
-  /// one.
+  /// Returns the reason why a problem has no bound, as the text after `no Cramer-Rao bound: `.
+  /// Returns "" if the problem has a bound.
   static std::string WhyUnavailable(const Problem& problem, const std::vector<StreamInfo>& truths);
 
-  /// Requires a problem with a bound.
+  /// Requires that WhyUnavailable() returns "" for the problem.
   CramerRaoBound(const Problem& problem, const std::vector<StreamInfo>& streams,
                  const std::vector<StreamInfo>& truths, TrueLandmark true_landmark = {});
 
   /// Processes the next frame of a run, in the order of time. Returns false if the bound does not
   /// exist from this frame on: the truth of an estimated block or landmark is unknown, a step
-  /// failed, or a landmark could not start at truth. All later calls then return false.
+  /// failed, or a landmark could not start at truth. All later calls then return false too.
   bool Add(const SourceFrame& frame);
   /// Returns the true values with the bound P as covariance.
   const State& state() const { return engine_.f.state; }
@@ -58,9 +60,10 @@ class CramerRaoBound {
 
   FilterEngine engine_;
   TrueLandmark true_landmark_;
-  std::vector<int> sensors_;                              ///< by stream, or -1
-  std::map<std::string, std::vector<double>> landmarks_;  ///< true values, by block
-  std::vector<int> truths_;                               ///< by block, or -1
+  std::vector<int> sensors_;  ///< index of the sensor of each stream, or -1
+  /// True values of each landmark block, by its name.
+  std::map<std::string, std::vector<double>> landmarks_;
+  std::vector<int> truths_;  ///< index of the truth of each block, or -1
   bool is_lost_ = false;
 };
 

@@ -6,7 +6,8 @@
 
 namespace alidade::internal {
 
-/// Returns the node of the config `root` that causes a defect of `problem`, which was read from it.
+/// Returns the node of a config that causes a defect of `problem`. The problem was read from the
+/// config, whose root is `root`.
 Node FindDefectNode(const ProblemDefect& defect, const Node& root, const Problem& problem);
 
 }  // namespace alidade::internal

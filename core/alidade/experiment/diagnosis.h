@@ -5,8 +5,9 @@
 
 namespace alidade::internal {
 
-/// Completes the result of `run` except for its metrics: counts, units, the map, whether it failed,
-/// and an event for each finding, such as a sensor that was never used.
+/// Completes the result of `run` except for the metrics. Adds the counts, the units, the map,
+/// whether the estimator failed, and an event for each finding, such as a sensor that was never
+/// used.
 void Diagnose(const Experiment& experiment, EstimatorRun& run);
 
 }  // namespace alidade::internal

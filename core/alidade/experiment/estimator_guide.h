@@ -12,9 +12,10 @@ namespace alidade::internal {
 /// Returns the first sensor on `stream` without known numbers, or null.
 const SensorBinding* GuidingSensor(const Problem& problem, std::string_view stream);
 
-/// Guide of the source of an experiment: predicts its measurements with the current state of the
-/// filter `experiment.guide` and its GuidingSensor. Sets itself as the guide of the source in the
-/// constructor and removes itself in the destructor. Has no effect without a guiding filter.
+/// Guide of the source of an experiment. It predicts measurements from the current state of the
+/// filter `experiment.guide`, with the GuidingSensor of that filter. The constructor sets it as the
+/// guide of the source, and the destructor removes it. It has no effect if `experiment.guide` is
+/// null.
 class EstimatorGuide : public Guide {
  public:
   explicit EstimatorGuide(Experiment& experiment);

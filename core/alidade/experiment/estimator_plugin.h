@@ -17,14 +17,16 @@ namespace alidade {
 
 inline constexpr const char* kEstimatorKind = "estimator";
 
-/// Creates an estimator with options that were read before; `streams` are those of the source.
+/// Function that creates an estimator with options that it already contains. `streams` are the
+/// streams of the source.
 using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
     const Problem& problem, const std::vector<StreamInfo>& streams)>;
 
 /// Arguments of the factory of an estimator.
 struct EstimatorArguments {
-  Node entry;      ///< the config's entry of `estimators`
-  Params& params;  ///< the same entry, read by declaration (numbers, flags, choices)
+  Node entry;  ///< the config's entry of `estimators`
+  /// Reader of the same entry that also declares each parameter (numbers, flags, choices).
+  Params& params;
 };
 
 /// Factory of an estimator.
@@ -32,13 +34,13 @@ struct EstimatorEntry {
   const char* name;
   const char* doc;
   const char* citation;
-  /// Reads the options and returns a function that creates the estimator for a problem. Errors of
-  /// both: an Error with a place, as thrown by Node::Fail.
+  /// Reads the options and returns a function that creates the estimator for a problem. Both this
+  /// function and the returned one report errors by an Error with a place, as Node::Fail throws.
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
   EstimatorKind kind = EstimatorKind::kFilter;
   /// Capabilities of the estimator. A problem that needs more is rejected with an error that names
-  /// the missing capability, before the estimator is created. Null: it does not support landmarks,
-  /// and must itself reject everything else that it does not support.
+  /// the missing capability, before the estimator is created. Null means that the estimator does
+  /// not support landmarks, and itself rejects everything else that it does not support.
   const EstimatorCapabilities* capabilities = nullptr;
 };
 constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
@@ -48,8 +50,8 @@ constexpr CppEntry EntryOf(const EstimatorEntry& estimator) {
 /// Returns the factory of `entry`, which must be an estimator.
 const EstimatorEntry& EstimatorOf(const PluginEntry& entry);
 
-/// Returns the maker of the estimator `name` with the options in `node`. Errors: kPlugin with the
-/// places searched, kBadConfig, those of the estimator.
+/// Reads the options of the estimator `name` from `node`, and returns a function that creates the
+/// estimator. Errors: kPlugin with the searched places, kBadConfig, those of the estimator.
 EstimatorMaker CreateEstimator(const PluginHost& host, const std::string& name, const Node& node);
 
 /// Returns the parameters of the estimator `entry`.

@@ -15,13 +15,13 @@ namespace alidade::internal {
 /// Options of an estimator entry, for display.
 struct Description {
   EkfOptions common;              ///< options of every filter
-  std::vector<TextRow> specific;  ///< keys and texts of the options of this type only
+  std::vector<TextRow> specific;  ///< key and text of each option that only this type has
 };
 
-/// Built-in type of estimator, for `type:` of an entry of `estimators:`.
+/// Built-in estimator type, which the key `type` of an entry of `estimators:` selects.
 struct EstimatorType {
   const char* name;
-  const char* doc;  ///< one line
+  const char* doc;  ///< description in one line
   EstimatorCapabilities capabilities;
   EstimatorKind kind;
   /// Reads the keys of the entry. Errors: kBadConfig.

@@ -16,41 +16,46 @@ namespace alidade::internal {
 /// State of one estimator during a run.
 struct EstimatorRun {
   EstimatorSpec& spec;
-  int index = 0;  ///< in the experiment
+  int index = 0;  ///< index in Experiment::estimators
   Metrics metrics;
   EstimatorResult result;
-  bool finished = false;                      ///< it could not continue
-  bool diverged = false;                      ///< in a processed frame; not of offline estimators
-  bool has_estimate = false;                  ///< so the counts of its measurements are known
-  const UpdateReport* last_report = nullptr;  ///< of the last frame; null if it finished earlier
-  bool needs_reference = false;               ///< its metrics need the estimates of the reference
-  std::vector<Estimate> estimates = {};       ///< if needs_reference
-  std::int64_t stale_inputs = 0;              ///< number of all events `input_stale`
-  std::vector<char> failed_sensors = {};      ///< under OnPluginFailure::kDisable, or empty
+  bool finished = false;  ///< true if the estimator could not continue
+  /// True if it diverged in a processed frame; never set for an offline estimator.
+  bool diverged = false;
+  bool has_estimate = false;  ///< true after an estimate, so the counts of measurements are known
+  /// Report of the last frame; null if the estimator finished earlier.
+  const UpdateReport* last_report = nullptr;
+  bool needs_reference = false;  ///< true if the metrics need the estimates of the reference
+  std::vector<Estimate> estimates = {};  ///< filled only if needs_reference is true
+  std::int64_t stale_inputs = 0;         ///< total number of events `input_stale`
+  /// By sensor: nonzero if it failed; empty unless OnPluginFailure::kDisable.
+  std::vector<char> failed_sensors = {};
 
-  /// Estimator after a frame.
+  /// Result of processing a frame: the estimator after the frame, with its report.
   struct FrameResult {
     const Estimator& estimator;
     const UpdateReport& report;
-    std::optional<double> wall_s;  ///< needed; empty if it processed the frame earlier
+    /// Wall-clock time of the frame; empty if it was processed earlier.
+    std::optional<double> wall_s;
   };
   /// Processes the frame without the streams that only failed sensors read. If the estimator
-  /// already processed it on arrival, returns that result from `rolled_back`, which is null
-  /// otherwise.
+  /// already processed the frame on arrival, `rolled_back` is the result, which the function
+  /// returns. Otherwise `rolled_back` is null.
   FrameResult Process(const Frame& frame, const std::vector<StreamInfo>& streams,
                       const ProcessedFrame* rolled_back) const;
-  /// Disables the sensors whose model failed in the frame of `report`. Returns why the run must
-  /// end, or "".
+  /// Disables the sensors whose model failed in the frame of `report`. Returns the reason why the
+  /// run must end, or "" if it can continue.
   std::string HandleFailures(const UpdateReport& report);
   /// Adds the estimate of frame `k` to the metrics and passes it to the observers of the run.
   void AddEstimate(std::size_t k, const FrameWithSegments& frame, const State& state,
                    const UpdateReport& report, const RunOptions& options);
-  /// Adds the events to the result and the log. Of equal events `input_stale`, it adds only the
-  /// first and counts all in `stale_inputs`.
+  /// Adds the events to the result and the log. Counts all events `input_stale` in `stale_inputs`,
+  /// but adds only the first of equal ones.
   void AddEvents(const std::vector<Event>& events);
 };
 
-/// Returns all estimators of the experiment in their state before the first frame.
+/// Returns an EstimatorRun for each estimator of the experiment, in its state before the first
+/// frame.
 std::vector<EstimatorRun> CreateRuns(Experiment& experiment);
 
 }  // namespace alidade::internal

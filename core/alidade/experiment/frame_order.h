@@ -15,35 +15,39 @@
 
 namespace alidade::internal {
 
-/// Sequence of the frames of a source, in the order of the OutOfSequencePolicy of the experiment.
-/// Under kRollback it also runs the estimators: they process each frame on arrival, and repeat the
-/// frames after an out-of-sequence frame. Guides the source if its config requests a guide.
+/// Sequence of the frames of a source, in the order that the OutOfSequencePolicy of the experiment
+/// requires. Under kRollback it also runs the estimators. They process each frame on arrival; after
+/// an out-of-sequence frame they repeat the later frames. It guides the source if the config
+/// requests a guide.
 class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
 
-  /// Calls `check` for each frame first; it throws if the estimators must not process the frame.
+  /// Calls `check` for each frame before any other use. `check` throws if the estimators must not
+  /// process the frame.
   FrameOrder(Experiment& experiment, Check check);
-  /// Restores the estimators to their state after the last frame that Next returned.
+  /// Restores each estimator to its state after the last frame that Next() returned.
   ~FrameOrder();
   FrameOrder(const FrameOrder&) = delete;
   FrameOrder& operator=(const FrameOrder&) = delete;
 
-  /// Reads the next frame that no later arrival can precede; returns false at the end. An error of
-  /// the source, of `check` or of an estimator is thrown after all buffered frames were returned.
-  /// Errors: kBadData if one timestamp has two measurements of a stream, or two values of a truth.
+  /// Returns, in `frame`, the next frame that no later arrival can precede. The result is false at
+  /// the end. An error of the source, of `check` or of an estimator is thrown after all buffered
+  /// frames were returned. Errors: kBadData if one timestamp has two measurements of a stream, or
+  /// two values of a truth.
   bool Next(SourceFrame& frame);
-  /// Under kRollback, returns the last frame of Next as the estimator processed it on arrival; else
-  /// null. Valid until the next call of Next.
+  /// Under kRollback, returns the result of the estimator for the last frame of Next(), which it
+  /// processed on arrival. Returns null under other policies. The result is valid until the next
+  /// call of Next().
   const ProcessedFrame* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
-  /// Returns an event `out_of_sequence` for each frame dropped since the last call.
+  /// Returns an event `out_of_sequence` for each frame that was dropped since the last call.
   std::vector<Event> ExtractEvents() { return std::exchange(events_, {}); }
 
  private:
   struct BufferedFrame {
     SourceFrame frame;
-    std::vector<Place> places;  ///< of the measurements
+    std::vector<Place> places;  ///< place of each measurement in its file
   };
 
   bool Accept(const Frame& frame);
@@ -59,8 +63,9 @@ class FrameOrder {
   Experiment& experiment_;
   Check check_;
   EstimatorGuide guide_;
-  std::deque<BufferedFrame> buffer_;  ///< in the order of the timestamps
-  /// By estimator, for the buffered frames; empty if it is offline. Only under kRollback.
+  std::deque<BufferedFrame> buffer_;  ///< buffered frames in the order of their timestamps
+  /// Under kRollback: snapshots of each estimator for the buffered frames. nullopt for an offline
+  /// estimator.
   std::vector<std::optional<Snapshots>> snapshots_;
   Timestamp newest_ = kNoTimestamp;
   bool is_at_end_ = false;

@@ -10,21 +10,22 @@
 
 namespace alidade::internal {
 
-/// State implied by one measurement without a filter: the x of one scalar block with h(x) = z, such
-/// as f B / d for a disparity d. If the sensor can initialise the block from a measurement alone, x
-/// is that initial value. Otherwise measurement and roles must be scalars; x is then the value of
-/// the first role by Newton's method from truth, with the other roles at truth.
+/// State that one measurement implies without a filter: the value x of one scalar block for which
+/// h(x) = z, such as f B / d for a disparity d. If the sensor can initialise the block from a
+/// measurement alone, x is that initial value. Otherwise the measurement and all roles must be
+/// scalars. Newton's method then computes x for the first role, starting from truth, with the other
+/// roles at truth.
 class ImpliedState {
  public:
-  /// Returns nothing if the sensor does not imply a scalar: it has a landmark, known numbers, more
-  /// elements, or roles without truth.
+  /// Returns nullopt if the sensor does not imply a scalar because it has a landmark, known
+  /// numbers, more than one element, or roles without truth.
   static std::optional<ImpliedState> Of(const Problem& problem, const SensorBinding& binding,
                                         const std::vector<StreamInfo>& truths);
 
   BlockId block() const { return block_; }
-  /// Returns whether the other roles are at truth.
+  /// Returns whether x depends on the true values of the other roles.
   bool uses_true_roles() const { return uses_true_roles_; }
-  /// Returns x, or nothing if z is invalid, a truth is unknown, or x does not exist.
+  /// Returns x, or nullopt if z is invalid, a truth is unknown, or x does not exist.
   std::optional<double> From(const Truth& truth, const double* z) const;
 
  private:
@@ -33,7 +34,7 @@ class ImpliedState {
   SharedSensor model_;
   BlockId block_;
   bool uses_true_roles_ = false;
-  std::vector<int> truths_;  ///< by role
+  std::vector<int> truths_;  ///< index of the truth of each role
 };
 
 /// Returns the index of the truth of each role; empty if a role is unbound or has no truth.

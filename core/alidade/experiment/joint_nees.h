@@ -12,7 +12,7 @@ namespace alidade::internal {
 struct BlockError {
   BlockId id;
   const Eigen::VectorXd* error;
-  double truth_variance;  ///< of each element
+  double truth_variance;  ///< variance of each element of the truth
 };
 
 /// NEES e' C^-1 e with its degrees of freedom.
@@ -21,7 +21,7 @@ struct Nees {
   int dof = 0;         ///< 0 if no block is estimated
 };
 
-/// Computes the joint NEES of those of the blocks that are estimated; C = P + T as in Metrics.
+/// Computes the joint NEES of the estimated blocks among `errors`. C = P + T is that of Metrics.
 Nees JointNees(const State& state, std::span<const BlockError> errors);
 
 }  // namespace alidade::internal

@@ -11,10 +11,10 @@ namespace alidade {
 ///   NAME[:SUBJECT][@SEGMENT]      `rmse:target.depth@blind`, `accepted:stereo`, `map.rmse`
 struct MetricKey {
   std::string name;     ///< `rmse`, `nees.mean`, `accepted`
-  std::string subject;  ///< the block, owner or sensor; "": the run
-  std::string segment;  ///< of `evaluate.segments`; "": the whole run
+  std::string subject;  ///< block, owner or sensor; "" for the run
+  std::string segment;  ///< name in `evaluate.segments`; "" for the whole run
 
-  /// The key with this text form.
+  /// Returns the key with this text form.
   static MetricKey Parse(std::string_view text) {
     MetricKey key;
     const std::size_t segment = text.find('@');

@@ -22,17 +22,17 @@ std::vector<TableRow> ComparisonRows(const RunResult& result);
 /// Returns the subjects of rows in the order of the config: the blocks, their owners and the
 /// sensors of each estimator.
 std::vector<std::string> SubjectsOf(const Experiment& experiment);
-/// Returns ComparisonRows() if there are at most ten, else `diverged`, `inconsistent` and eight
-/// other rows. These rows are in the same order, and none is for a segment. Each round of the
-/// selection chooses one subject of each metric, in the order of priority. Unknown subjects come
-/// last.
+/// Returns ComparisonRows() if they are at most ten rows. Otherwise returns `diverged`,
+/// `inconsistent` and eight other rows in the same order, without rows of segments. The selection
+/// proceeds in rounds. Each round chooses one subject of each metric, in the order of priority;
+/// subjects that `subjects` does not contain come last.
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
 /// Returns the table of MainRows(), with the number of omitted rows.
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);
-/// Returns the rows of the metrics of this name over whole runs, with `label` instead of the name.
+/// Returns the rows of the metrics with this name over the whole run. Replaces the name by `label`.
 std::vector<TableRow> RowsOf(const RunResult& result, const std::string& name,
                              const std::string& label);
-/// Returns a sentence about the reference of the errors; "" if it is truth.
+/// Returns a sentence about the reference of the errors; "" if the reference is truth.
 std::string ReferenceText(const RunResult& result);
 
 }  // namespace alidade::internal

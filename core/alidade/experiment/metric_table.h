@@ -15,7 +15,7 @@ enum class MetricSubject { kRun, kBlock, kOwner, kSensor };
 /// Unit of a metric.
 enum class MetricUnit {
   kNone,
-  kSubject,  ///< unit of the block, or of the block that the sensor implies
+  kSubject,  ///< unit of the block; for a sensor, unit of the block that it implies
   kMetre,
   kMillisecond,
   kMicrosecond,
@@ -26,7 +26,7 @@ enum class MetricUnit {
 /// Best value of a metric.
 enum class MetricGoal { kNone, kZero, kOne, k95Percent };
 
-/// Reduction of the samples of a run to the metric.
+/// How the samples of a run are reduced to the metric.
 enum class MetricReduction { kMean, kRootMean, kMax, kLast };
 
 /// Section of a comparison that shows a metric.
@@ -38,9 +38,9 @@ enum class MetricSection {
 
 /// Error of a block at one timestamp.
 struct BlockSample {
-  double square;                ///< |e|^2; infinite if e is not finite
+  double square;                ///< |e|^2, infinite if e is not finite
   double error;                 ///< first element of e
-  std::optional<double> sigma;  ///< only of a scalar block with a variance
+  std::optional<double> sigma;  ///< set only for a scalar block with a variance
 };
 /// Joint error of the blocks of an owner at one timestamp.
 struct OwnerSample {
@@ -58,34 +58,34 @@ struct ImpliedSample {
   double square;
 };
 
-/// A metric: its meaning, its accumulation over a run, and its place in tables. A sampled metric
-/// has exactly one of the four sample functions. Separate code computes each other metric.
+/// Metric: its meaning, how it is accumulated over a run, and which tables show it. A sampled
+/// metric has exactly one of the four sample functions. Separate code computes the other metrics.
 struct MetricInfo {
   const char* name;
-  const char* meaning;  ///< for the documentation, in Markdown
+  const char* meaning;  ///< text of the documentation, in Markdown
   MetricSubject subject;
   MetricUnit unit = MetricUnit::kNone;
   MetricGoal goal = MetricGoal::kNone;
   bool needs_truth = true;
 
-  // Sample functions: return one value for a timestamp or measurement, or nothing.
+  // Sample functions: each returns one value for a timestamp or a measurement, or nullopt.
   std::optional<double> (*block)(const BlockSample&) = nullptr;
   std::optional<double> (*owner)(const OwnerSample&) = nullptr;
   std::optional<double> (*sensor)(const SensorSample&) = nullptr;
   std::optional<double> (*implied)(const ImpliedSample&) = nullptr;
   MetricReduction reduction = MetricReduction::kMean;
-  bool has_segments = false;  ///< also computed for each segment
+  bool has_segments = false;  ///< true if the metric is also computed for each segment
 
-  bool is_shown = false;             ///< has a row in the tables of `run` and `sweep`
-  bool is_shown_by_segment = false;  ///< also has a row for each segment
+  bool is_shown = false;             ///< true if the tables of `run` and `sweep` have a row for it
+  bool is_shown_by_segment = false;  ///< true if these tables also have a row for each segment
   int priority = 0;  ///< order among the ten main rows of `run`, from 1; 0: not a main row
 
   MetricSection section = MetricSection::kNone;
   const char* label = "";  ///< label in a comparison
-  bool is_main = false;    ///< also shown in the short form of a comparison
-  bool has_ratio = false;  ///< a comparison shows its ratio to the reference
-  bool is_ratio = false;   ///< is itself a ratio of means over the runs
-  bool is_cost = false;    ///< independent of the estimate
+  bool is_main = false;    ///< true if the short form of a comparison also shows it
+  bool has_ratio = false;  ///< true if a comparison shows its ratio to the reference
+  bool is_ratio = false;   ///< true if the metric is itself a ratio of means over the runs
+  bool is_cost = false;    ///< true if the metric is a cost, which does not depend on the estimate
 };
 
 /// All metrics, in the order of the tables. To add a sampled metric, add one entry.
@@ -106,7 +106,7 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .has_ratio = true},
     MetricInfo{.name = "mse_by_bound",
-               .meaning = "`compare`: mean square error by the Cramer-Rao bound",
+               .meaning = "`compare`: mean square error divided by the Cramer-Rao bound",
                .subject = MetricSubject::kBlock,
                .goal = MetricGoal::kOne,
                .section = MetricSection::kAlong,
@@ -128,8 +128,8 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kAlong,
                .label = "rmse of single measurements,"},
     MetricInfo{.name = "trajectory.sim3.rmse",
-               .meaning = "with landmarks: RMSE of the position after the similarity that "
-                          "minimises it [Umeyama1991]",
+               .meaning = "with landmarks: RMSE of the position after alignment by the similarity "
+                          "that minimises this RMSE [Umeyama1991]",
                .subject = MetricSubject::kRun,
                .unit = MetricUnit::kMetre,
                .goal = MetricGoal::kZero,
@@ -138,7 +138,8 @@ inline constexpr std::array kMetrics = {
                .is_main = true,
                .has_ratio = true},
     MetricInfo{.name = "trajectory.sim3.scale",
-               .meaning = "scale of that similarity: true = scale x estimate",
+               .meaning = "scale of the similarity of `trajectory.sim3.rmse`: true = scale x "
+                          "estimate",
                .subject = MetricSubject::kRun,
                .goal = MetricGoal::kOne,
                .section = MetricSection::kAlong,
@@ -163,7 +164,7 @@ inline constexpr std::array kMetrics = {
                .label = "RMSD, Sim3-aligned trajectory",
                .is_main = true},
     MetricInfo{.name = "rmsd.sigmas",
-               .meaning = "`compare`: RMSD in sigmas of the reference",
+               .meaning = "`compare`: RMSD in sigmas of the reference estimator",
                .subject = MetricSubject::kOwner,
                .goal = MetricGoal::kZero,
                .needs_truth = false,
@@ -300,7 +301,7 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kFinal,
                .label = "difference"},
     MetricInfo{.name = "final_difference.sigmas",
-               .meaning = "`compare`: final difference in sigmas of the reference",
+               .meaning = "`compare`: final difference in sigmas of the reference estimator",
                .subject = MetricSubject::kOwner,
                .goal = MetricGoal::kZero,
                .needs_truth = false,
@@ -318,19 +319,20 @@ inline constexpr std::array kMetrics = {
                .label = "map",
                .is_main = true,
                .has_ratio = true},
-    MetricInfo{.name = "map.sim3.rmse",
-               .meaning = "`map.rmse` after the similarity that minimises it [Umeyama1991]",
-               .subject = MetricSubject::kRun,
-               .unit = MetricUnit::kMetre,
-               .goal = MetricGoal::kZero,
-               .is_shown = true,
-               .priority = 7,
-               .section = MetricSection::kFinal,
-               .label = "Sim3-aligned map",
-               .is_main = true,
-               .has_ratio = true},
+    MetricInfo{
+        .name = "map.sim3.rmse",
+        .meaning = "`map.rmse` after alignment by the similarity that minimises it [Umeyama1991]",
+        .subject = MetricSubject::kRun,
+        .unit = MetricUnit::kMetre,
+        .goal = MetricGoal::kZero,
+        .is_shown = true,
+        .priority = 7,
+        .section = MetricSection::kFinal,
+        .label = "Sim3-aligned map",
+        .is_main = true,
+        .has_ratio = true},
     MetricInfo{.name = "map.sim3.scale",
-               .meaning = "scale of that similarity: true = scale x estimate",
+               .meaning = "scale of the similarity of `map.sim3.rmse`: true = scale x estimate",
                .subject = MetricSubject::kRun,
                .goal = MetricGoal::kOne,
                .is_shown = true,
@@ -346,15 +348,16 @@ inline constexpr std::array kMetrics = {
                .section = MetricSection::kFinal,
                .label = "RMSD, map",
                .is_main = true},
-    MetricInfo{.name = "map.sim3.rmsd",
-               .meaning = "`compare`: `map.rmsd` after the similarity that minimises it",
-               .subject = MetricSubject::kRun,
-               .unit = MetricUnit::kMetre,
-               .goal = MetricGoal::kZero,
-               .needs_truth = false,
-               .section = MetricSection::kFinal,
-               .label = "RMSD, Sim3-aligned map",
-               .is_main = true},
+    MetricInfo{
+        .name = "map.sim3.rmsd",
+        .meaning = "`compare`: `map.rmsd` after alignment by the similarity that minimises it",
+        .subject = MetricSubject::kRun,
+        .unit = MetricUnit::kMetre,
+        .goal = MetricGoal::kZero,
+        .needs_truth = false,
+        .section = MetricSection::kFinal,
+        .label = "RMSD, Sim3-aligned map",
+        .is_main = true},
     MetricInfo{.name = "reprojection",
                .meaning = "with landmarks: rms of the accepted innovations of a frame, as in "
                           "`NAME/reprojection.csv`; median over the last half of the frames",
@@ -366,8 +369,8 @@ inline constexpr std::array kMetrics = {
                .priority = 8},
     MetricInfo{.name = "settling_frames",
                .meaning = "number of the first frame (from 1) from which the centred rms over up "
-                          "to 9 frames stays within 20 % of `reprojection`; infinite if it is "
-                          "outside at the end",
+                          "to 9 frames stays within 20 % of `reprojection`; infinite if this "
+                          "rms is outside this band at the end",
                .subject = MetricSubject::kSensor,
                .unit = MetricUnit::kFrames,
                .goal = MetricGoal::kZero,

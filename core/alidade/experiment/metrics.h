@@ -11,15 +11,16 @@
 
 namespace alidade {
 
-/// Metrics of one estimator, accumulated frame by frame: the entries of kMetrics, but for those of
-/// the map (MapMetrics) and of comparisons.
+/// Metrics of one estimator, accumulated frame by frame. They are the entries of kMetrics, except
+/// those of the map (MapMetrics) and of comparisons.
 ///
-/// e = x_true (-) x is the error, in the tangent at the estimate. C = P + T is its covariance, and
-/// T = diag(StreamInfo::sigma^2) is that of the truth, which does not depend on the filter.
-/// An exact truth has T = 0. Timestamps at which C is singular or not finite have no NEES.
+/// e = x_true (-) x is the error, in the tangent space at the estimate. C = P + T is the covariance
+/// of e, and T = diag(StreamInfo::sigma^2) is the covariance of the truth, whose error does not
+/// depend on the filter. An exact truth has T = 0. If C is singular or not finite at a timestamp,
+/// the NEES is not computed there.
 ///
-/// The lag needs a scalar block, a truth that changes, and steps within 5 % of their mean. It uses
-/// the first 100 000 timestamps (Lag). The bounds of the mean NEES allow for the correlation of the
+/// The lag (see Lag()) is computed only for a scalar block whose truth changes and whose time steps
+/// lie within 5 % of their mean. It uses the first 100 000 timestamps. The bounds of the mean NEES allow for the correlation of the
 /// errors over time: n timestamps, at most 10 000, count as n / tau samples. tau is the integrated
 /// autocorrelation time of the NEES. Innovations are white, but those of one frame share the error
 /// of the prediction and count as one sample [BarShalom2001, sec. 5.4].
@@ -27,11 +28,11 @@ namespace alidade {
 /// Counts are `OUTCOME:SENSOR`, `inputs:ENTRY` for control inputs, and for landmarks
 /// `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`, `.rescued`.
 /// A truth has the name of its block, `target.depth`, or the last component of that name if only
-/// one block has it. A frame older than the state (before `initial_time_s`, say) changes only
-/// the counts. A metric without samples is omitted.
+/// one block has it. A frame that is older than the state (for example before `initial_time_s`)
+/// changes only the counts. A metric without samples is omitted.
 class Metrics {
  public:
-  /// `truths` are the truths of the source, or the blocks of the reference estimator.
+  /// `truths` are the truths of the source. If an estimator is the reference, they are its blocks.
   Metrics(const EstimatorSpec& spec, const std::vector<StreamInfo>& truths,
           const std::vector<Segment>& segments);
   ~Metrics();
@@ -44,20 +45,21 @@ class Metrics {
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
   /// Adds the errors of an estimate relative to the reference estimator, which replaces the truth:
   /// rmse, lag_ms and final_error only. P does not bound these differences, because both estimators
-  /// use the same data. `reference` and `estimate` have a value for each block of their
-  /// estimator's problem, empty if the block has no value.
+  /// use the same data. `reference` and `estimate` contain one value for each block of the
+  /// respective estimator's problem. The value is empty if the block has none.
   void AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
                      const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
-  /// Returns the events `inconsistent`, at most one for each block element: its truth is known, and
-  /// its error exceeded 10 sigma for 20 timestamps in a row.
+  /// Returns the events `inconsistent`, at most one for each block element. Such an event means
+  /// that the truth of the block is known, and the error of the element exceeded 10 sigma for 20
+  /// timestamps in a row.
   const std::vector<Event>& events() const;
-  /// Returns the indices of the sensors whose measurements may be in another unit: more than half
-  /// of the accepted and gated ones are far from their prediction. Far means
-  /// sqrt(r' S^-1 r / dof) > 100. For angles, whose r never exceeds pi, it means |r| > 5 sqrt(S)
-  /// with |r| > pi / 4 or |z| > 2 pi.
+  /// Returns the indices of the sensors whose measurements may have the wrong unit: more than half
+  /// of the accepted and gated measurements are far from their prediction. Far means sqrt(r' S^-1 r
+  /// / dof) > 100. For angles, whose r never exceeds pi, it means |r| > 5 sqrt(S) with |r| > pi / 4
+  /// or |z| > 2 pi.
   std::vector<int> far_off_sensors() const;
-  /// Returns the blocks whose truth the source names, but no frame provided.
+  /// Returns the names of the blocks whose truth the source declares, but no frame provided.
   std::vector<std::string> blocks_without_truth() const;
   /// Returns all metrics by key.
   std::map<std::string, double> Finish() const;

@@ -11,13 +11,14 @@
 
 namespace alidade::internal {
 
-/// Reads the additional keys of the entry `name` of a landmark sensor: the role `landmark` and
-/// `outlier_rejection`. Also creates its model for the representation xyz. Errors: kBadConfig.
+/// Reads the additional keys of a landmark sensor, the config entry `name`: the role `landmark` and
+/// `outlier_rejection`. Also creates the model of the sensor for the representation xyz. Errors:
+/// kBadConfig.
 void ReadLandmarkKeys(const std::string& name, const Node& entry, const SensorModel& model,
                       const PluginHost& host, SensorOptions& options);
 
-/// Reads the map `landmarks` of the root; returns nothing if no sensor measures landmarks. Errors:
-/// kBadConfig, also if the map does not fit the sensors.
+/// Reads the map `landmarks` of the root. Returns nullopt if no sensor measures landmarks. Errors:
+/// kBadConfig, for example if the sensors do not support an option of the map.
 std::optional<LandmarkOptions> ReadLandmarks(const Node& root,
                                              const std::vector<SensorBinding>& sensors);
 

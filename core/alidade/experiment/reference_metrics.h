@@ -5,7 +5,7 @@
 
 #include "alidade/experiment/metrics.h"
 
-/// Metrics with an estimator as reference instead of truth.
+/// Metrics whose reference is an estimator instead of truth.
 namespace alidade::internal {
 
 /// Returns the blocks of a problem in the form of the truths of a source.
@@ -14,7 +14,8 @@ std::vector<StreamInfo> BlocksOf(const Problem& problem);
 /// Values of an estimate, with the index of its frame in the run.
 struct Estimate {
   std::size_t frame;
-  std::vector<std::vector<double>> values;  ///< by block of the problem; empty without a value
+  /// Value of each block of the problem; empty if the block has none.
+  std::vector<std::vector<double>> values;
 };
 
 /// Returns the values of the first `blocks` blocks of a state.
@@ -26,9 +27,9 @@ struct FrameWithSegments {
   std::vector<bool> in_segment;
 };
 
-/// Adds the differences between `estimates` and the reference at the same frames to `metrics`,
-/// which was created with BlocksOf the problem of the reference. `frames` are all frames of the
-/// run. A reference value that is not finite counts as unknown.
+/// Adds to `metrics` the differences between `estimates` and `reference` at the same frames. The
+/// truths of `metrics` must be BlocksOf() the problem of the reference. `frames` are all frames of
+/// the run. A reference value that is not finite counts as unknown.
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
                     const std::vector<FrameWithSegments>& frames, Metrics& metrics);
 

@@ -8,15 +8,16 @@
 /// Log messages of a run.
 namespace alidade::internal {
 
-/// Logs, at level info, the streams and truths of the source, and the type, sensors and blocks of
-/// each estimator.
+/// Logs the streams and truths of the source, and the type, sensors and blocks of each estimator.
+/// The level is info.
 void LogExperiment(const Experiment& experiment);
 
-/// Logs one message for each event: a divergence as a warning, all others as info. With
-/// `is_reason`, the run reports the divergence as its reason, so it is logged as info.
+/// Logs one message for each event: a divergence as a warning, all others as info. If `is_reason`
+/// is true, the divergence is logged as info too, because the run also reports it as the reason for
+/// its end.
 void LogEvents(const std::string& estimator, std::span<const Event> events, bool is_reason = false);
 
-/// Logs, at level debug, the wall-clock time of each estimator.
+/// Logs the wall-clock time of each estimator. The level is debug.
 void LogDurations(const RunResult& result);
 
 }  // namespace alidade::internal

@@ -21,13 +21,13 @@ struct Similarity {
 
 namespace internal {
 
-/// Computes the similarity, with scale 1 unless `has_scale`.
+/// Computes the similarity. If `has_scale` is false, the scale is 1.
 Similarity Umeyama(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target, bool has_scale);
 
-/// Computes the mean of |p - mean p|^2; exactly 0 if all points are equal.
+/// Computes the mean of |p - mean p|^2. The result is exactly 0 if all points are equal.
 double SquaredExtent(const Eigen::Matrix3Xd& points);
 
-/// Computes the similarity. Returns nothing for fewer than three points, or if the points do not
+/// Computes the similarity. Returns nullopt for fewer than three points, or if the points do not
 /// determine s > 0.
 std::optional<Similarity> FindSimilarity(const Eigen::Matrix3Xd& source,
                                          const Eigen::Matrix3Xd& target);
@@ -37,17 +37,19 @@ struct SimilarityFit {
   double rmse = 0.0, scale = 1.0;
 };
 
-/// Aligns the columns of `source` to those of `target`. Returns nothing if FindSimilarity does.
+/// Aligns the columns of `source` to those of `target`. Returns nullopt if FindSimilarity does.
 std::optional<SimilarityFit> AlignBySimilarity(const Eigen::Matrix3Xd& source,
                                                const Eigen::Matrix3Xd& target);
 
-/// Alignment of a trajectory with a target trajectory by the best similarity [Umeyama1991]. It
-/// stores only sums, so its memory does not grow. For n pairs of points p, q with means p0, q0:
+/// Alignment of a trajectory with a target trajectory by the best similarity [Umeyama1991]. The
+/// class stores only sums, so its memory does not grow. For n pairs of points p, q with means p0,
+/// q0:
 ///
 ///   C = sum (q - q0) (p - p0)' / n,    t = max tr(R' C) over rotations R
 ///   scale = t / var p,    rmse^2 = var q - t^2 / var p
 ///
-/// The rmse is accurate to 1e-8 of the extent of the trajectory, as its square is a difference.
+/// The rmse is accurate to only 1e-8 times the extent of the trajectory, because its square is a
+/// difference of similar numbers.
 class TrajectoryAlignment {
  public:
   /// Adds a pair of points.
@@ -64,7 +66,7 @@ class TrajectoryAlignment {
     squares_ += p.squaredNorm();
     target_squares_ += q.squaredNorm();
   }
-  /// Returns the alignment, or nothing if FindSimilarity returns nothing.
+  /// Returns the alignment, or nullopt if FindSimilarity would return nullopt.
   std::optional<SimilarityFit> Result() const;
 
  private:

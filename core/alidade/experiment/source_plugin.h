@@ -26,8 +26,8 @@ constexpr CppEntry EntryOf(const SourceEntry& source) {
   return {kSourceKind, source.name, source.doc, "", source.keys, &source};
 }
 
-/// Creates the source of a config from its map `source`; `any_order` as in SourceArguments. Errors:
-/// kPlugin with the places searched, kBadConfig, those of the source.
+/// Creates the source that the map `source` of a config describes. SourceArguments describes
+/// `any_order`. Errors: kPlugin with the searched places, kBadConfig, those of the source.
 std::unique_ptr<Source> CreateSource(const PluginHost& host, const Config& config,
                                      std::uint64_t seed, bool any_order = false);
 

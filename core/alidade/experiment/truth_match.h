@@ -9,12 +9,14 @@
 
 namespace alidade::internal {
 
-/// Returns the index of the truth of each block, or -1. A truth has the name of its block
-/// (`target.depth`) or the last component of that name (`depth`); a full name has precedence. A
-/// last component that fits two blocks, or a truth of another size, does not match.
+/// Returns the index of the truth of each block, or -1 if the block has no truth. A truth has the
+/// name of its block (`target.depth`) or the last component of that name (`depth`); the full name
+/// has precedence. A last component that two blocks have does not match, nor does a truth of
+/// another size.
 std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<StreamInfo>& truths);
 
-/// Returns why truth `t` does not match a block of `layout`, or "" if it matches one.
+/// Returns the reason why truth `t` does not match any block of `layout`, or "" if it matches a
+/// block.
 std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>& truths,
                        std::size_t t);
 

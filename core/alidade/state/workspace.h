@@ -45,7 +45,8 @@ class Workspace {
   using Matrix = Eigen::Map<Eigen::MatrixXd>;
   using Vector = Eigen::Map<Eigen::VectorXd>;
 
-  /// Scope in which the memory is used. Its destructor releases all memory that was taken since its construction.
+  /// Scope in which memory is used. Its destructor releases the memory taken since its
+  /// construction.
   class Use {
    public:
     explicit Use(Workspace& workspace) : workspace_(workspace), used_(workspace.used_) {}

@@ -58,8 +58,8 @@ TEST(Random, IsXoshiro256PlusPlusSeededBySplitmix64) {
 }
 
 TEST(Random, SameSeedAndStreamGiveTheSameNumbers) {
-  // The expected values come from an independent program. The logarithm of the C library may differ
-  // in the last bit.
+  // The expected values come from an independent program. The C library may compute a logarithm
+  // that differs in the last bit.
   Random zero(2017), one(2017, 1);
   for (const double expected : {1.028508934778973, 0.2839764101068146, -0.8565249074654515}) {
     EXPECT_NEAR(zero.Normal(), expected, 1e-15);
@@ -71,8 +71,8 @@ TEST(Random, SameSeedAndStreamGiveTheSameNumbers) {
 }
 
 TEST(Random, UniformFillsItsInterval) {
-  // The mean is 1/2 +- 5 sqrt(1/12/N), and each tenth of the interval has N/10 values within 5
-  // sigma.
+  // The mean must be 1/2 +- 5 sqrt(1/12/N). Each tenth of the interval must have N/10 values, with
+  // a tolerance of 5 sigma.
   Random random(3);
   double sum = 0.0;
   std::vector<int> histogram(10);
@@ -90,8 +90,8 @@ TEST(Random, UniformFillsItsInterval) {
 }
 
 TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
-  // The moments are 0, 1, 0, 3. Their estimates have the variances 1, 2, 15, 96 over N; tolerance 5
-  // sigma.
+  // The moments are 0, 1, 0 and 3. Their estimates have the variances 1, 2, 15 and 96, each divided
+  // by N. The tolerance is 5 sigma.
   double m1 = 0.0, m2 = 0.0, m3 = 0.0, m4 = 0.0;
   int beyond = 0;
   for (const double x : Normals(Random(11))) {
@@ -109,7 +109,7 @@ TEST(Random, NormalHasTheMomentsOfTheNormalDistribution) {
 }
 
 TEST(Random, NeighbouringNormalsAreIndependent) {
-  // Two successive values are computed from one point in the unit disc.
+  // Both of two successive values are computed from one point in the unit disc.
   const std::vector<double> values = Normals(Random(12));
   const std::vector<double> later(values.begin() + 1, values.end());
   EXPECT_NEAR(Correlation(later, values), 0.0, 5.0 / std::sqrt(kCount));

@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-// Compares with tabulated chi-square quantiles.
+// Compares the bounds with tabulated quantiles of chi-square.
 TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
   // chi2(0.025; 200) = 162.728, chi2(0.975; 200) = 241.058: [BarShalom2001], table 1.5.4-1.
   const Interval bounds = ConsistencyBounds(2.0, 100.0);
@@ -21,8 +21,9 @@ TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
   EXPECT_NEAR(bounds.high, 241.058 / 200.0, 1e-5);
 }
 
-// The mean of 50 values of chi2(1), each below the 90 % gate, lies within the bounds in 95 % of
-// 4000 cases. The gate reduces the expected mean to 0.62, so the upper bound is below 1.
+// Each mean is that of 50 values of chi2(1) below the 90 % gate. In 95 % of 4000 cases the mean
+// must lie within the bounds. The gate reduces the expected mean to 0.62, so the upper bound is
+// below 1.
 TEST(ConsistencyBounds, KnowWhatAGateCutsOff) {
   const double gate = ChiSquareQuantile(0.9, 1);
   const Interval bounds = ConsistencyBounds(1.0, 50.0, gate);
@@ -39,19 +40,20 @@ TEST(ConsistencyBounds, KnowWhatAGateCutsOff) {
     }
     inside += sum / 50.0 >= bounds.low && sum / 50.0 <= bounds.high;
   }
-  // Tolerance: five standard deviations, and 1 % because the bounds match only two moments of the
-  // sum.
+  // The tolerance is five standard deviations plus 1 %, because the bounds match only two moments
+  // of the sum.
   EXPECT_NEAR(inside / double{kCases}, 0.95, 5.0 * std::sqrt(0.95 * 0.05 / kCases) + 0.01);
   EXPECT_LT(bounds.high, 1.0);
 }
 
-/// Quantiles at kProbabilities for one number of degrees of freedom.
+/// Quantiles at kProbabilities for `dof` degrees of freedom.
 struct Quantiles {
   int dof;
   double x[6];
 };
 constexpr double kProbabilities[] = {1e-9, 0.05, 0.5, 0.95, 0.999, 1.0 - 1e-12};
-// Computed with 40 digits by mpmath and by Boost.Math, which agree in all digits shown here.
+// These values were computed with 40 digits by mpmath and by Boost.Math. Both agree in all digits
+// shown here.
 constexpr Quantiles kQuantiles[] = {
     {1,
      {1.5707963267948968e-18, 0.0039321400000195232, 0.45493642311957275, 3.8414588206941245,
@@ -75,7 +77,8 @@ constexpr Quantiles kQuantiles[] = {
      {754.63306317829334, 927.59436302097905, 999.33341240338097, 1074.679448803441,
       1143.9170926196792, 1347.6202217646366}}};
 
-// The tolerance is seven times the largest observed error, 1.1e-15 at one degree of freedom.
+// The tolerance is seven times the largest observed error, which is 1.1e-15 at one degree of
+// freedom.
 TEST(ChiSquareQuantile, IsAccurateToRounding) {
   for (const Quantiles& expected : kQuantiles) {
     for (std::size_t i = 0; i < std::size(kProbabilities); ++i) {
@@ -85,8 +88,8 @@ TEST(ChiSquareQuantile, IsAccurateToRounding) {
   }
 }
 
-// The median is dof - 2 / 3 + 32 / (405 dof), with an error of at most 0.06 / dof^2: the known
-// series in 1 / dof.
+// The median is dof - 2 / 3 + 32 / (405 dof), with an error of at most 0.06 / dof^2. This is the
+// known series in 1 / dof.
 TEST(ChiSquareQuantile, OfManyDegreesOfFreedomIsFound) {
   for (const double dof : {1e4, 1e6, 1e8}) {
     EXPECT_NEAR(ChiSquareQuantile(0.5, dof) / (dof - 2.0 / 3.0 + 32.0 / (405.0 * dof)), 1.0, 1e-12);

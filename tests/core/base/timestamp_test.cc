@@ -20,7 +20,7 @@ TEST(TimestampFromSeconds, IsTheNearestNanosecond) {
 }
 
 TEST(TimestampFromSeconds, KeepsEveryBitOfLongTimes) {
-  // 2^30 + 2^-22 s is exact as a double; 1e9 times it is not. 2^-22 s = 238.4 ns.
+  // 2^30 + 2^-22 s is exact as a double, but 1e9 times this number is not. 2^-22 s = 238.4 ns.
   EXPECT_EQ(TimestampFromSeconds(0x1p30 + 0x1p-22), 1'073'741'824'000'000'238);
 }
 

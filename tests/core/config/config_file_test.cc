@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::string_view_literals;  // NOLINT(google-build-using-namespace)
 
-/// Returns the error that `call` throws, as `CODE message`.
+/// Returns the error that `call` throws as `CODE message`.
 template <class Call>
 std::string Failure(const Call& call) {
   try {
@@ -47,7 +47,7 @@ class ConfigFolder : public ::testing::Test {
     return file;
   }
 
-  /// Returns the error of reading `name`, with `D/` for the folder.
+  /// Returns the error of reading the file `name`. In the message, `D/` stands for the folder.
   std::string Fault(const std::string& name) const {
     std::string message = Failure([&] { Config::FromFile(folder_ / name); });
     const std::string folder = folder_.path().string();
@@ -132,7 +132,7 @@ TEST(ConfigFile, DeepNestingFailsEarly) {
   }
   EXPECT_NE(TextError(Repeated("? ", kSize)), "no error");
   EXPECT_EQ(TextError(chain), "78 f:64:12: nested too deep; expected at most 64 levels");
-  // Takes about 10 ms; a scanner that reads to the end needs seconds in a debug build.
+  // This takes about 10 ms. A scanner that reads to the end would need seconds in a debug build.
   EXPECT_LT(std::clock() - start, 2 * CLOCKS_PER_SEC);
 }
 
@@ -239,7 +239,7 @@ TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
   const std::vector<Node> plugins = config.root().At("plugins").Items();
   EXPECT_EQ(plugins[0].Text(), (folder_ / "parts/../x.so").string());
   EXPECT_EQ(plugins[1].Text(), "/y.so");
-  // The written config has the same meaning in any folder.
+  // The written config has the same meaning if it is stored in another folder.
   const Config again = Config::FromFile(Write("elsewhere/g.yaml", config.ToYaml()));
   EXPECT_EQ(again.ToYaml(), config.ToYaml());
 }

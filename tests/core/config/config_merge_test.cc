@@ -40,7 +40,7 @@ TEST(ConfigSet, RelativePathsAreTakenFromTheCurrentFolder) {
     EXPECT_EQ(config.root().At("source").At(key).Text(),
               (std::filesystem::current_path() / "tables/t.csv").string());
   }
-  config.Set("source.left", "3", "--set");  // the parameter of a plugin, not a file name
+  config.Set("source.left", "3", "--set");  // `left` is a parameter of a plugin, not a file name
   EXPECT_EQ(config.root().At("source").At("left").Text(), "3");
   config.Set("source.truth", "{depth: z}", "--set");
   EXPECT_EQ(config.root().At("source").At("truth").At("depth").Text(), "z");
@@ -80,7 +80,7 @@ TEST(ConfigSet, KeyPathMustFitTheTree) {
   }
 }
 
-// A file with these keys could not be read.
+// A file with these keys could not be read again.
 TEST(ConfigSet, RefusesKeysThatAFileMayNotHave) {
   EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8");
   EXPECT_EQ(SetError("a.x\ny", "1").find("--set: control character in the key"), 0u);

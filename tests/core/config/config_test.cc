@@ -19,7 +19,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 using testing::Message;
 using testing::Read;
 
-/// Returns the message of `read` for the value of `v`, without the leading `f.yaml:1:4 v: `.
+/// Calls `read` on the value of `v` and returns the error message without its start, `f.yaml:1:4 v:
+/// `.
 template <class Reader>
 std::string MessageOf(const std::string& value, const Reader& read) {
   const Config config = Read("v: " + value);
@@ -198,14 +199,15 @@ TEST(ReadCovariance, IsSquareSymmetricAndPositive) {
   EXPECT_EQ(error("[[1, 0], [0]]"), "f.yaml:1:13 v[1]: has 1 item; expected 2");
   EXPECT_EQ(error("[[1, 0.5], [0.25, 1]]"),
             "not symmetric: [0][1] is 0.5, [1][0] is 0.25; expected a covariance");
-  // Eigenvalues of [[1, 2], [2, 1]] are 3 and -1.
+  // The eigenvalues of [[1, 2], [2, 1]] are 3 and -1.
   EXPECT_EQ(error("[[1, 2], [2, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1; expected a covariance");
-  // A negative eigenvalue is found also if the blocks have units of very different size.
+  // A negative eigenvalue is also found if the variances differ by many orders of magnitude.
   const std::string mixed = "[[1e6, 0, 0], [0, 1e-14, 2e-14], [0, 2e-14, 1e-14]]";
   EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return internal::ReadCovariance(node, 3); }),
             "not positive semi-definite: its smallest eigenvalue is -1e-14; expected a covariance");
-  // A value that is known exactly has no covariance with another: the eigenvalues are 1 and -1e-18.
+  // The first variance is zero, so its covariance must be zero too. The eigenvalues are 1 and
+  // -1e-18.
   EXPECT_EQ(error("[[0, 1e-9], [1e-9, 1]]"),
             "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
   // A negative variance is found even if it is far below the rounding error of the other variance.
@@ -244,7 +246,7 @@ TEST(Node, WrongUnitNamesTheRightOne) {
             "f.yaml:1:2 baseline_mm: wrong unit 'mm'; expected baseline_m");
   EXPECT_EQ(Message([&] { root.At("rate_rad_s"); }),
             "f.yaml:1:19 rate_deg_s: wrong unit 'deg_s'; expected rate_rad_s");
-  // Pixels do not convert to metres: sigma_m may be another key that is read later.
+  // Pixels cannot be converted to metres. sigma_m may be another key, which is read later.
   EXPECT_EQ(Message([&] { root.At("sigma_px"); }),
             "f.yaml:1:1 sigma_px: missing key; found 'sigma_m' at line 1");
   const std::string rejected = Message([&] { root.RejectUnread(); });
@@ -274,8 +276,8 @@ TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
   }
 }
 
-// A key with the unit of another quantity may be another key. It is an error only if the program
-// does not read it.
+// A key with a unit of another quantity may be another key. It is an error only if the program does
+// not read this key.
 TEST(Node, UnitsOfDifferentQuantitiesDoNotConvert) {
   const std::vector<std::string> units = {"m",  "s",   "rad",  "hz", "px",     "m2",
                                           "s2", "px2", "rad2", "kg", "percent"};

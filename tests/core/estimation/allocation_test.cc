@@ -18,9 +18,10 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-// The sanitizers replace malloc themselves.
+// The sanitizers replace malloc, so allocations cannot be counted.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// Counts every allocation of this program, including those of operator new and of Eigen.
+// These functions count every allocation of this program, including those of operator new and of
+// Eigen.
 extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
 extern "C" void* malloc(std::size_t size) noexcept {
   ++allocations;
@@ -31,7 +32,7 @@ extern "C" void* malloc(std::size_t size) noexcept {
 namespace alidade {
 namespace {
 
-/// Returns the depth filter with a second motion model, whose block no sensor uses.
+/// Returns the depth filter with a second motion model. No sensor uses the block of this model.
 Problem WalkingDepthFilter() {
   Problem problem = testing::DepthFilter();
   testing::AddMotion(problem, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
@@ -60,8 +61,8 @@ TEST(Log, TakesNoAllocationWithoutASink) {
   EXPECT_EQ(allocations - before, 0);
 }
 
-/// Returns frames with both sensors, with one, with an outlier, without measurements, and with the
-/// sensors in reverse order.
+/// Returns frames with both sensors, with one sensor, with an outlier, without measurements, and
+/// with the sensors in reverse order.
 std::vector<Frame> Frames() {
   std::vector<Frame> frames;
   for (int k = 0; k < 60; ++k) {
@@ -89,7 +90,7 @@ void ExpectNoAllocation(Estimator& filter) {
   const std::vector<Frame> frames = Frames();
   for (std::size_t k = 0; k < 20; ++k) filter.Process(frames[k]);
   const long before = allocations;
-  EXPECT_GT(before, 0);  // the counter works
+  EXPECT_GT(before, 0);  // checks that the counter works
   for (std::size_t k = 20; k < frames.size(); ++k) filter.Process(frames[k]);
   EXPECT_EQ(allocations - before, 0);
   EXPECT_FALSE(filter.diverged());
@@ -133,7 +134,8 @@ TEST_P(Allocation, AStepOfTheUkfTakesNone) {
 INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
                          ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
 
-/// Adds `count` states that walk at random. With `considered`, the first one is a consider state.
+/// Adds `count` states that perform a random walk. If `considered`, the first of them is a consider
+/// state.
 void AddWalking(Problem& problem, int count, bool considered) {
   const SharedMotion model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
@@ -150,14 +152,15 @@ void AddWalking(Problem& problem, int count, bool considered) {
   }
 }
 
-/// Returns the pixel of landmark `id` seen by a camera that moves along x.
+/// Returns the pixel of landmark `id` in a camera that moves along x.
 std::vector<double> PixelOf(std::int64_t id, double x) {
   const double angle = static_cast<double>(id), depth = 4.0 + static_cast<double>(id % 5);
   return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
 }
 
-/// Expects no allocations in frames of `measured` landmarks out of 1.5 times as many. In each frame
-/// a tenth of them leaves and as many enter; one measurement is an outlier.
+/// Expects that frames with `measured` landmarks cause no allocations. There are 1.5 times as many
+/// landmarks. From frame to frame a tenth of the measured landmarks is replaced by others. One
+/// measurement of each frame is an outlier.
 void ExpectNoAllocationOf(Filter& filter, int measured) {
   if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
   const int known = measured * 3 / 2, change = measured / 10;
@@ -237,7 +240,7 @@ TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
   ExpectNoAllocationOf(filter, 20);
 }
 
-/// Returns a problem of thirty states: fifteen moving points, with one measurement for each point.
+/// Returns a problem with thirty states: fifteen moving points, each with a sensor.
 Problem ThirtyStates() {
   Problem problem;
   for (int i = 0; i < 15; ++i) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A composite measurement has several parts with one covariance. With independent parts, it must
-// match separate measurements of the parts; otherwise, the closed form of the Kalman update.
+// Tests composite measurements, which have several parts with one covariance. If the parts are
+// independent, the result must equal that of separate measurements of the parts. Otherwise it must
+// equal the closed form of the Kalman update.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -25,7 +26,7 @@ using testing::ManifoldSensor;
 using testing::ManifoldWalk;
 using testing::StreamsOf;
 
-/// Measures both blocks at once, each with the noise that ManifoldSensor assumes for it.
+/// Measures both blocks at once, each with the noise of ManifoldSensor.
 template <class A, class B>
 struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
@@ -45,8 +46,8 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   }
 };
 
-/// Returns a problem with one block of each geometry. Both walk at random and are correlated by the
-/// prior.
+/// Returns a problem with one block of each of two geometries. Both blocks perform a random walk.
+/// Their priors are correlated.
 template <class A, class B>
 Problem Walking() {
   Problem problem;
@@ -64,7 +65,7 @@ Problem Walking() {
   return problem;
 }
 
-/// Returns z of both blocks at step k: the means of the priors with noise.
+/// Returns the measurements of both blocks at step k: the prior means plus noise.
 std::vector<std::vector<double>> MeasuredAt(const Problem& problem, int k) {
   std::vector<std::vector<double>> z;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -107,7 +108,7 @@ void ExpectBothAreTheTwo() {
       const UpdateReport& joint = other->Process(Frame{t, {{t, 0, -1, both, {}}}});
       ASSERT_EQ(joint.measurements()[0].outcome, Outcome::kAccepted);
       EXPECT_EQ(joint.measurements()[0].dof, A::kTangent + B::kTangent);
-      if (k == 0) {  // the blocks are still uncorrelated
+      if (k == 0) {  // so far the blocks are uncorrelated
         EXPECT_NEAR(joint.measurements()[0].nis, nis, 1e-10);
       }
       for (std::size_t i = 0; i < one->state().values().size(); ++i) {
@@ -125,7 +126,7 @@ TEST(CompositeMeasurement, OfIndependentPartsIsTwoSensors) {
   ExpectBothAreTheTwo<Angle, Vec<2>>();
 }
 
-// x' = x + P (P + R)^-1 (z - x), in which R is a full matrix supplied with the measurement.
+// x' = x + P (P + R)^-1 (z - x). The full matrix R is supplied with the measurement.
 TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   Problem problem = Walking<Vec<2>, Vec<1>>();
   AddSensor(problem, "z", MakeSensor(BothAtOnce<Vec<2>, Vec<1>>(), "both"), {"a.x", "b.x"});
@@ -146,7 +147,7 @@ TEST(CompositeMeasurement, TakesTheCovarianceThatCameWithIt) {
   }
 }
 
-// An angle within a composite wraps: -3.1 rad and 3.1 rad differ by 0.083 rad.
+// An angle that is part of a composite measurement wraps: -3.1 rad and 3.1 rad differ by 0.083 rad.
 TEST(CompositeMeasurement, WrapsTheAnglesAmongItsParts) {
   Problem problem = Walking<Vec<1>, Angle>();
   problem.priors[1].mean = {-3.1};

@@ -22,12 +22,13 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kFix = 0, kOdometry = 1;
-constexpr double kNoise = 0.2, kSigma = 0.3;  // m/s^0.5, m
+// kNoise is in m/s^0.5, kSigma in m.
+constexpr double kNoise = 0.2, kSigma = 0.3;
 
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 
-/// Returns the problem of `car.position`, 1 +- 0.5 m, driven by stream `odometry` and measured by
-/// sensor `fix`.
+/// Returns a problem with the state `car.position`, 1 +- 0.5 m. The stream `odometry` drives it,
+/// and the sensor `fix` measures it.
 Problem Car(double timeout_s = kInfinity) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
@@ -36,7 +37,8 @@ Problem Car(double timeout_s = kInfinity) {
   return problem;
 }
 
-/// One row of the drive: time t / s, fix / m, speed / (m/s). NaN means no measurement.
+/// One row of the drive: time in s, fix in m, speed in m/s. NaN means that the row has no such
+/// value.
 struct Seen {
   double t_s, fix, speed;
 };
@@ -59,8 +61,8 @@ struct Gaussian {
   double x, p;
 };
 
-/// Kalman filter in closed form. The distance between two rows is the integral of u(t), the last
-/// speed until `timeout_s` after it and then 0. P grows by kNoise^2 dt.
+/// Kalman filter in closed form. The distance between two rows is the integral of u(t): the last
+/// speed until `timeout_s` after its row, then 0. P grows by kNoise^2 dt.
 std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_s) {
   std::vector<Gaussian> estimates;
   double x = 1.0, p = 0.25, t = drive[0].t_s, speed = 0.0, since = t;
@@ -83,7 +85,7 @@ std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_
   return estimates;
 }
 
-/// Compares the filter with WrittenOut and returns the kinds of all events in order.
+/// Compares the filter with WrittenOut. Returns the kinds of all events in order.
 std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<Seen>& drive,
                                           double timeout_s, double tolerance) {
   std::vector<std::string> kinds;
@@ -101,7 +103,7 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   return kinds;
 }
 
-/// Returns the problem with an additional constant block.
+/// Returns `problem` with an additional constant block.
 Problem WithConstantBlock(Problem problem) {
   const BlockId id =
       problem.layout.Declare("aside.x", "aside", problem.layout[0].space, BlockStatus::kConstant);
@@ -110,7 +112,7 @@ Problem WithConstantBlock(Problem problem) {
 }
 
 TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
-  const std::vector<std::string> first = {"input_stale"};  // no input from 0 s to 0.5 s
+  const std::vector<std::string> first = {"input_stale"};  // there is no input from 0 s to 0.5 s
   for (const Problem& problem : {Car(), WithConstantBlock(Car())}) {
     Ekf ekf(problem, {}, kStreams);
     EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, kInfinity, 1e-12), first);
@@ -127,14 +129,15 @@ TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
   for (const Problem& problem : {Car(0.4), WithConstantBlock(Car(0.4))}) {
     Ekf ekf(problem, {}, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, 0.4, 1e-12);
-    // Before the first input, and after each but the last, because the next input comes at least
-    // 0.5 s later.
+    // One event comes before the first input. The next input comes at least 0.5 s later each time,
+    // so one event also follows each input except the last.
     EXPECT_EQ(kinds, std::vector<std::string>(6, "input_stale"));
     Ukf ukf(problem, {}, kStreams);
     ExpectWrittenOut(ukf, kDrive, 0.4, 1e-9);
   }
   Ekf ekf(Car(1.5), {}, kStreams);
-  // Before the first input, and from 4 s to 6.5 s: two frames, but one event.
+  // There is no input before the first one, and none acts from 4 s to 6.5 s. The second gap spans
+  // two frames but causes one event.
   EXPECT_EQ(ExpectWrittenOut(ekf, kDrive, 1.5, 1e-12), std::vector<std::string>(2, "input_stale"));
 }
 
@@ -145,7 +148,7 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
     Ekf ekf(Car(timeout_s), options, kStreams);
     std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, timeout_s, 1e-12);
     std::erase(kinds, "input_stale");
-    // 0.5 s needs 5 parts; 3 s needs 30, the only gap with at least twice as many.
+    // The gap of 0.5 s needs 5 parts. Only the gap of 3 s needs at least twice as many: 30.
     EXPECT_EQ(kinds, std::vector<std::string>(2, "substeps")) << timeout_s;
   }
   Ekf ekf(Car(), options, kStreams);
@@ -169,7 +172,7 @@ TEST(ControlInputs, AnOldOneIsToldOnceUntilOneActsAgain) {
     }
   };
   step(0.0, 1.0);
-  step(0.5, kNone);  // exactly at the timeout
+  step(0.5, kNone);  // the age of the input equals the timeout
   EXPECT_TRUE(texts.empty());
   for (const double t_s : {0.6, 0.7, 0.8}) step(t_s, kNone);
   EXPECT_EQ(texts, std::vector<std::string>{"the control input of 'car' from stream 'odometry' is "
@@ -200,13 +203,14 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   EXPECT_FALSE(ekf.failed());
 }
 
-// With `policy: reject`, a frame may be late.
+// With `policy: reject` a late frame can still reach the filter.
 TEST(ControlInputs, ALateOneActsFromTheNextStepOnUnlessANewerOneIsHeld) {
   Ekf ekf(Car(), {}, kStreams);
   ekf.Process(FrameOf({0.0, kNone, 2.0}));
   ekf.Process(FrameOf({1.0, kNone, kNone}));
   EXPECT_TRUE(ekf.Process(FrameOf({0.5, 9.0, 4.0})).stale);
-  EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 3.0, 1e-15);  // no second step
+  // The filter does not step a second time.
+  EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 3.0, 1e-15);
   ekf.Process(FrameOf({2.0, kNone, 5.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 7.0, 1e-15);
   EXPECT_TRUE(ekf.Process(FrameOf({1.9, kNone, 100.0})).inputs.empty());
@@ -254,7 +258,8 @@ TEST(ControlInputs, AFilterGoesBackToTheOneItHeld) {
   ExpectTheSameAfterGoingBack<Ukf>(UkfOptions{});
 }
 
-// x_s = x + C (x_s' - x'), P_s = P + C^2 (P_s' - P'), C = P / P', with F = 1.
+// With F = 1 the recursion of the smoother is x_s = x + C (x_s' - x'), P_s = P + C^2 (P_s' - P'), C
+// = P / P'.
 TEST(ControlInputs, DriveTheSmootherToo) {
   constexpr double kMaxAge = 0.4;
   RtsSmoother rts(Car(kMaxAge), {}, kStreams);
@@ -278,7 +283,8 @@ TEST(ControlInputs, DriveTheSmootherToo) {
   EXPECT_EQ(count, kDrive.size());
 }
 
-/// x' = x + q_w dt for a unit quaternion q, whose neutral element is not zero.
+/// Motion model x' = x + q_w dt. The input is a unit quaternion q, whose neutral element is not
+/// zero.
 struct TurnedByInput : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   using Input = UnitQuaternion;
@@ -299,7 +305,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   const auto frame = [](double t_s, const std::vector<double>& q) {
     return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}};
   };
-  ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // the norm is 1e-4 too large
+  ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // the norm of q is 1e-4 too large
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.0, 1e-15);
   const UpdateReport& report = ekf.Process(frame(1.0, {2.0, 0.0, 0.0, 0.0}));
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.6, 1e-15);
@@ -330,7 +336,7 @@ TEST(ControlInputs, OfAnotherSizeThanTheStreamAreAMisuse) {
   EXPECT_THROW(Ekf(Car(), {}, {{"fix", 1}, {"odometry", 2}}), ContractViolation);
 }
 
-/// A point that moves in the direction of its heading: the heading is observable only while it
+/// A point moves in the direction of its heading. The heading is observable only while the point
 /// moves.
 struct Heading : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}, Quantity{"heading"}};
@@ -372,8 +378,8 @@ TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
   }
 }
 
-// If two frames with the same timestamp are processed one by one, the input of the later frame
-// acts.
+// If two frames with the same timestamp are processed one after the other, the input of the second
+// frame acts.
 TEST(ControlInputs, OfTwoAtOneTimestampTheLaterActs) {
   const Problem problem = Car();
   Ekf ekf(problem, {}, kStreams);

@@ -13,7 +13,8 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
-  // 1/scale = lambda Z: dh/dZ uses the first estimate of lambda, dh/dlambda the current Z.
+  // 1/scale = lambda Z: dh/dZ is evaluated at the first estimate of lambda, and dh/dlambda at the
+  // current Z.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   EkfOptions options;
@@ -66,8 +67,8 @@ TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
 }
 
 TEST(Ekf, AResetMakesANewFirstEstimate) {
-  // Only the scale is measured, and its lambda is far from the truth: rejection recovery resets it
-  // to z / Z.
+  // Only the scale is measured, and the initial lambda is far from the truth. Rejection recovery
+  // resets lambda to z / Z.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   problem.priors[0].covariance(0, 0) = 1e-6;
@@ -89,7 +90,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
 }
 
-/// A constant direction.
+/// A direction that does not change.
 struct StillDirection : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"u", "", "", "x,y,z"}};
   template <class T>
@@ -100,7 +101,7 @@ struct StillDirection : Motion<0, UnitVector> {
   bool Stationary() const { return true; }
 };
 
-/// z = u
+/// Measures z = u.
 struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
   static constexpr std::array kRoles{Quantity{"u", "", "", "x,y,z"}};
   static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
@@ -115,7 +116,7 @@ struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
   }
 };
 
-// H d = R B(u) d: R is the shortest rotation from the latest u to the first, R u = u0.
+// H d = R B(u) d. R is the shortest rotation from the latest u to the first u: R u = u0.
 TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
   Problem problem;
   MotionBinding binding{"s", MakeMotion(StillDirection(), "still"), {}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// 1-point RANSAC on the matches of a frame.
+// Tests 1-point RANSAC on the matches of a frame.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -19,8 +19,8 @@ Eigen::Vector3d PointAt(int i) {
   return {0.1 * (i % 8 - 4), 0.1 * (i / 8 - 2), 2.0 + 0.1 * (i % 5)};
 }
 
-/// Returns a problem with a known map and a camera whose position has the standard deviation
-/// `sigma_0`.
+/// Returns a problem with a known map and a camera. The position of the camera has the standard
+/// deviation `sigma_0`.
 Problem KnownMap(double sigma_0 = 0.1) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {
@@ -39,8 +39,8 @@ Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustL
   return {problem, gated, {{"tracks", 2}}};
 }
 
-/// Returns the matches of a camera at `r`. Every `every`-th match is shifted by the same offset
-/// `aside`.
+/// Returns the matches of a camera at `r`. One in `every` matches is shifted by `aside`, always in
+/// the same direction.
 Frame Matches(const Eigen::Vector3d& r, int every, double aside) {
   Random random(5);
   std::vector<Observation> observations;
@@ -63,7 +63,7 @@ int Accepted(const UpdateReport& report, int every, bool wrong) {
 
 TEST(OnePointRansac, LeavesOutWhatTheGateOfEachCannot) {
   const Eigen::Vector3d r(0.05, -0.03, 0.02);
-  // A shift of 0.03 is twenty times the noise, but within the uncertainty of the camera.
+  // The shift of 0.03 is twenty times the noise, but it is within the uncertainty of the camera.
   const Frame frame = Matches(r, 3, 0.03);
   Ekf gate_alone = Filter(false), ekf = Filter(true);
   EXPECT_EQ(Accepted(gate_alone.Process(frame), 3, true), 14);
@@ -71,7 +71,7 @@ TEST(OnePointRansac, LeavesOutWhatTheGateOfEachCannot) {
   EXPECT_EQ(Accepted(report, 3, true), 0);
   EXPECT_GE(Accepted(report, 3, false), 25);
   EXPECT_GT((PositionOf(gate_alone) - r).norm(), 0.01);
-  // The result is as if only the correct matches had been measured.
+  // The result is the same as if only the correct matches had been measured.
   Frame right = frame;
   std::erase_if(right.measurements, [](const Measurement& m) { return m.landmark % 3 == 0; });
   Ekf told = Filter(false);
@@ -89,8 +89,8 @@ TEST(OnePointRansac, TriesFewerTheMoreAgree) {
   EXPECT_LT(more, kPoints);
 }
 
-// Half of the matches belong to a sensor with a higher confidence. The number of hypotheses is as
-// large as if all belonged to it.
+// Half of the matches belong to a sensor with a higher `confidence`. The number of hypotheses is
+// the same as if all matches belonged to this sensor.
 TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
   const auto hypotheses = [](double first, double second) {
     Problem problem = KnownMap();
@@ -112,8 +112,8 @@ TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
 }
 
 TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
-  // One match does not determine the forward motion of the camera: the residuals of the others then
-  // exceed the noise.
+  // A single match does not determine the forward motion of the camera, so the residuals of the
+  // other matches exceed the noise.
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   Ekf ekf = Filter(true);
   const UpdateReport& report = ekf.Process(frame);
@@ -121,14 +121,14 @@ TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
   const auto accepted =
       std::ranges::count(report.measurements(), Outcome::kAccepted, &MeasurementReport::outcome);
   EXPECT_GE(accepted, kPoints - 2);
-  // Each match counts only once: P describes the error.
+  // Each match is used only once, so P agrees with the error.
   const Eigen::Vector3d error = PositionOf(ekf) - Eigen::Vector3d(0.05, -0.03, 0.08);
   const Eigen::MatrixXd p = ekf.state().covariance().Block(0, 3, 0, 3);
   EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // chi2(0.999, 3)
 }
 
-// Cauchy's R / w grows as fast as r^2: if the test used this noise, any match would support any
-// hypothesis. Inliers are weighted all the same, here by less than 1.
+// The R / w of a Cauchy loss grows as fast as r^2. If the test used R / w, any match would support
+// any hypothesis. In the update the inliers are weighted, here with weights below 1.
 TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   const RobustLoss loss{LossKind::kCauchy, 1.0};
   const Eigen::Vector3d r(0.001, 0.0, 0.0);
@@ -150,7 +150,7 @@ TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   EXPECT_GT((PositionOf(plain) - PositionOf(told)).norm(), 5e-5);
 }
 
-// The threshold of the rescue is independent of that of the support.
+// The threshold for the rescue of matches does not depend on the threshold for their support.
 TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
   int rescued[2];
@@ -164,8 +164,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
-// A sensor without outlier rejection needs no support: its measurement is used even if it is far
-// off, because it has no gate.
+// Sensor `z` has no outlier rejection and no gate. Its measurement is used even if it is far from
+// the prediction.
 TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   Problem problem = KnownMap();
   problem.sensors[0].outlier_rejection = OnePointRansac{};
@@ -179,8 +179,8 @@ TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 1.0, 1e-12);
 }
 
-// A huge value overflows if it is measured. The update with the inliers then fails and is rolled
-// back, so there is no corrected state that the other matches could fit.
+// The huge measurement overflows. The update with the inliers then fails and is rolled back, so
+// there is no corrected state that other matches could fit.
 TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   for (const bool overflows : {false, true}) {
     Problem problem = KnownMap();
@@ -202,8 +202,8 @@ TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   }
 }
 
-// With a threshold that no match meets, all hypotheses are tried and none has an inlier. All
-// matches fit the prior state and are rescued.
+// The threshold is so strict that no match meets it. All hypotheses are tried, and none has an
+// inlier. All matches fit the prior state, so they are rescued.
 TEST(OnePointRansac, AgreesByItsOwnThreshold) {
   Problem problem = KnownMap();
   problem.sensors[0].outlier_rejection = OnePointRansac{.inlier_probability = 1e-9};
@@ -213,8 +213,9 @@ TEST(OnePointRansac, AgreesByItsOwnThreshold) {
   EXPECT_EQ(report.landmarks.rescued, kPoints);
 }
 
-// No match corrects a camera that is a consider state, so no hypothesis explains 0.05 m, 25 times
-// the noise. All matches are rescued afterwards, because of the uncertainty of the camera.
+// The camera is a consider state, so no match corrects it. No hypothesis explains the offset of
+// 0.05 m, which is 25 times the noise. Afterwards all matches are rescued, because the camera is
+// uncertain.
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {
@@ -233,9 +234,9 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   }
 }
 
-// Points that were initialised from one camera share its uncertainty. For a sensor whose camera
-// position counts as known, all points are shifted by 0.1 m: one match corrects them all, and all
-// agree.
+// All points were initialised from one camera position, so they share its uncertainty. Sensor
+// `held` treats this position as known. All its points are shifted by 0.1 m: one match corrects
+// them all, and all matches agree.
 TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
   Problem problem = MapSystem(Offset(0.01), {}, 0.3);
   SensorBinding held = problem.sensors[0];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Rules for landmarks: initialisation, removal, reused ids, landmarks shared by sensors, delayed
-// initialisation, and Jacobians at the implied state.
+// Tests the rules for landmarks: initialisation, removal, reused ids, landmarks seen by several
+// sensors, delayed initialisation, and Jacobians at the implied state.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -12,7 +12,8 @@
 namespace alidade::testing {
 namespace {
 
-/// Returns the problem with a second sensor of its landmarks on the same stream, which comes first.
+/// Returns the problem with a second sensor, which measures its landmarks on the same stream. The
+/// second sensor comes first.
 Problem WithTwoSensors(Problem problem) {
   SensorBinding second = problem.sensors[0];
   second.name = "second";
@@ -72,7 +73,7 @@ TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
   const Frame three = FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}});
   EXPECT_EQ(ekf.Process(three).landmarks.initialised, 2);
   EXPECT_EQ(OutcomeFor(ekf.Process(three), 3), Outcome::kNotReady);
-  // If the frame measures only one of them, another landmark can be initialised.
+  // The next frame measures only one of the two landmarks, so another landmark can be initialised.
   EXPECT_EQ(OutcomeFor(ekf.Process(FrameOf(0.1, {{1, {0, 0, 1}}, {3, {1, 0, 1}}})), 3),
             Outcome::kInitialised);
 }
@@ -104,7 +105,8 @@ TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   EXPECT_EQ(Find(ekf.landmarks(), 2)->generation, 0);
 }
 
-// A removed landmark is reported with the estimate that a filter without removal has at that time.
+// The report of a removed landmark contains the estimate that a filter without removal has at the
+// same time.
 TEST(Landmarks, ThatAreRemovedAreReportedAsTheyWere) {
   LandmarkOptions options = WithPrior();
   Ekf keeps = EkfOf(MapSystem(InverseDepthPixels(0.01), options, 0.1));
@@ -134,7 +136,7 @@ TEST(Landmarks, ThatAreRemovedAreReportedAsTheyWere) {
   EXPECT_GT(one.covariance(2, 2), 0.0);
   EXPECT_EQ(one.inverse_distance, kept->inverse_distance);
   EXPECT_EQ(one.sigma, kept->sigma);
-  EXPECT_TRUE(both(FrameOf(0.4, {{2, {-0.12, 0.3}}})).empty());  // reported once
+  EXPECT_TRUE(both(FrameOf(0.4, {{2, {-0.12, 0.3}}})).empty());  // each removal is reported once
 }
 
 TEST(Landmarks, ThatFailTooOftenAreForgotten) {
@@ -166,9 +168,9 @@ TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
     Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options));
     LandmarkCounts counts;
     for (int k = 0; k < 6; ++k) {
-      // The camera moves right, and so does the image of landmark 7: its inverse depth is negative.
-      // Its predicted pixel does not move, so the first step contains no information on its depth:
-      // H = rho (a - r) + m.
+      // The camera moves right, and so does the image of landmark 7, so its inverse depth is
+      // negative. Its predicted pixel does not move. The first step thus gives no information on
+      // its depth: H = rho (a - r) + m.
       const double x = 0.1 * k;
       const UpdateReport& report = ekf.Process(FrameOf(
           0.1 * k, {{1, {-x / 2.0, 0.0}}, {2, {(1.0 - x) / 2.0, 0.0}}, {7, {0.02 * k, 0.0}}}));
@@ -176,7 +178,7 @@ TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
       counts.deleted += report.landmarks.deleted;
     }
     const bool keeps = policy == kKeep;
-    EXPECT_EQ(counts.negative, keeps ? 1 : 2);  // once deleted, the landmark is initialised again
+    EXPECT_EQ(counts.negative, keeps ? 1 : 2);  // the landmark is deleted and initialised again
     EXPECT_EQ(counts.deleted, keeps ? 0 : 2);
     if (keeps) {
       EXPECT_NEAR(Find(ekf.landmarks(), 7)->inverse_distance, -0.2, 0.05);
@@ -215,7 +217,7 @@ TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
   prior.sensor = "gps";
   problem.priors.push_back(prior);
   problem.sensors[0].roles[0].block = waits;
-  problem.AddSensor("gps", Gps(), {waits});  // no measurement of this sensor in the frame
+  problem.AddSensor("gps", Gps(), {waits});  // the frame has no measurement of this sensor
   Ekf ekf(problem, {}, {{"tracks", 3}});
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{5, {0, 0, 1}}}));
   ASSERT_EQ(report.measurements().size(), 2u);
@@ -223,7 +225,7 @@ TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
   EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInitialised);
 }
 
-/// z = (p - r)^3, element by element, which determines r if p is known.
+/// Measures z = (p - r)^3, element by element. z determines r if p is known.
 struct Cubes : Sensor<Vec<3>, Vec<3>, Vec<3>> {
   static constexpr std::array kRoles{kPosition,
                                      Quantity{"landmark", "m", "", "x,y,z", kOfLandmark}};
@@ -252,7 +254,7 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
   Problem problem = MapSystem(Cubes(), options, 1.0);
   problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   Ekf ekf(problem, {}, {{"tracks", 3}});
-  const double z = 1.5 * 1.5 * 1.5;  // the implied r is 0.5, so H = -3 1.5^2
+  const double z = 1.5 * 1.5 * 1.5;  // z implies r = 0.5, so H = -3 1.5^2
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {z, z, z}}}));
   EXPECT_NEAR(report.measurements()[0].s[0], 6.75 * 6.75 + 1e-6, 1e-9);
 }
@@ -276,12 +278,12 @@ TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
   ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.025}}, {7, {0.1, 0.1}}}));
   const std::vector<LandmarkEstimate> landmarks = ekf.landmarks();
   ASSERT_NE(Find(landmarks, 7), nullptr);
-  EXPECT_EQ(Find(landmarks, 7)->inverse_distance, 1.0);  // two have converged, not four
+  EXPECT_EQ(Find(landmarks, 7)->inverse_distance, 1.0);  // two landmarks have converged, not four
 }
 
 TEST(Landmarks, NeedAPriorWithBothNumbers) {
   LandmarkOptions options;
-  options.prior.emplace();  // neither number has a default
+  options.prior.emplace();  // neither number of the prior has a default
   EXPECT_THROW(EkfOf(MapSystem(InverseDepthPixels(0.01), options)), ContractViolation);
   options.prior->inverse_distance = 1.0;
   EXPECT_THROW(EkfOf(MapSystem(InverseDepthPixels(0.01), options)), ContractViolation);
@@ -307,7 +309,7 @@ TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
   problem.sensors[0].roles[0].mode = RoleMode::kKnown;
   Ekf ekf(problem, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
-  // Only R counts: the uncertainty of the camera would make it 0.1^2 + 0.3^2.
+  // Only R counts. With the uncertainty of the camera the variance would be 0.1^2 + 0.3^2.
   EXPECT_NEAR(ekf.landmarks().at(0).covariance(0, 0), 0.01, 1e-12);
 }
 
@@ -346,14 +348,14 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   EXPECT_EQ(see(2), 2);
 }
 
-/// Walk whose process noise is constant from one update to the next.
+/// A Walk whose process noise is constant from one update to the next.
 struct HeldWalk : Walk {
   using Walk::Walk;
   NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
 };
 
-// At 0.1 s, only a landmark that is not yet initialised is measured. The noise interval therefore
-// lasts until 0.2 s, whether or not another landmark is pruned meanwhile.
+// At 0.1 s only a landmark that is not yet initialised is measured. So the noise interval lasts
+// until 0.2 s. This also holds if another landmark is pruned at 0.1 s.
 TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
   const auto camera = [](int max_missed_frames) {
     LandmarkOptions options;
@@ -370,7 +372,7 @@ TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
     return ekf.state().covariance().Variance(0);
   };
   EXPECT_DOUBLE_EQ(camera(1), camera(0));
-  // Constant noise over the interval: 2 sigma sqrt(dt) w.
+  // The noise is constant over the interval, so two steps add 2 sigma sqrt(dt) w.
   EXPECT_NEAR(camera(0), 0.3 * 0.3 + 4.0 * 0.1 * 0.1 * 0.1, 1e-12);
 }
 

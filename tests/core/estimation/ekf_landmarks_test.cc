@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landmarks in the filter: their initialisation, conversion and removal.
+// Tests how landmarks are initialised, converted and removed.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -21,7 +21,8 @@ bool IsPoint(const LandmarkEstimate& landmark) {
 
 std::vector<double> Vector(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 
-/// A camera on a random walk, points in front of it, and the measurements at each step.
+/// A camera performs a random walk. Points are in front of the camera, and all of them can be
+/// measured at each step.
 struct Scene {
   std::vector<Vector3d> camera, points;
   Random random{7};
@@ -48,7 +49,7 @@ struct Scene {
   }
 };
 
-/// Whether point i is seen at `step`; each point has its own pattern.
+/// Returns true if point i is seen at `step`. The pattern differs from point to point.
 bool Seen(int step, int i) { return (step + 2 * i) % 5 < 3 && step >= i / 2; }
 
 TEST(Landmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
@@ -58,7 +59,8 @@ TEST(Landmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   Ekf ekf = EkfOf(MapSystem(Offset(kNoise), {}, kStart));
   MatrixXd information = MatrixXd::Zero(kSize, kSize);
   VectorXd right = VectorXd::Zero(kSize);
-  const auto add = [&](int a, int b, const Vector3d& difference, double sigma) {  // x_b - x_a
+  // The measured difference is x_b - x_a.
+  const auto add = [&](int a, int b, const Vector3d& difference, double sigma) {
     const double w = 1.0 / (sigma * sigma);
     for (int e = 0; e < 3; ++e) {
       const Eigen::Index i = 3 * a + e, j = 3 * b + e;
@@ -94,7 +96,7 @@ TEST(Landmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
-/// y = g(r, z, rho) of InverseDepthPixels, implemented independently.
+/// Computes y = g(r, z, rho) of InverseDepthPixels with independent code.
 VectorXd InverseObservation(const VectorXd& x) {
   const double u = x[3], v = x[4];
   VectorXd y(6);
@@ -109,7 +111,7 @@ TEST(Landmarks, EnterWithTheCorrelationsOfTheirInverseObservation) {
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{4, z1}, {9, z2}}));
   EXPECT_EQ(OutcomeFor(report, 4), Outcome::kInitialised);
   EXPECT_EQ(report.landmarks.initialised, 2);
-  // x = (r, z1, rho1, z2, rho2) -> (r, y1, y2) by central differences.
+  // Differentiates x = (r, z1, rho1, z2, rho2) -> (r, y1, y2) by central differences.
   VectorXd x(9), sigma(9);
   x << 0, 0, 0, z1[0], z1[1], 0.4, z2[0], z2[1], 0.4;
   sigma << kStart, kStart, kStart, kNoise, kNoise, 0.3, kNoise, kNoise, 0.3;
@@ -146,7 +148,7 @@ TEST(Landmarks, ASharedAnchorGivesWhatAnchorsOfTheirOwnGive) {
     shared.Process(frame);
     alone.Process(frame);
   }
-  // The camera has 3 rows, each landmark 3, and each anchor 3: two frames have new anchors.
+  // The camera, each landmark and each anchor have 3 rows. Two frames have new anchors.
   EXPECT_EQ(shared.state().covariance().size(), 3 + 3 * kPoints + 3 * 2);
   EXPECT_EQ(alone.state().covariance().size(), 3 + 6 * kPoints);
   EXPECT_LT((PositionOf(shared) - PositionOf(alone)).norm(), 1e-9);
@@ -168,7 +170,7 @@ TEST(Landmarks, ASharedAnchorGoesWithItsLastLandmark) {
   EXPECT_EQ(ekf.landmarks().size(), 1u);
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
   for (int k = 3; k < 5; ++k) ekf.Process(FrameOf(0.1 * k, {{3, {0.0, 0.1}}}));
-  // Landmark 2 was removed with its anchor; landmark 3 came with a new one.
+  // Landmark 2 was removed together with its anchor. Landmark 3 came with a new anchor.
   EXPECT_EQ(ekf.landmarks().size(), 1u);
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
 }
@@ -206,7 +208,7 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
   for (const bool anchored : {false, true}) {
     Scene scene(kSteps, kPoints);
     LandmarkOptions options = WithPrior();
-    for (int i = 0; i < kKnown; ++i) {  // the last three are known and fix the scale
+    for (int i = 0; i < kKnown; ++i) {  // the last three points are known and determine the scale
       const Vector3d& p = scene.points[static_cast<std::size_t>(kPoints - 1 - i)];
       options.known.push_back({kPoints - 1 - i, {p[0], p[1], p[2]}, 0.0});
     }
@@ -230,21 +232,22 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
     }
     ASSERT_GT(converted, 0);
     ASSERT_LT(converted, kPoints - kKnown);
-    // Positions and covariances are unchanged, also those of landmarks that were not converted.
+    // Conversion changes no position and no covariance, including those of landmarks that are not
+    // converted.
     const std::vector<LandmarkEstimate> before = never.landmarks(), after = ekf.landmarks();
     for (std::size_t i = 0; i < before.size(); ++i) {
       EXPECT_LT((before[i].position - after[i].position).norm(), 1e-9);
       EXPECT_LT((before[i].covariance - after[i].covariance).norm(), 1e-9);
     }
     EXPECT_EQ(std::ranges::count_if(after, IsPoint), converted + kKnown);
-    // The filter continues: landmarks of both representations are measured in one update.
+    // The filter continues. One update now measures landmarks of both representations.
     for (; k < kSteps; ++k) {
       for (const auto& entry : ekf.Process(frame_at(k)).measurements()) {
         EXPECT_EQ(entry.outcome, Outcome::kAccepted);
       }
     }
     EXPECT_EQ(std::ranges::count_if(ekf.landmarks(), IsPoint), kPoints);
-    // The anchor was removed with its last landmark.
+    // The anchor was removed together with its last landmark.
     EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 * (kPoints - kKnown));
     for (const LandmarkEstimate& landmark : ekf.landmarks()) {
       const Vector3d error =
@@ -266,7 +269,7 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
   for (int k = 0; k < 5000; ++k) {
     std::vector<Observation> observations;
     for (int i = 0; i < kInView; ++i) {
-      // At every step, one landmark leaves and one enters.
+      // At each step one landmark leaves the view and another enters.
       const int id = k + i;
       const Vector3d p(0.03 * id, 0.3 * (id % 3), 2.0 + 0.2 * (id % 4));
       observations.push_back({id, {(p[0] - 0.03 * k) / p[2], p[1] / p[2]}});
@@ -278,8 +281,9 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
     ASSERT_FALSE(ekf.failed());
   }
   EXPECT_GT(converted, 1000);
-  // Landmarks remain for two frames after they leave the view: at most 12, each with at most three
-  // blocks, 6 rows and 7 values. While a landmark is initialised, there is one more.
+  // A landmark remains for two frames after it has left the view, so there are at most 12
+  // landmarks. Each has at most three blocks, 6 rows and 7 values. While a landmark is initialised,
+  // there is one more.
   EXPECT_LE(ekf.landmarks().size(), std::size_t{kInView + 2});
   EXPECT_LE(most_rows, 3 + 6 * (kInView + 3));
   EXPECT_LE(blocks, std::size_t{1 + 3 * (kInView + 3) + 1});
@@ -293,7 +297,7 @@ TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
       {1, {0.0, 0.0, 2.0}, 0.0}, {2, {1.0, 0.0, 2.0}, 0.01}, {3, {0.0, 1.0, 2.0}, 0.0}};
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options, 0.5));
   EXPECT_EQ(ekf.state().covariance().size(), 6);
-  // The true position of the camera.
+  // r is the true position of the camera.
   const Vector3d r(0.1, -0.2, 0.3);
   for (int k = 0; k < 10; ++k) {
     std::vector<Observation> observations;

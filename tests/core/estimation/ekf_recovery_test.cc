@@ -29,7 +29,7 @@ TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   EXPECT_FALSE(ekf.failed());
 }
 
-/// Motion that overflows in its first step.
+/// The value overflows in the first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -116,7 +116,7 @@ TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
   Frame frame = FrameAt(0.0, {{0, 65.0}});
   frame.measurements[0].covariance = {100.0};
   ekf.Process(frame);
-  // sigma_Z = Z^2 / BF sigma_d
+  // The depth has sigma_Z = Z^2 / BF sigma_d.
   EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"),
               std::pow(0.16 / 26.0 * 10.0, 2), 1e-12);
 }
@@ -129,7 +129,7 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
-// Invalid covariances do not count as rejections either: they are a fault of the measurement, not
+// An invalid covariance also does not count as a rejection. It is a fault of the measurement, not
 // of the filter.
 TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
   const Problem problem = DepthFilter();
@@ -146,12 +146,12 @@ TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
     }
     EXPECT_EQ(ekf.state().values(), before.values());
     EXPECT_EQ(ekf.state().covariance().Dense(), before.covariance().Dense());
-    frame.measurements[0].covariance = {0.0};  // zero variance: an exact measurement
+    frame.measurements[0].covariance = {0.0};  // zero variance: the measurement is exact
     EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome, Outcome::kAccepted);
   }
 }
 
-/// Measures x twice, with noise on the sum only.
+/// Measures x twice. Only the sum of the two numbers has noise.
 struct OfSum : Sensor<Vec<2>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -166,8 +166,8 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
   }
 };
 
-// A measurement rejected because of S counts as much as one rejected by the gate: the covariance of
-// the sensor's blocks is increased.
+// If S is not positive definite, the measurement counts as rejected, like one outside the gate. So
+// the covariance of the sensor's blocks is increased.
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -219,14 +219,16 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   ASSERT_FALSE(report.events.empty());
   EXPECT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
-  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the other blocks; the rate has its prior again.
+  // sigma_Z = Z^2 / BF sigma_d, and the depth is uncorrelated with the other blocks. The variance
+  // of the rate is that of its prior.
   EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
               0.4 * 0.4 / 26.0, 1e-12);
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 0.25);
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements()[0].outcome, Outcome::kAccepted);
 }
 
-// After one second, the variance of the rate exceeds its prior by 1. The reset must not reduce it.
+// After one second the variance of the rate is larger than its prior variance by 1. The reset must
+// not reduce this variance.
 TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EkfOptions options;
   options.gate = 0.999;
@@ -242,7 +244,7 @@ TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth", "target.depth_rate"), 0.0);
 }
 
-// Filters that maintain more than P, and so do not support a change of P from outside.
+// These filters maintain more than P, so they do not support a change of P by another component.
 template <class Type>
 class WithoutRecovery : public ::testing::Test {};
 using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
@@ -268,7 +270,7 @@ TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
   EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
 }
 
-/// x' = x + w for each of the two blocks, independently.
+/// Motion model x' = x + w for each of the two blocks. Their noises are independent.
 struct Pair : Motion<2, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"a"}, Quantity{"b"}};
   template <class T>
@@ -279,7 +281,7 @@ struct Pair : Motion<2, Vec<1>, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 1e-3; }
 };
 
-/// z = a + b, which determines b.
+/// Measures z = a + b. z determines b if a is known.
 struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -300,8 +302,8 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// b = z - a. Block a has the same motion model, so it is first reset to its prior; b is then
-// correlated with it.
+// Block b is reset to z - a. Block a has the same motion model, so it is first reset to its prior.
+// Afterwards b is correlated with a.
 TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
@@ -318,7 +320,7 @@ TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.b", "p.b"), 0.25 + 0.01, 1e-12);
 }
 
-/// z = (a, b)
+/// Measures z = (a, b).
 struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -334,7 +336,7 @@ struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
 };
 
-// The lower and the upper triangle each define a valid covariance.
+// Each triangle alone would define a valid covariance.
 TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
@@ -357,7 +359,7 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   problem.priors[0] = {0, {}, {}, "disparity"};
   problem.priors[2] = {2, {}, {}, "inverse_scale"};
   Ekf ekf(problem, {}, StreamsOf(problem));
-  // A measurement of the scale cannot initialise its block without a depth.
+  // A measurement of the scale cannot initialise its block as long as the depth has no value.
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements()[0].outcome, Outcome::kNotReady);
   const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
@@ -431,11 +433,11 @@ TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
   ASSERT_EQ(report.events.back().kind, EventKind::kRejectionRecovery);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
-  // 0.25 from the prior and 1 from the acceleration over one second.
+  // The variance is 0.25 from the prior and 1 from the acceleration over one second.
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
 }
 
-/// z = x + y, which determines y; the role of y is optional.
+/// Measures z = x + y. z determines y, whose role is optional.
 struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"},
                                      Quantity{"y", "", "", "", ALIDADE_ROLE_OPTIONAL}};

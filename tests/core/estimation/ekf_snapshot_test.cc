@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A copy of a filter also contains its memory for one-time warnings and for the last measurement.
+// Tests that a copy of a filter also contains what the filter remembers: which one-time warnings
+// were given, and the last measurement.
 #include <algorithm>
 #include <limits>
 
@@ -9,7 +10,7 @@
 namespace alidade::testing {
 namespace {
 
-/// Motion that is constant for steps up to one second, and not finite for longer ones.
+/// The state does not change in steps of up to one second. In longer steps it is not finite.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -19,7 +20,8 @@ struct Breaking : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// Returns a filter of one block with the prior 1 +- 1, measured directly with the given noise.
+/// Returns a filter with one block, whose prior is 1 +- 1. The block is measured directly with the
+/// standard deviation `sigma`.
 Ekf OneBlock(double sigma) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});

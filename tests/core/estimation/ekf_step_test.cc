@@ -15,7 +15,8 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 constexpr double kPi = 3.14159265358979323846;
 
 /// Returns the variance of the velocity after a gap of `gap` ns, in steps of at most `max_dt_s`.
-/// The acceleration is constant within a step: n steps add gap^2 / n to 9.
+/// The acceleration is constant within each step, so n steps add gap^2 / n to the prior variance of
+/// 9.
 double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
   EkfOptions options;
   options.max_dt_s = max_dt_s;
@@ -29,7 +30,7 @@ double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
 }
 
 TEST(EkfStep, AGapOfTheLongestStepIsOnePart) {
-  // 3e7 * 1e-9 is above 0.03 by rounding.
+  // Because of rounding 3e7 * 1e-9 is above 0.03.
   EXPECT_NEAR(VelocityVarianceAfter(30'000'000, 0.03) - 9.0, 9e-4, 1e-13);
   EXPECT_NEAR(VelocityVarianceAfter(90'000'000, 0.03) - 9.0, 81e-4 / 3.0, 1e-13);
   EXPECT_NEAR(VelocityVarianceAfter(30'000'001, 0.03) - 9.0, 9e-4 / 2.0, 1e-9);
@@ -40,11 +41,11 @@ TEST(EkfStep, TheLongestStepMayBeOfAnySize) {
   for (const double longest : {infinity, 1e300, 1e10, 9.3e9}) {
     EXPECT_NEAR(VelocityVarianceAfter(2'000'000'000, longest), 9.0 + 4.0, 1e-12) << longest;
   }
-  // Timestamps are whole nanoseconds, and so are the steps.
+  // Timestamps are whole nanoseconds, so steps are too.
   EXPECT_NEAR(VelocityVarianceAfter(4, 1e-12) - 9.0, 0.0, 1e-12);
 }
 
-/// x' = 1e10 x + w.
+/// Motion model x' = 1e10 x + w.
 struct Stretching : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -55,7 +56,7 @@ struct Stretching : Motion<1, Vec<1>> {
 };
 
 TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
-  // F P F' = 1e20 * 1e300 overflows; the other point has a valid step.
+  // F P F' = 1e20 * 1e300 overflows. The step of the other point is valid.
   Problem problem = MovingPoint();
   AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
   Ekf ekf(problem, {}, {});
@@ -71,7 +72,7 @@ TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
 }
 
 TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
-  // 1e20 * 1e287 is finite. The bound that decides whether a backup copy is needed overflows.
+  // 1e20 * 1e287 is finite. The bound that decides if a backup copy is needed overflows.
   Problem problem;
   AddMotion(problem, "q", MakeMotion(Stretching(), "stretching"), {{"x", 1.0, std::sqrt(1e287)}});
   Ekf ekf(problem, {}, {});
@@ -81,7 +82,8 @@ TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "q.x", "q.x") / 1e307, 1.0, 1e-12);
 }
 
-/// The angle grows by 1 rad per step. The quaternion turns about z, and its norm grows by 0.1 %.
+/// The angle grows by 1 rad in each step. The quaternion rotates about z, and its norm grows by
+/// 0.1 % in each step.
 struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}, Quantity{"q"}};
   template <class T>
@@ -93,7 +95,7 @@ struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// z = a + pi, which determines a.
+/// Measures z = a + pi. z determines a.
 struct Opposite : Sensor<Angle, Angle> {
   static constexpr std::array kRoles{Quantity{"a", "rad"}};
   static constexpr Quantity kMeasurement{"z", "rad"};
@@ -154,7 +156,7 @@ TEST(EkfStep, ABlockThatStartsFromAMeasurementIsOnItsManifold) {
   EXPECT_NEAR(ValueOf(ekf.state(), "t.a"), kPi - 1.0, 1e-12);
 }
 
-/// z = a + 6 rad, not wrapped.
+/// Measures z = a + 6 rad without wrapping.
 struct Unwrapped : Opposite {
   template <class T>
   bool Predict(const T* a, T* z) const {
@@ -177,11 +179,12 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   }
 }
 
-// FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update uses the shorter direction.
+// Fault 84 of tests/faults/README.md: 3 and -3 rad are 0.28 rad apart, and the update uses the
+// shorter direction.
 TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   Problem problem = Turn();
   AddSensor(problem, "opposite", MakeSensor(Opposite(), "opposite"), {"t.a"});
-  problem.priors[0].mean = {3.0 - kPi};  // z = 3
+  problem.priors[0].mean = {3.0 - kPi};  // h = 3 rad
   for (const double turns : {0.0, 1.0, -2.0}) {
     Ekf ekf(problem, {}, StreamsOf(problem));
     Ukf ukf(problem, {}, StreamsOf(problem));
@@ -191,14 +194,14 @@ TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
       EXPECT_EQ(entry.outcome, Outcome::kAccepted);
       const double short_way = 2.0 * kPi - 6.0;
       EXPECT_NEAR(entry.innovation[0], short_way, 1e-12);
-      // P = 1, R = 0.01
+      // The variances are P = 1 and R = 0.01.
       EXPECT_NEAR(ValueOf(one->state(), "t.a"), 3.0 - kPi + short_way / 1.01, 1e-9);
     }
   }
 }
 
-// The event is reported for the first gap in several steps, and then for each gap with at least
-// twice as many.
+// The event is reported for the first gap that takes several steps. After that it is reported for
+// each gap that takes at least twice as many.
 TEST(Ekf, AGapInPartsIsNotedWhereItTakesTwiceAsManyAsBefore) {
   EkfOptions options;
   options.max_dt_s = 0.1;

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Textbook Kalman filter of MovingPoint: x' = F x, P' = F P F' + G q G', and an update with the
+/// Textbook Kalman filter of MovingPoint: x' = F x, P' = F P F' + G q G'. The update computes the
 /// inverse of S.
 struct Textbook {
   Eigen::Vector2d x{1.0, -0.5};
@@ -75,7 +75,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
       measurements(problem, per_measurement, StreamsOf(problem));
   Random random(12);
   for (int k = 0; k < 200; ++k) {
-    // Two measurements of the first stream with the same timestamp, one of the second.
+    // The frame has two measurements of the first stream and one of the second.
     const Frame frame =
         FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
     for (Ekf* ekf : {&joint, &sensors, &measurements}) ekf->Process(frame);
@@ -120,12 +120,12 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
     passed += report.measurements()[0].outcome == Outcome::kAccepted ? 1 : 0;
   }
-  // Tolerance: 5 sigma of a binomial share.
+  // The tolerance is 5 sigma of a binomial share.
   EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
 }
 
 TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
-  // d = BF / Z is not linear: joint and per-sensor updates differ.
+  // d = BF / Z is not linear, so joint and per-sensor updates give different results.
   const Problem problem = DepthFilter();
   EkfOptions options;
   options.fuse = Fuse::kPerSensor;
@@ -140,7 +140,7 @@ TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   EXPECT_NE(joint.state().values(), whole.state().values());
 }
 
-/// z = x + gain c
+/// Measures z = x + gain c.
 struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -157,8 +157,8 @@ struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// Two updates of three rows each, in Joseph form. If c is a consider state, its gain is zero for
-// all rows; if only one sensor considers c, for the rows of that sensor.
+// Two updates in Joseph form have three rows each. If c is a consider state, its gain is zero for
+// all rows. If only one sensor considers c, its gain is zero for the rows of that sensor.
 TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   for (const bool by_role : {false, true}) {
     Problem problem;
@@ -196,7 +196,7 @@ TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   }
 }
 
-/// z = x. The implied x exists only if z is positive.
+/// Measures z = x. The implied x exists only if z is positive.
 struct Implies : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -218,7 +218,7 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// A measurement without an implied state is invalid; it is not a divergence of the filter.
+// A measurement that implies no state is invalid. This is not a divergence of the filter.
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
@@ -234,7 +234,8 @@ TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.5}})).measurements()[0].outcome, Outcome::kAccepted);
 }
 
-// A quaternion has three degrees of freedom: chi2(0.95, 3) = 7.81, chi2(0.95, 4) = 9.49.
+// A quaternion has three degrees of freedom, so the gate is chi2(0.95, 3) = 7.81. With four numbers
+// it would be chi2(0.95, 4) = 9.49.
 TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
   const Problem problem = WalkingOrientation();
   EkfOptions options;
@@ -252,7 +253,7 @@ TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
 }
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
-  // z = lambda Z with lambda as a consider state; the Schmidt gain is computed by hand.
+  // z = lambda Z, and lambda is a consider state. The expected Schmidt gain is computed by hand.
   Problem problem = DepthFilter();
   problem.sensors.erase(problem.sensors.begin());
   problem.sensors[0].roles[1].mode = RoleMode::kConsider;
@@ -260,7 +261,8 @@ TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
   ekf.Start(0);
   ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda;
-  const Eigen::RowVector3d jacobian(lambda, 0.0, z);  // depth, depth_rate, inverse_distance
+  // The elements are depth, depth_rate and inverse_distance.
+  const Eigen::RowVector3d jacobian(lambda, 0.0, z);
   const Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
   const double sigma = 2.0 / 300.0 * h * h * h, r = sigma * sigma;
   const double s = jacobian * p * jacobian.transpose() + r;
@@ -293,7 +295,7 @@ TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
   Ekf ekf(problem, {}, StreamsOf(problem));
   const double d = 80.0, bf = 26.0;
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, d}}));
-  // H1 = -d^2 / BF, evaluated at the measurement; the innovation is evaluated at the prediction.
+  // H1 = -d^2 / BF is evaluated at the measurement. The innovation is evaluated at the prediction.
   const double jacobian = -d * d / bf;
   EXPECT_NEAR(report.measurements()[0].s[0], jacobian * jacobian * 0.01 + 1.0, 1e-9);
   EXPECT_NEAR(report.measurements()[0].innovation[0], d - bf / 0.35, 1e-12);
@@ -356,7 +358,7 @@ TEST(Ekf, StaleFramesInARowAreOneEvent) {
           "the frame at 0.500000 s is older than the state at 1.000000 s: the measurements of "
           "this frame are not used; to use late frames, set `out_of_sequence: {policy: "
           "rollback, ...}` or, in C++, alidade::Rollback"});
-  EXPECT_EQ(stale(0.6), none);  // same episode
+  EXPECT_EQ(stale(0.6), none);  // this frame belongs to the same episode
   EXPECT_EQ(stale(1.1), none);
   EXPECT_EQ(stale(1.0).size(), 1u);
 }
@@ -391,7 +393,7 @@ TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0 + std::pow(0.125, 2), 1e-14);
 }
 
-/// z = a b
+/// Measures z = a b.
 struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -406,7 +408,7 @@ struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// z = x^2 at x = 2: H = (4, 0), S = 17. The number of roles equals that of the states.
+// z = x^2 at x = 2: H = (4, 0) and S = 17. The number of roles equals the number of states.
 TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
@@ -426,7 +428,7 @@ TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   }
 }
 
-/// z = p - r: a sensor of landmarks.
+/// Measures z = p - r, the offset of a landmark.
 struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"position"},
                                      Quantity{"landmark", "", "", "", ALIDADE_ROLE_LANDMARK}};
@@ -442,8 +444,8 @@ struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// p ~ N(0, 4), r ~ N(0, 1), z = 6: S = 6, so p = 4 and r = -1. The order of the blocks in the state
-// differs from that of the roles.
+// p ~ N(0, 4), r ~ N(0, 1) and z = 6: S = 6, so p = 4 and r = -1. The blocks and the roles have
+// different orders.
 TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   Problem problem;
   AddMotion(problem, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
@@ -460,8 +462,8 @@ TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   }
 }
 
-// P R / (P + R) equals R up to 1e-14. The difference P - P^2 / (P + R) is accurate only to the last
-// digit of P, 1.5 % of R.
+// P R / (P + R) equals R to 1e-14. The difference P - P^2 / (P + R) is accurate only to the last
+// digit of P, which is 1.5 % of R.
 TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
   for (const int n : {3, 20}) {
     Problem problem;

@@ -78,7 +78,7 @@ bool Makes(const Problem& problem) {
   return true;
 }
 
-/// Expects that the filter accepts exactly the problems that its kCapabilities allows.
+/// Expects that Filter accepts exactly those problems that its kCapabilities allow.
 template <class Filter>
 void ExpectAsSupported() {
   const EstimatorCapabilities& can = Filter::kCapabilities;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Online use of a filter: measurements pushed by name, predictions that do not change the filter,
-// copies.
+// Tests live use of a filter: measurements pushed by name, predictions that do not change the
+// filter, and copies.
 #include "alidade/estimation/filter.h"
 
 #include <gtest/gtest.h>
@@ -32,8 +32,8 @@ Type MakeLive() {
   }
 }
 
-/// Returns frames of a target that oscillates between 0.2 and 0.4 m. Some frames are empty, some
-/// have one stream.
+/// Returns frames of a target that oscillates between 0.2 and 0.4 m. Some frames are empty, and
+/// some have only one stream.
 std::vector<Frame> Swinging(int count, std::uint64_t seed) {
   Random random(seed);
   std::vector<Frame> frames;
@@ -54,7 +54,7 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
-/// Distance to a beacon whose position is supplied with the measurement.
+/// Measures the distance to a beacon. The position of the beacon is supplied with the measurement.
 struct Beacon : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -72,7 +72,7 @@ struct Beacon : Sensor<Vec<1>, Vec<1>> {
   bool Valid(const double* beacon, const double*) const { return beacon[0] > 0.0; }
 };
 
-// x = 1 +- 2; z = x - 3 +- 0.3, so that S = 4.09 and x' = 1 + 4 / 4.09 (z + 2).
+// x = 1 +- 2 and z = x - 3 +- 0.3, so S = 4.09 and x' = 1 + 4 / 4.09 (z + 2).
 TEST(LiveKnown, ComesWithAReadingAndIsNeededForAPrediction) {
   Problem problem = MovingPoint();
   AddSensor(problem, "z", MakeSensor(Beacon(), "beacon"), {"p.x"});
@@ -111,10 +111,10 @@ TYPED_TEST(Live, AtIsWhereAFrameWithoutMeasurementsLeads) {
     ExpectSame(at, run.state());
     EXPECT_NE(at.covariance().Dense(), before.covariance().Dense());
   }
-  ExpectSame(filter.At(0), filter.state());  // the current state, for a past time
+  ExpectSame(filter.At(0), filter.state());  // for a past time At returns the current state
 }
 
-// Runs 250 random sequences per filter type.
+// Runs 250 random sequences for each type of filter.
 TYPED_TEST(Live, WhateverIsAskedBetweenTheFramesTheRunIsTheStraightOne) {
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
     const std::vector<Frame> frames = Swinging(12, seed);
@@ -132,7 +132,7 @@ TYPED_TEST(Live, WhateverIsAskedBetweenTheFramesTheRunIsTheStraightOne) {
         } else if (dice < 0.6) {
           filter.Expect("disparity", frame.timestamp + later);
         } else {
-          const auto other = filter.Clone();  // a copy that is updated independently
+          const auto other = filter.Clone();  // updates a copy, which must not change the filter
           other->Process(FrameAt(Seconds(frame.timestamp + later), {{0, 70.0}}));
         }
       }
@@ -180,7 +180,7 @@ TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
   EXPECT_THROW(filter.ExpectEach("stereo", later, {-1}), Error);
 }
 
-// The expected pixels are those of the camera at its predicted position. A landmark that is not in
+// The expected pixels are those in the camera at its predicted position. A landmark that is not in
 // the map has no expected pixel.
 TEST(Live, ExpectsOfEachLandmarkOfTheMapItsOwn) {
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), WithPrior()));
@@ -242,7 +242,7 @@ TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {
 
 TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
   Problem problem = DepthFilter();
-  problem.priors[0].mean = {-0.1};  // behind the camera
+  problem.priors[0].mean = {-0.1};  // the target is behind the camera
   Ekf behind(problem, {}, StreamsOf(problem));
   behind.Start(0);
   EXPECT_FALSE(behind.Expect("disparity", 0));
@@ -287,7 +287,7 @@ TEST(Live, ExpectsNothingOfThePast) {
 TEST(Live, AnEndedFilterExpectsNothing) {
   Problem problem = DepthFilter();
   EkfOptions options;
-  options.max_dt_s = 1e-9;  // the next frame would need too many steps
+  options.max_dt_s = 1e-9;  // the next frame would take too many steps
   Ekf ekf(problem, options, StreamsOf(problem));
   ekf.Start(0);
   EXPECT_TRUE(ekf.Expect("disparity", 0));
@@ -296,7 +296,8 @@ TEST(Live, AnEndedFilterExpectsNothing) {
   EXPECT_FALSE(ekf.Expect("disparity", ekf.timestamp()));
 }
 
-// H is evaluated at the depth that the expected z implies, so S is that of the expected z.
+// H is evaluated at the depth that the expected z implies. So S equals the S of a measurement of
+// the expected z.
 TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
   Problem problem = DepthFilter();
   problem.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
@@ -308,7 +309,7 @@ TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
   EXPECT_NEAR(expected->s(0, 0), report.measurements()[0].s[0], 1e-9 * expected->s(0, 0));
 }
 
-// Results are identical bit for bit, with covariances and landmarks.
+// The results are identical bit for bit, including covariances and landmarks.
 TEST(Live, PushIsProcess) {
   Ekf pushed(MapSystem(Offset(0.1), {}, 0.3), {}, {{"tracks", 3}});
   Ekf processed = pushed;
@@ -346,14 +347,14 @@ TEST(Live, ExpectsALandmarkByItsId) {
   const auto seen = ekf.Expect("tracks", 0, 7);
   ASSERT_TRUE(seen);
   EXPECT_NEAR(seen->z[2], 1.0, 1e-12);
-  // The landmark was initialised from a measurement with the same noise: S = 2 R, whatever P of the
-  // camera is.
+  // The landmark was initialised from a measurement with the same noise. So S = 2 R, and it does
+  // not depend on the P of the camera.
   EXPECT_NEAR(seen->s(0, 0), 2.0 * 0.1 * 0.1, 1e-12);
   EXPECT_FALSE(ekf.Expect("tracks", 0, 8));
   EXPECT_FALSE(ekf.Expect("tracks", 0));
 }
 
-// This test is meant for the thread sanitizer.
+// The thread sanitizer finds errors in this test.
 TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   Ekf ekf = MakeLive<Ekf>();
   const std::vector<Frame> frames = Swinging(30, 5);
@@ -377,7 +378,7 @@ TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   EXPECT_EQ(same, std::vector<char>(4, 1));
 }
 
-// Time is in nanoseconds: seconds do not compile.
+// Times are in nanoseconds. Code that passes seconds as a double does not compile.
 template <class T>
 concept TakesTime = requires(Filter& filter, T t) {
   filter.At(t);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Discrete process noise is constant between two updates: splitting the time between them must not
-// change the result.
+// Tests discrete process noise, which is constant between two updates. Splitting the time between
+// the updates must not change the result.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -26,7 +26,7 @@ struct Options {
   double gate = 1.0;
 };
 
-/// Makes a filter of the given type.
+/// Returns a filter of the type Filter.
 template <class Filter>
 std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
                              const std::vector<StreamInfo>& streams) {
@@ -42,8 +42,8 @@ std::unique_ptr<Filter> Make(const Problem& problem, const Options& options,
   }
 }
 
-/// Returns the largest difference of values and of covariances, the latter relative to the standard
-/// deviations.
+/// Returns the largest difference of values and of covariances. A difference of covariances is
+/// divided by the standard deviations.
 double Apart(const State& a, const State& b) {
   double most = 0.0;
   for (std::size_t i = 0; i < a.values().size(); ++i) {
@@ -59,7 +59,7 @@ double Apart(const State& a, const State& b) {
   return most;
 }
 
-/// Returns 60 frames of the depth filter, 30 per second; every third has no disparity.
+/// Returns 60 frames of the depth filter, 30 per second. Every third frame has no disparity.
 std::vector<Frame> DepthFrames() {
   std::vector<Frame> frames;
   Random random(11);
@@ -74,7 +74,7 @@ std::vector<Frame> DepthFrames() {
   return frames;
 }
 
-/// Inserts `parts` - 1 frames without measurements before each frame but the first.
+/// Inserts `parts` - 1 frames without measurements before each frame except the first.
 std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) {
   std::vector<Frame> all;
   for (const Frame& frame : frames) {
@@ -87,8 +87,8 @@ std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) 
   return all;
 }
 
-/// Returns the states after the frames that have a measurement; for a smoother, the smoothed
-/// states.
+/// Returns the states after the frames that have a measurement. For a smoother these are the
+/// smoothed states.
 std::vector<State> StatesOf(Estimator& filter, const std::vector<Frame>& frames) {
   std::vector<State> states;
   for (const Frame& frame : frames) {
@@ -117,8 +117,8 @@ class HeldNoise : public ::testing::Test {
                                 const Options& options = {}) {
     return StatesOf(*Make<Filter>(problem, options, StreamsOf(problem)), frames);
   }
-  /// Rounding error. For sigma points it grows with eps / alpha^2, alpha = 0.01; for the smoother
-  /// with P / P_s, here up to 1e4.
+  /// Tolerance for rounding errors. With sigma points they grow with eps / alpha^2, and alpha
+  /// = 0.01. In the smoother they grow with P / P_s, which is up to 1e4 here.
   static constexpr bool kCancels =
       std::is_same_v<Filter, Ukf> || std::is_same_v<Filter, RtsSmoother>;
   static constexpr double kTolerance = kCancels ? 1e-9 : 1e-11;
@@ -143,7 +143,7 @@ TYPED_TEST(HeldNoise, FramesWithoutMeasurementsChangeNothing) {
   EXPECT_LT(MostApart(whole, this->Run(DepthFilter(), more, {0.001})), this->kTolerance);
 }
 
-// The estimates after rejected measurements equal those without these measurements.
+// Rejected measurements change no estimate: the result is the same without them.
 TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   const Problem problem = DepthFilter();
   std::vector<Frame> frames = DepthFrames(), wild;
@@ -160,8 +160,8 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   EXPECT_LT(MostApart(this->Run(problem, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
 }
 
-// The problem also contains a model with independent noise per step, in addition to the model with
-// discrete noise.
+// The problem has two motion models: one with discrete noise, and one whose noise is independent
+// from step to step.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
   Problem problem = DepthFilter();
   problem.motions[1].model = testing::ConstantMotion(1, 0.3);
@@ -180,7 +180,7 @@ TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
   EXPECT_LT(MostApart(whole, this->Run(problem, more)), this->kTolerance);
 }
 
-/// Constant velocity, with a control input that has no effect.
+/// Constant velocity with a control input that has no effect.
 struct Pushed : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"depth", "m"}, Quantity{"depth_rate", "m/s"}};
   using Input = Vec<1>;
@@ -199,7 +199,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   const auto whole = this->Run(DepthFilter(), DepthFrames());
   Problem problem = DepthFilter();
   problem.motions[0].model = MakeMotion(Pushed(), "pushed");
-  problem.motions[0].input = {"push", 0.004};  // times out after 4 ms
+  problem.motions[0].input = {"push", 0.004};  // the input times out after 4 ms
   std::vector<StreamInfo> streams = StreamsOf(problem);
   streams.push_back({"push", 1});
   std::vector<Frame> frames;
@@ -213,7 +213,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   EXPECT_LT(MostApart(whole, states), this->kTolerance);
 }
 
-// The first block is constant: it has no error and no part in M.
+// The first block is constant, so it has no error and no rows in M.
 TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
   const auto problem = [](BlockStatus position) {
     Problem made;
@@ -242,7 +242,7 @@ class HeldNoiseSnapshot : public ::testing::Test {};
 using Recursive = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf>;
 TYPED_TEST_SUITE(HeldNoiseSnapshot, Recursive);
 
-// The copy is made inside a gap, after one part and after several.
+// The copy is made inside a gap: after one part, and after several parts.
 TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
   const Problem problem = DepthFilter();
   for (const int parts : {1, 3}) {
@@ -262,7 +262,8 @@ TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
   }
 }
 
-// Var(v) after one second of frames without measurements: one interval, sigma^2 T^2.
+// The frames of one second have no measurements and form a single interval. So Var(v) grows by
+// sigma^2 T^2.
 TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
   const Problem problem = HeldPoint(1.0);
   const auto filter = Make<TypeParam>(problem, {}, {});
@@ -271,7 +272,8 @@ TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
   EXPECT_NEAR(CovarianceOf(filter->state(), "p.x", "p.x"), 4.0 + 9.0 + 0.25, 1e-9);
 }
 
-// The initialisation of a block ends the noise interval, as does an update without information.
+// The initialisation of a block ends the noise interval. An update without information does the
+// same.
 TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   Problem waits = DepthFilter();
   waits.priors[2] = {2, {}, {}, "inverse_scale"};
@@ -294,7 +296,8 @@ TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
   EXPECT_GT(std::abs(covariance(starts) - covariance(goes_on)), 1e-3);
 }
 
-// Least squares over x_k = Phi_k x_0 + sum Gamma w; one w per interval between measured frames.
+// Least squares over x_k = Phi_k x_0 + sum Gamma w. There is one w for each interval between
+// measured frames.
 TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Iterated EKF with landmarks.
+// Tests the iterated EKF with landmarks.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -65,7 +65,7 @@ struct Cost {
     }
     return gradient;
   }
-  /// x (-) prior
+  /// Returns x (-) prior.
   VectorXd From(const State& x) const {
     VectorXd dx(prior.covariance().size());
     for (const Block& block : prior.layout().blocks()) {
@@ -76,8 +76,8 @@ struct Cost {
   }
 };
 
-// The landmark contains a direction on the sphere: H at an iterate is transported to the tangent
-// space at the prediction.
+// The landmark contains a direction on the sphere. The H of an iterate is transported to the
+// tangent space at the prediction.
 TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   constexpr double kSigma = 0.05;
   const AnchoredPixels<0> pixels(kSigma);
@@ -96,7 +96,8 @@ TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   ASSERT_EQ(prediction.state().layout().blocks().size(), 4u);
   const double before = cost.Gradient(VectorXd::Zero(cost.From(iekf.state()).size())).norm();
   EXPECT_LT(cost.Gradient(cost.From(iekf.state())).norm(), 1e-4 * before);
-  EXPECT_GT(cost.Gradient(cost.From(ekf.state())).norm(), 1e-2 * before);  // one step is not enough
+  // A single step is not enough.
+  EXPECT_GT(cost.Gradient(cost.From(ekf.state())).norm(), 1e-2 * before);
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST(Iekf, EqualsTheEkfOnALinearProblem) {
   }
 }
 
-/// Returns the minimiser of c in [low, high], by golden-section search.
+/// Returns the minimiser of `c` in [low, high], found by golden-section search.
 double Least(const std::function<double(double)>& c, double low, double high) {
   const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
   for (int i = 0; i < 200; ++i) {
@@ -59,14 +59,14 @@ TEST(Iekf, FindsTheMostProbableState) {
     return std::pow((z - 0.35) / 0.1, 2) + std::pow(110.0 - 26.0 / z, 2);
   };
   const double least = Least(cost, 0.15, 0.4);
-  // The tolerance is a ten-thousandth of the posterior's sigma, 2 mm.
+  // The tolerance is a ten-thousandth of the posterior sigma, which is 2 mm.
   EXPECT_NEAR(ValueOf(iekf.state(), "target.depth"), least, 2e-7);
-  // P = (1 / P0 + H' H)^-1 at the estimate. A step as large as the tolerance changes P by 3e-6 of
-  // its value through H.
+  // P = (1 / P0 + H' H)^-1 at the estimate. If the estimate moves by the tolerance, H changes P by
+  // 3e-6 of its value.
   const double h = -26.0 / (least * least);
   const double p = 1.0 / (1.0 / 0.01 + h * h);
   EXPECT_NEAR(CovarianceOf(iekf.state(), "target.depth", "target.depth") / p, 1.0, 1e-4);
-  // The report contains the values at the prediction.
+  // The report contains the values at the prediction, not at the estimate.
   EXPECT_NEAR(report.measurements()[0].h[0], 26.0 / 0.35, 1e-12);
   EXPECT_NEAR(report.measurements()[0].innovation[0], 110.0 - 26.0 / 0.35, 1e-12);
   EXPECT_NEAR(report.measurements()[0].s[0], std::pow(26.0 / 0.35 / 0.35, 2) * 0.01 + 1.0, 1e-9);
@@ -86,7 +86,7 @@ TEST(Iekf, TheGateIsThatOfThePrediction) {
   EXPECT_EQ(iekf.state().values(), x);
 }
 
-/// z = atan(x)
+/// Measures z = atan(x).
 struct ArcTangent : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -102,7 +102,8 @@ struct ArcTangent : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-/// ArcTangent with an analytic derivative 1 / (1 + x^2), which counts its calls.
+/// An ArcTangent with the analytic derivative 1 / (1 + x^2). `count` counts the calls of the
+/// derivative.
 struct CountedArcTangent : ArcTangent {
   int* count;
   CountedArcTangent(const ArcTangent& base, int* counter) : ArcTangent(base), count(counter) {}
@@ -112,7 +113,7 @@ struct CountedArcTangent : ArcTangent {
   }
 };
 
-/// z = x^2; the Jacobian is defined for |x| > 2 only.
+/// Measures z = x^2. The Jacobian is defined only for |x| > 2.
 struct Creased : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -137,9 +138,9 @@ Problem FarArcTangent() {
   return problem;
 }
 
-// FAULTS 81: the iterate with the lowest cost is used.
+// Fault 81 of tests/faults/README.md: the filter uses the iterate with the lowest cost.
 TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
-  // From 3, a full Gauss-Newton step leads to -9.5, the next to 116, and so on.
+  // A full Gauss-Newton step from 3 leads to -9.5, the next step leads to 116, and so on.
   const Problem problem = FarArcTangent();
   Iekf iekf(problem, {}, StreamsOf(problem));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
@@ -162,8 +163,8 @@ TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   EXPECT_FALSE(iekf.diverged());
 }
 
-// H was last evaluated at the last iterate x: P = (1 / P0 + H^2 / R)^-1 there. The remaining step
-// is (P0 H (r + H dx) / S - dx) / sqrt(P), computed here by hand.
+// The last H was evaluated at the last iterate x, so P = (1 / P0 + H^2 / R)^-1. The remaining step
+// is (P0 H (r + H dx) / S - dx) / sqrt(P), which is computed here by hand.
 TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
   const Problem problem = FarArcTangent();
   for (const int most : {2, 3}) {
@@ -186,7 +187,7 @@ TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
     const double p = 1.0 / (1.0 / p0 + h * h / r);
     EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x") / p, 1.0, 2.2e-16 * p0 / p) << most;
     EXPECT_NEAR(left / (std::abs(step) / std::sqrt(p)), 1.0, 5e-3)
-        << most;  // the event prints three digits
+        << most;  // The text of the event has three digits.
   }
 }
 
@@ -203,7 +204,7 @@ TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
   }
 }
 
-// The first step leads from 2.5 to 1.34, for which h is defined but its derivative is not.
+// The first step leads from 2.5 to 1.34. There h is defined, but its derivative is not.
 TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
@@ -219,7 +220,7 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   EXPECT_EQ(report.events[0].text,
             "an update stopped after 1 iterations because h has no Jacobian; the last iterate is "
             "used");
-  // H = 5 at the prediction: 1 / P = 1 + 1 + 25, and the step is P 5 (0 - 2.5^2).
+  // At the prediction H = 5, so 1 / P = 1 + 1 + 25. The step is P 5 (0 - 2.5^2).
   EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0 / 27.0, 1e-12);
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 2.5 - 5.0 * 6.25 / 27.0, 1e-12);
 }
@@ -246,7 +247,7 @@ struct Still : Motion<0, UnitQuaternion, UnitVector> {
   bool Stationary() const { return true; }
 };
 
-/// z = R(q) u
+/// Measures z = R(q) u.
 struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
   static constexpr std::array kRoles{Quantity{"q"}, Quantity{"u"}};
   static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
@@ -296,7 +297,8 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
   const double z[3] = {-0.3, 0.9, 0.2};
   frame.measurements.push_back({0, 0, -1, {z[0], z[1], z[2]}, {}});
   EXPECT_TRUE(iekf.Process(frame).events.empty());
-  // The gradient of the cost with respect to the tangent at the prior vanishes at the estimate.
+  // At the estimate the gradient of the cost must be zero. It is taken with respect to the tangent
+  // at the prior.
   const Geometry geometries[2] = {Geometry::UnitQuaternion(), Geometry::UnitVector()};
   double d[5];
   geometries[0].Minus(iekf.state().value(0), problem.priors[0].mean.data(), d);
@@ -310,7 +312,7 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
     for (const double element : d) sum += element * element / 0.5;
     return sum;
   };
-  EXPECT_GT(std::hypot(d[0], d[1], d[2]), 0.5);  // large enough for the curvature to matter
+  EXPECT_GT(std::hypot(d[0], d[1], d[2]), 0.5);  // large enough for the curvature to have an effect
   constexpr double kStep = 1e-5;
   for (double& element : d) {
     const double middle = element;
@@ -319,8 +321,8 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
     element = middle - kStep;
     const double below = cost();
     element = middle;
-    // Second derivatives are about 2 / 0.1^2 = 200: the tolerance corresponds to a distance of 1e-7
-    // from the optimum.
+    // The second derivatives are about 2 / 0.1^2 = 200, so the tolerance is equivalent to a
+    // distance of 1e-7 from the optimum.
     EXPECT_NEAR((above - below) / (2.0 * kStep), 0.0, 2e-5);
   }
 }
@@ -343,7 +345,7 @@ TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
       1e-12);
 }
 
-/// z = x^k c + n
+/// Measures z = x^k c + n.
 struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -361,8 +363,8 @@ struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// z = x - c + n. Its update changes P = 1.9 I to the correlated P = [[1, .9], [.9, 1]], in which
-/// .9 = 1.9^2 / S.
+/// Measures z = x - c + n. The update changes P = 1.9 I to P = [[1, .9], [.9, 1]], with .9
+/// = 1.9^2 / S.
 struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -377,8 +379,8 @@ struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Returns the state after z = 2 = x^k c with R = .01, for a sensor that counts c as known. Before
-/// it, x = c = 1, correlated by Difference.
+/// Returns the state after the measurement z = 2 = x^k c with R = .01. The sensor treats c as
+/// known. Before this measurement x = c = 1, correlated by an update with Difference.
 State AfterAHeldRole(int power) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
@@ -398,7 +400,7 @@ State AfterAHeldRole(int power) {
   return iekf.state();
 }
 
-// With a known c, h = x is linear: K = (1, .9) / 1.01.
+// c is treated as known, so h = x is linear: K = (1, .9) / 1.01.
 TEST(Iekf, HoldsARoleInEveryIteration) {
   const State linear = AfterAHeldRole(1);
   EXPECT_NEAR(ValueOf(linear, "p.x"), 1.0 + 1.0 / 1.01, 1e-9);
@@ -411,7 +413,7 @@ TEST(Iekf, HoldsARoleInEveryIteration) {
   };
   const double x = Least(cost, 1.0, 1.5);
   EXPECT_NEAR(ValueOf(cubic, "p.x"), x,
-              1e-7);  // golden-section search is accurate to the square root of eps
+              1e-7);  // Golden-section search is accurate to the square root of eps.
   EXPECT_NEAR(ValueOf(cubic, "q.c"), 1.0 + 0.9 * (x - 1.0), 1e-7);
 }
 

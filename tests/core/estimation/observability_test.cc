@@ -80,8 +80,8 @@ TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
 }
 
-// FAULTS 78: one camera without other motion or sensor information cannot determine the scale of
-// the world.
+// Fault 78 of tests/faults/README.md: a single camera without other motion or sensor information
+// cannot determine the scale of the world.
 TEST(UnobservableDirections, OneCameraCannotTellScale) {
   const auto problem = [](const LandmarkOptions& options) {
     return testing::MapSystem(testing::InverseDepthPixels(0.01), options);
@@ -90,15 +90,16 @@ TEST(UnobservableDirections, OneCameraCannotTellScale) {
   const auto anchored =
       testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), testing::WithPrior());
   EXPECT_EQ(UnobservableDirections(anchored), (std::vector<Names>{{"scale"}}));
-  // One landmark with a known position determines the scale.
+  // A single landmark with a known position determines the scale.
   LandmarkOptions known = testing::WithPrior();
   known.known = {{1, {0.0, 0.0, 2.0}, 0.01}};
   EXPECT_TRUE(UnobservableDirections(problem(known)).empty());
-  // Any offset in metres determines the scale, too.
+  // Any offset that is measured in metres also determines the scale.
   EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
 }
 
-// FAULTS 78: the initial position of the camera is unknown, too, so the whole world may be shifted.
+// Fault 78 of tests/faults/README.md: the initial position of the camera is also unknown, so the
+// whole world may be shifted.
 TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
   const Problem problem =
       testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.5);
@@ -110,8 +111,8 @@ TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
   }
 }
 
-/// Adds a block with the prior mean `mean` and the standard deviation `sigma` of each tangent
-/// element.
+/// Adds a block with the prior mean `mean`. Each tangent element has the standard deviation
+/// `sigma`.
 BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
                  const std::vector<double>& mean, double sigma) {
   const BlockId id = problem.layout.Declare(name, name.substr(0, name.find('.')), space);
@@ -120,7 +121,8 @@ BlockId AddBlock(Problem& problem, const std::string& name, const Space& space,
   return id;
 }
 
-/// Returns a body `b` driven by its accelerometer, and a sensor of its position or velocity.
+/// Returns a body `b` driven by its accelerometer, with a sensor of the block `measured`, its
+/// position or velocity.
 Problem Accelerated(const std::string& measured) {
   Problem problem;
   const SharedMotion model = MakeMotion(testing::Accelerated(), "accelerated");
@@ -132,12 +134,14 @@ Problem Accelerated(const std::string& measured) {
   return problem;
 }
 
-// A rotation about the acceleration becomes observable once the acceleration changes its direction.
+// The rotation about the direction of the acceleration becomes observable when this direction
+// changes.
 TEST(UnobservableDirections, AnAccelerometerThatChangesAndAPositionTellTheOrientation) {
   EXPECT_EQ(UnobservableDirections(Accelerated("b.position")), std::vector<Names>{});
 }
 
-// Only R u is observable: one of the three rotations is not.
+// If the acceleration u is constant, only R u is observable. So one of the three rotations is
+// unobservable.
 TEST(UnobservableDirections, AConstantAccelerometerLeavesARotation) {
   using internal::Excitation;
   const Problem problem = Accelerated("b.position");
@@ -150,7 +154,8 @@ TEST(UnobservableDirections, WhatNoInputExcitesIsReported) {
             (std::vector<Names>{{"b.position.x"}, {"b.position.y"}, {"b.position.z"}}));
 }
 
-/// Returns a vehicle `car` driven by its odometry, with a satellite receiver on a mast.
+/// Returns a vehicle `car` driven by its odometry. A satellite receiver is on a mast of the
+/// vehicle.
 Problem CarWithMast() {
   Problem problem;
   const SharedMotion model = MakeMotion(testing::Unicycle(), "unicycle");
@@ -163,7 +168,8 @@ Problem CarWithMast() {
   return problem;
 }
 
-// On a circle, any circle with the same centre explains the data: 4 numbers for 5 unknowns.
+// On a circle all circles with the same centre explain the data: these are 4 numbers for 5
+// unknowns.
 TEST(UnobservableDirections, OdometryThatChangesTellsALeverArm) {
   EXPECT_EQ(UnobservableDirections(CarWithMast()), std::vector<Names>{});
 }
@@ -182,8 +188,8 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-// Three steps of 0.02 s move x by j (0.02 s)^3: 8e-8 sigma if the jerk has sigma 0.01 m/s^3 and the
-// position sigma 1 m. This is small, but above rounding.
+// In three steps of 0.02 s the jerk j moves x by j (0.02 s)^3. If j has sigma 0.01 m/s^3 and the
+// position 1 m, this is 8e-8 sigma: small, but above rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Chain(), "chain"),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Problems built in code equal those of a config; invalid ones are rejected with a message.
+// Tests that problems built in code equal those of a config, and that invalid problems are rejected
+// with a message.
 #include <gtest/gtest.h>
 
 #include "alidade/base/error.h"
@@ -29,7 +30,7 @@ std::string RefusalOf(const Call& call) {
   return "nothing";
 }
 
-/// Returns the message of the error if `add` is called with a problem that has the state `target`.
+/// Calls `add` with a problem that has the state `target`. Returns the message of the error.
 template <class Add>
 std::string Refusal(const Add& add) {
   Problem problem;

@@ -31,7 +31,7 @@ TEST(RobustLoss, TheWeightIsTheSlopeOfRhoOverD) {
 }
 
 TEST(RobustLoss, HasTheTextbookValues) {
-  // Huber: k d - k^2 / 2; Cauchy: k^2 / 2 log(1 + d^2 / k^2).
+  // rho is k d - k^2 / 2 for Huber, and k^2 / 2 log(1 + d^2 / k^2) for Cauchy.
   EXPECT_NEAR(Rho(kHuber, 3.0), 1.345 * 3.0 - 0.5 * 1.345 * 1.345, 1e-15);
   EXPECT_NEAR(Rho(kCauchy, 4.0), 2.0 * std::log(5.0), 1e-15);
   EXPECT_NEAR(Weight(kHuber, 2.69), 0.5, 1e-15);
@@ -39,7 +39,7 @@ TEST(RobustLoss, HasTheTextbookValues) {
   EXPECT_EQ(Weight(kHuber, 1.345), 1.0);
 }
 
-/// x ~ N(0, 4), measured with R = 1 and the given loss.
+/// Returns a problem with x ~ N(0, 4), measured with R = 1 and the given loss.
 Problem Measured(const RobustLoss& loss) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 0.0, 2.0}});
@@ -48,7 +48,7 @@ Problem Measured(const RobustLoss& loss) {
   return problem;
 }
 
-/// Processes one measurement z of the problem Measured.
+/// Processes one measurement z of the problem Measured(loss). Stores the resulting state.
 template <class Filter>
 UpdateReport Measure(const RobustLoss& loss, double z, State& state) {
   const Problem problem = Measured(loss);
@@ -64,7 +64,7 @@ using Filters = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf, RtsSmoother>;
 TYPED_TEST_SUITE(RobustFilter, Filters);
 
 TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
-  // S = 5, d = 10 / sqrt(5).
+  // S = 5, so d = 10 / sqrt(5).
   constexpr double kOutlier = 10.0;
   const double d = kOutlier / std::sqrt(5.0);
   for (const auto& [loss, w] :
@@ -79,7 +79,8 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
   }
 }
 
-// R / w overflows: the measurement is not used, but the valid one in the same frame is.
+// If R / w overflows, the measurement is not used. The valid measurement in the same frame is still
+// used.
 TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   for (const RobustLoss& loss : {kCauchy, kHuber}) {
     Problem problem = Measured({});
@@ -101,7 +102,7 @@ TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   }
 }
 
-/// z = x + n of two elements.
+/// Measures both elements: z = x + n.
 struct PairOfElements : Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -128,7 +129,7 @@ EkfOptions& Common(UkfOptions& options) { return options.filter; }
 struct Normal {
   Eigen::Vector2d x;
   Eigen::Matrix2d p;
-  /// Kalman update with R / w(d), d^2 = r' S^-1 r.
+  /// Kalman update with the noise R / w(d), d^2 = r' S^-1 r.
   void Take(const Eigen::Vector2d& z, const Eigen::Matrix2d& r, const RobustLoss& loss) {
     const Eigen::Vector2d innovation = z - x;
     const double d = std::sqrt(innovation.dot((p + r).inverse() * innovation));
@@ -138,8 +139,9 @@ struct Normal {
   }
 };
 
-// Both elements have one weight; R is correlated and comes with the measurement. `fuse: per_*`
-// computes d of the second measurement after the first update. A gate uses S without the loss.
+// Both elements have the same weight. R is correlated and comes with the measurement. With `fuse:
+// per_*`, the d of the second measurement is computed after the first update. A gate uses S without
+// the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   Problem problem;
   const SharedMotion still = testing::ConstantMotion(2);
@@ -186,12 +188,12 @@ TEST(RobustLoss, HuberLeavesAnInlierAsItIs) {
   EXPECT_EQ(robust.covariance().Dense(), plain.covariance().Dense());
 }
 
-// x is constant: every smoothed estimate uses all measurements, 1 / P = 1/4 + w + 1.
+// x is constant, so every smoothed estimate uses all measurements: 1 / P = 1/4 + w + 1.
 TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   const Problem problem = Measured(kHuber);
   RtsSmoother rts(problem, {}, StreamsOf(problem));
   const double w = 1.345 / (10.0 / std::sqrt(5.0)), first = w * 10.0 / (0.25 + w);
-  const double second = first + 0.1;  // an inlier
+  const double second = first + 0.1;  // the second measurement is an inlier
   rts.Process(FrameAt(0.0, {{0, 10.0}}));
   rts.Process(FrameAt(0.1, {{0, second}}));
   int count = 0;
@@ -204,8 +206,8 @@ TEST(RobustLoss, TheSmootherGoesBackWithROverW) {
   EXPECT_EQ(count, 2);
 }
 
-// Central differences with step 1e-5: their errors are 1e-10 f''' and the rounding error, 1e-11. No
-// loss has a kink at these points.
+// Compares with central differences of step 1e-5. Their errors are 1e-10 f''', plus a rounding
+// error of 1e-11. No loss has a kink at these points.
 TEST(EveryLoss, HasTheWeightAndTheCurvatureOfItsRho) {
   constexpr double kStep = 1e-5, kTolerance = 1e-8;
   for (std::size_t kind = 0; kind < kLosses.size(); ++kind) {

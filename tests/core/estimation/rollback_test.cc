@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Late measurements: rollback produces the same bits as the frames in order.
+// Tests late measurements: with rollback, the result is bit-identical to that of the frames in
+// order.
 #include "alidade/estimation/rollback.h"
 
 #include <gtest/gtest.h>
@@ -37,7 +38,7 @@ std::vector<Frame> Swinging(int count) {
   return frames;
 }
 
-/// Delays each frame by at most `most_s` and returns them in order of arrival.
+/// Delays each frame by at most `most_s`. Returns the frames in the order of their arrival.
 std::vector<Frame> Delayed(const std::vector<Frame>& frames, double most_s) {
   Random random(2);
   std::multimap<double, Frame> arrivals;
@@ -49,7 +50,7 @@ std::vector<Frame> Delayed(const std::vector<Frame>& frames, double most_s) {
   return delayed;
 }
 
-/// Returns the full content of a report, exactly.
+/// Returns the full content of a report as text, without rounding.
 std::string Text(const UpdateReport& report) {
   std::string text = report.stale ? "stale" : "";
   for (const MeasurementReport& m : report.measurements()) {
@@ -73,7 +74,7 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
-/// Compares a run with delayed frames with the run in order.
+/// Compares a run with delayed frames with a run of the same frames in order.
 template <class Type, class Options>
 void ExpectTheBitsOfTheInOrderRun(const Options& options) {
   const Problem problem = DepthFilter();
@@ -91,7 +92,7 @@ void ExpectTheBitsOfTheInOrderRun(const Options& options) {
     }
   }
   EXPECT_EQ(found, expected);
-  EXPECT_GT(processed, frames.size() + 40);  // rollbacks occurred
+  EXPECT_GT(processed, frames.size() + 40);  // checks that rollbacks occurred
   ExpectSame(late.filter().state(), in_order.state());
   const Timestamp soon = in_order.timestamp() + TimestampFromSeconds(0.05);
   ExpectSame(late.filter().At(soon), in_order.At(soon));
@@ -100,7 +101,7 @@ void ExpectTheBitsOfTheInOrderRun(const Options& options) {
 TEST(Rollback, GivesTheBitsOfTheInOrderRun) {
   EkfOptions options;
   options.gate = 0.99;
-  options.rejection_recovery_after = 2;  // each copy has its own counter
+  options.rejection_recovery_after = 2;  // each copy of the filter has its own counter
   ExpectTheBitsOfTheInOrderRun<Ekf>(options);
   ExpectTheBitsOfTheInOrderRun<SquareRootEkf>(options);
   ExpectTheBitsOfTheInOrderRun<Iekf>(IekfOptions{options});
@@ -122,9 +123,10 @@ TEST(Rollback, AFrameGivesItsReportAndThoseOfTheLaterOnes) {
   EXPECT_EQ(timestamps(1.5), Times{1.5});
   EXPECT_EQ(timestamps(2.0), Times{2.0});
   EXPECT_EQ(timestamps(1.25), (Times{1.25, 1.5, 2.0}));
-  EXPECT_EQ(timestamps(2.0), Times{2.0});  // after the frame that arrived first
+  EXPECT_EQ(timestamps(2.0), Times{2.0});  // the earlier arrival at 2.0 s comes first
   EXPECT_EQ(timestamps(1.0),
-            (Times{1.0, 1.25, 1.5, 2.0, 2.0}));  // exactly at the edge of the window
+            // The frame at 1.0 s is exactly at the edge of the window.
+            (Times{1.0, 1.25, 1.5, 2.0, 2.0}));
   EXPECT_EQ(timestamps(2.125), Times{2.125});
 }
 
@@ -160,11 +162,11 @@ TEST(Rollback, AFrameBeyondTheWindowIsRefusedAsStaleAndChangesNothing) {
       "the frame at 1.250000 s is 0.750000 s older than the newest frame, more than the window "
       "of 0.500000 s: the measurements of this frame are not used");
   ExpectSame(late.filter().state(), in_order.state());
-  late.Process(FrameAt(1.75, {{0, 81.0}}));  // within the window
+  late.Process(FrameAt(1.75, {{0, 81.0}}));  // this frame is within the window
   EXPECT_FALSE(late.filter().state().values() == in_order.state().values());
 }
 
-// The difference of the two timestamps does not fit into a Timestamp.
+// A Timestamp cannot represent the difference of the two timestamps.
 TEST(Rollback, TimesFarApartAreBeyondEveryWindow) {
   const Problem problem = DepthFilter();
   Rollback late(Ekf(problem, {}, StreamsOf(problem)), 9.1e9);
@@ -191,7 +193,7 @@ TEST(Rollback, AWindowThatIsNoneIsMisuse) {
   EXPECT_THROW(Rollback(ekf, std::nan("")), ContractViolation);
 }
 
-/// Throws if the value is 7; its state is the sum of the values.
+/// The state is the sum of the measured values. The value 7 causes an exception.
 class Sum : public Estimator {
  public:
   void Start(Timestamp) override {}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Smoother on the sphere, across the discontinuity of the tangent basis, compared with a batch
-// solution.
+// Tests the smoother on the sphere. The direction crosses the discontinuity of the tangent basis.
+// The result is compared with a batch solution.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// A direction that walks at random: n' = n (+) w.
+/// A direction that performs a random walk: n' = n (+) w.
 struct Wander : Motion<2, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   double sigma;
@@ -46,7 +46,7 @@ struct Direction : Sensor<UnitVector, UnitVector> {
   }
 };
 
-/// Returns the rotation from a to b as a vector in space. It needs no basis, so it has no
+/// Returns the rotation from a to b as a vector in space. No basis is used, so there is no
 /// discontinuity.
 Eigen::Vector3d Turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const Eigen::Vector3d across = b - a.dot(b) * a;
@@ -61,13 +61,15 @@ Eigen::Matrix<double, 3, 2> BasisAt(const double* n) {
   return Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(basis);
 }
 
-/// Gauss-Newton over all directions, with numeric derivatives.
+/// Gauss-Newton over all directions with numeric derivatives.
 struct DirectionBatch {
   Prior prior;
-  double sigma;                             ///< noise of a step and of a measurement
-  std::vector<Eigen::Vector3d> n = {};      ///< current solution
-  std::vector<std::vector<double>> z = {};  ///< per frame; empty if not measured
-  Eigen::MatrixXd covariance = {};          ///< joint covariance, in the tangent planes at n
+  double sigma;                         ///< noise of a step, and of a measurement
+  std::vector<Eigen::Vector3d> n = {};  ///< current solution
+  /// One measurement per frame; empty if the frame has none.
+  std::vector<std::vector<double>> z = {};
+  /// Joint covariance of all directions, in the tangent planes at n.
+  Eigen::MatrixXd covariance = {};
 
   std::vector<Eigen::Vector3d> Moved(const Eigen::VectorXd& d) const {
     std::vector<Eigen::Vector3d> to(n.size());
@@ -108,13 +110,14 @@ struct DirectionBatch {
   }
 };
 
-/// Largest difference of smoother and batch: of estimates in standard deviations, of P as a ratio.
+/// Largest differences of smoother and batch: of estimates in standard deviations, and of P as a
+/// ratio.
 struct SeamDistance {
   double estimate = 0.0, covariance = 0.0;
 };
 
-/// Filters a direction that crosses z = 0 several times. At z = 0, the basis of the tangent plane
-/// changes discontinuously. All angles scale with `sigma`.
+/// Filters and smooths a direction that crosses z = 0 several times. At z = 0 the basis of the
+/// tangent plane is discontinuous. All angles are proportional to `sigma`.
 SeamDistance Follow(double sigma) {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Wander(sigma), "wander"), {}};
@@ -160,11 +163,11 @@ SeamDistance Follow(double sigma) {
   return most;
 }
 
-// The smoother is linearised at the filter's estimates, the batch at its solution. In units of
-// sigma, the difference is of second order in the angles because of the curvature of the sphere. A
-// quarter of the angles therefore leaves a sixteenth of it; a first-order error would leave a
-// quarter. The factor 8 is halfway on a logarithmic scale. An error at the discontinuity would not
-// decrease.
+// The smoother is linearised at the filter's estimates, and the batch at its own solution. Because
+// of the curvature of the sphere, they differ by a term of second order in the angles, in units of
+// sigma. If the angles are a quarter as large, this term is a sixteenth as large, but an error of
+// first order would be a quarter. The factor 8 is halfway on a logarithmic scale. An error at the
+// discontinuity would not become smaller.
 TEST(RtsSmoother, FollowsADirectionAcrossTheSeamOfItsBasisAsTheBatchDoes) {
   const SeamDistance wide = Follow(2e-3), narrow = Follow(0.5e-3);
   EXPECT_GT(wide.estimate, 8.0 * narrow.estimate) << wide.estimate << ' ' << narrow.estimate;

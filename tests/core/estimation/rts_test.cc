@@ -16,10 +16,10 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Least squares over the first state and all noise inputs, which also allows a singular Q:
-/// x_k = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
+/// Least squares over the first state and all noise inputs, which also works if Q is singular: x_k
+/// = Phi_k x_0 + sum Gamma w, z_k = H x_k + n.
 struct DenseBatch {
-  std::vector<Eigen::MatrixXd> map;  ///< x_k as a function of the unknowns
+  std::vector<Eigen::MatrixXd> map;  ///< each x_k as a linear function of the unknowns
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
   DenseBatch(int frames, int n) {
@@ -105,12 +105,13 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
     sigma.push_back(CovarianceOf(state, "p.x", "p.x"));
     EXPECT_EQ(report.measurements()[0].outcome, k == 2 ? Outcome::kGated : Outcome::kAccepted);
     if (k + 1 < frames.size()) return;
-    EXPECT_EQ(state.values(), ekf.state().values());  // the last frame has no later data
+    EXPECT_EQ(state.values(), ekf.state().values());  // there are no data after the last frame
     EXPECT_EQ(state.covariance().Dense(), ekf.state().covariance().Dense());
   });
   ASSERT_EQ(sigma.size(), frames.size());
-  EXPECT_LT(sigma[0], 0.09);  // better than the measurement alone
-  // The same steps as frames without a measurement: 0.35 s in 4 steps, 0.6 s in 6.
+  EXPECT_LT(sigma[0], 0.09);  // more accurate than the measurement alone
+  // The second smoother takes the same steps as frames without measurements: 4 for 0.35 s, and 6
+  // for 0.6 s.
   options.max_dt_s = std::numeric_limits<double>::infinity();
   RtsSmoother in_frames(problem, options, StreamsOf(problem));
   std::vector<double> of_frames;
@@ -127,9 +128,10 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   for (std::size_t i = 0; i < sigma.size(); ++i) EXPECT_NEAR(sigma[i], of_frames[i], 1e-9) << i;
 }
 
-// The depth filter is not linear. The expected values come from the Rauch-Tung-Striebel recursion,
-// with the inverse that the adjoint form avoids:
+// The depth filter is not linear. The expected values come from the recursion of Rauch, Tung and
+// Striebel:
 // x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-) C', C = P F' P-^-1.
+// The recursion needs the inverse of P-, which the adjoint form avoids.
 TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
   const Problem problem = DepthFilter();
   EkfOptions options;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Compares a filter of few states, with unrolled kernels, with the same filter plus unobserved
-// states. The larger filter has enough states for the vector kernels.
+// Compares a filter of few states with the same filter plus unobserved states. The small filter
+// uses unrolled kernels. The large filter has enough states for the vector kernels.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -21,7 +21,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Two elements measured from one block of two, with correlated noise.
+/// Measures both elements of one block, with correlated noise.
 struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -39,7 +39,7 @@ struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
-/// Returns the problem with nine additional states that no sensor uses.
+/// Returns the problem with nine additional states. No sensor uses them.
 Problem AmongOthers(Problem problem) {
   for (int i = 0; i < 9; ++i) {
     AddMotion(problem, "aside" + std::to_string(i), ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -58,7 +58,7 @@ void ExpectEqual(std::span<const double> a, std::span<const double> b) {
   }
 }
 
-/// Returns the leading `rows` of each column of a gain.
+/// Returns the first `rows` elements of each column of a gain.
 std::vector<double> Leading(std::span<const double> gain, int columns, std::size_t rows) {
   std::vector<double> leading;
   const std::size_t all = gain.size() / static_cast<std::size_t>(columns);
@@ -68,7 +68,8 @@ std::vector<double> Leading(std::span<const double> gain, int columns, std::size
   return leading;
 }
 
-/// Runs both filters on the same frames and returns the number of each outcome and kind of event.
+/// Runs both filters on the same frames and compares them. Returns how often each outcome and each
+/// kind of event occurred.
 std::map<std::string, int> Compare(const Problem& problem, const EkfOptions& options,
                                    const std::vector<Frame>& frames) {
   const Problem other = AmongOthers(problem);
@@ -136,7 +137,8 @@ TEST(SmallEkf, DoesWhatALargeOneDoes) {
         break;
       case 4:
         frames.push_back(
-            FrameAt(t, {{1, s}, {0, d}, {0, d + 0.5}}));  // two measurements of one sensor
+            // The frame has two measurements of one sensor.
+            FrameAt(t, {{1, s}, {0, d}, {0, d + 0.5}}));
         break;
       case 5:
         frames.push_back(FrameAt(t, {{1, k % 3 == 0 ? std::nan("") : s}, {0, d}}));
@@ -154,8 +156,8 @@ TEST(SmallEkf, DoesWhatALargeOneDoes) {
   }
 }
 
-/// Returns frames 0.01 s apart. The disparity fits a depth of 0.3 m, except in frames [first,
-/// last).
+/// Returns frames that are 0.01 s apart. The disparity fits a depth of 0.3 m, except in the frames
+/// [first, last).
 std::vector<Frame> WildFrom(int first, int last, int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -165,16 +167,16 @@ std::vector<Frame> WildFrom(int first, int last, int count) {
   return frames;
 }
 
-// A reset does not change the order of the blocks in the state.
+// A reset must not change the order of the blocks in the state.
 TEST(SmallEkf, IsResetAsALargeOne) {
   EkfOptions options;
   options.gate = 0.999;
   options.rejection_recovery_after = 3;
   auto seen = Compare(DepthFilter(), options, WildFrom(20, 30, 80));
-  EXPECT_GE(seen["rejection_recovery"], 2);  // to the wrong depth and back
+  EXPECT_GE(seen["rejection_recovery"], 2);  // resets to the wrong depth and back
 }
 
-// The block without a value precedes blocks that have a prior.
+// The block without a value comes before blocks that have a prior.
 TEST(SmallEkf, StartsABlockFromAMeasurementAsALargeOne) {
   Problem problem = DepthFilter();
   problem.priors[0] = {0, {}, {}, "disparity"};
@@ -183,7 +185,7 @@ TEST(SmallEkf, StartsABlockFromAMeasurementAsALargeOne) {
   EXPECT_EQ(seen["accepted"], 19);
 }
 
-// An accepted measurement ends the first sequence of rejections: the second sequence inflates P
+// An accepted measurement ends the first sequence of rejections. So the second sequence inflates P
 // again.
 TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
   EkfOptions options;
@@ -225,7 +227,7 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   EXPECT_GT(seen.count("gated"), 0u);
 }
 
-/// CorrelatedPair with a model of much larger noise.
+/// A CorrelatedPair with much larger noise.
 struct LoudPair : CorrelatedPair {
   template <class T>
   void SqrtNoise(const T*, T* l) const {
@@ -258,7 +260,7 @@ TEST(SmallEkf, TakesAGivenNoiseInPlaceOfTheModels) {
   }
 }
 
-/// x' = x + w, with a square root of Qw that is not triangular.
+/// Motion model x' = x + w. The square root of Qw is not triangular.
 struct Shaken : Motion<2, Vec<2>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -272,7 +274,7 @@ struct Shaken : Motion<2, Vec<2>> {
   }
 };
 
-/// x' = x + dt (x_2, -x_1), without noise.
+/// Motion model x' = x + dt (x_2, -x_1), without noise.
 struct Spinning : Motion<0, Vec<2>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -321,8 +323,8 @@ struct Repeated : Sensor<Vec<K>, Vec<1>> {
   }
 };
 
-// A gain of 3 rows for the 2 states initialised by then has the same number of elements as one of 2
-// rows for 3 states.
+// The first gain has 3 rows and 2 columns, because only 2 states are initialised. The later gain of
+// 2 measured rows and 3 states has the same number of elements.
 TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
   Problem problem = DepthFilter();
   problem.priors[2] = {2, {}, {}, "inverse_scale"};
@@ -337,7 +339,7 @@ TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
 
 // ---- every number of states ---------------------------------------------------------------------
 
-/// Two elements measured from two blocks, with correlated noise.
+/// Measures two elements from two blocks, with correlated noise.
 struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -355,7 +357,7 @@ struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
   }
 };
 
-/// z = a + t_1 t_2 + t_3
+/// Measures z = a + t_1 t_2 + t_3.
 struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"a"}, Quantity{"t"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -370,7 +372,7 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
   }
 };
 
-/// Adds a block `t.x` of three elements that walk at random, with correlated priors.
+/// Adds a block `t.x` of three elements that perform a random walk. Their priors are correlated.
 void AddTriple(Problem& problem) {
   const SharedMotion walk = testing::ConstantMotion(3, 0.2);
   const BlockId id = problem.layout.Declare("t.x", "t", walk->blocks()[0]);
@@ -379,9 +381,9 @@ void AddTriple(Problem& problem) {
   problem.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
 }
 
-/// Returns a problem with `n` states. From n = 4 on, it has a block of three; the remaining states
-/// form as many pairs of position and velocity as possible. All motions have noise; sensors relate
-/// the first scalar to the others.
+/// Returns a problem with `n` states. From n = 4 on, it has a block of three states. The remaining
+/// states form as many pairs of position and velocity as possible. All motions have noise. The
+/// sensors relate the first scalar to the other states.
 Problem OfSize(int n) {
   Problem problem;
   const bool triple = n >= 4;
@@ -409,7 +411,7 @@ Problem OfSize(int n) {
 
 class SmallEkfOfSize : public ::testing::TestWithParam<int> {};
 
-// The frames have one measurement, two, or all: updates of 1 to 6 rows.
+// The frames have one measurement, two, or one of each sensor. The updates have 1 to 6 rows.
 TEST_P(SmallEkfOfSize, DoesWhatALargeOneDoes) {
   const Problem problem = OfSize(GetParam());
   ASSERT_EQ(problem.InitialState().covariance().size(), GetParam());

@@ -29,7 +29,7 @@ struct MeasuredDirection : Sensor<UnitVector, UnitVector> {
   }
 };
 
-/// A constant direction.
+/// A direction that does not change.
 struct Fixture : Motion<0, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   template <class T>
@@ -39,8 +39,8 @@ struct Fixture : Motion<0, UnitVector> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// Returns a problem of a direction at z = 0.05 that the measurement moves across z = 0. At z = 0,
-/// the basis of the tangent plane changes discontinuously.
+/// Returns a problem with a direction at z = 0.05. The measurement moves the direction across z
+/// = 0, where the basis of the tangent plane is discontinuous.
 Problem DirectionNearTheSeam() {
   Problem problem;
   MotionBinding binding{"d", MakeMotion(Fixture(), "still"), {}};
@@ -55,7 +55,7 @@ Problem DirectionNearTheSeam() {
   return problem;
 }
 
-/// Returns P of a direction as a covariance of the vector: B P B'.
+/// Returns the covariance of the direction as a vector in space: B P B'.
 Eigen::Matrix3d InSpace(const State& state) {
   double basis[6];
   UnitVector::Basis(state.value(0), basis);

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// z = a x + b y + n
+/// Measures z = a x + b y + n.
 struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -31,7 +31,7 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-/// Kalman filter of MovingPoint(0.7) with one direct measurement and the explicit inverse of S.
+/// Kalman filter of MovingPoint(0.7) with one direct measurement. It computes the inverse of S.
 struct DirectTextbook {
   Eigen::Vector2d x{1.0, -0.5};
   Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();
@@ -100,8 +100,9 @@ TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
   }
 }
 
-// Two constants with wide priors, then x + y measured to 1e-7 and x + (1 + 1e-3) y. The smallest
-// variance is at most 1e-16 of the largest prior variance, below the rounding of P.
+// Two constants have wide priors. Then x + y and x + (1 + 1e-3) y are measured with sigma 1e-7. The
+// smallest variance is at most 1e-16 of the largest prior variance, so it is below the rounding
+// error of P.
 TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot) {
   constexpr double kPrior = 1e3, kSigma = 1e-7;
   Problem problem;
@@ -125,7 +126,7 @@ TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot)
     lost = lost || !(difference.determinant() > 0.0);
   }
   EXPECT_TRUE(lost);
-  // Information form, exact to rounding: P^-1 = P0^-1 + sum H' R^-1 H.
+  // The information form is exact to rounding: P^-1 = P0^-1 + sum H' R^-1 H.
   const Eigen::Matrix2d information =
       Eigen::Matrix2d::Identity() / (kPrior * kPrior) +
       2.0 / (kSigma * kSigma) * (sum.transpose() * sum + nearly.transpose() * nearly);

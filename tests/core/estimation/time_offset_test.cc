@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A sensor with a clock offset: worked numbers, Jacobians compared with numeric ones, and data that
-// are really late.
+// Tests a sensor with a clock offset: worked numbers, Jacobians compared with numeric ones, and
+// data that are late.
 #include "alidade/estimation/time_offset.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ std::vector<std::string> NamesOf(const SharedSensor& sensor) {
   return names;
 }
 
-// z = 2 (x + v delta)
+// The sensor predicts z = 2 (x + v delta).
 TEST(TimeOffset, SeesAPointWhereItIsThen) {
   Problem problem = testing::MovingPoint();
   AddSensor(problem, "z", LinearSensor(2.0, 0.1), {"p.x"});
@@ -61,8 +61,8 @@ TEST(TimeOffset, SeesAPointWhereItIsThen) {
   }
 }
 
-// A camera that rotates and moves sees a landmark: rotations, landmark roles and an inverse
-// measurement model.
+// A camera that rotates and moves sees a landmark. This tests rotations, landmark roles and an
+// inverse measurement model.
 TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   const Camera camera(640, 480, 400, 400, 320, 240);
   for (const bool anchored : {false, true}) {
@@ -116,13 +116,13 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
     } else {
       roles[5] = {0.4, 0.3, 3.0};
     }
-    // df/ddelta is itself a numeric derivative: 1e-12 of the values over 1 ms.
+    // df/ddelta is itself a numeric derivative. Its error is 1e-12 of the values, divided by 1 ms.
     ExpectSame(SensorJacobian(sensor.model, roles), NumericSensorJacobian(sensor.model, roles),
                1e-7);
   }
 }
 
-/// Constant velocity that throws for speeds above that of light.
+/// Constant velocity. Throws for speeds above the speed of light.
 struct Refusing : ConstantVelocity<1, false> {
   using ConstantVelocity<1, false>::ConstantVelocity;
   template <class T>
@@ -132,7 +132,7 @@ struct Refusing : ConstantVelocity<1, false> {
   }
 };
 
-// The motion model fails, so the error text is that of the motion model.
+// The motion model fails, so the error message is that of the motion model.
 TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
   Problem problem;
   AddMotion(problem, "p", MakeMotion(Refusing(1.0), "refusing"),
@@ -162,8 +162,9 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
             std::string::npos);
 }
 
-// A point oscillates. One sensor is on time; the timestamps of the other are 20 ms late: its
-// measurements are from t - 0.02. The truth is a sine, not a motion model.
+// A point oscillates. One sensor is on time. The measurements of the other sensor are from t -
+// 0.02, so its timestamps are 20 ms late. The true motion is a sine, which no motion model
+// generates.
 TEST(TimeOffset, IsFoundInDataThatAreLate) {
   Problem problem = testing::MovingPoint(2.0);
   AddSensor(problem, "good", LinearSensor(1.0, 0.01), {"p.x"});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sigma points outside the domain of a model.
+// Tests sigma points that lie outside the domain of a model.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   Problem problem = DepthFilter();
-  problem.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m: points at 0.35 - 1.7 m
+  problem.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m; sigma points reach 0.35 - 1.7 m
   UkfOptions options;
   options.alpha = 1.0;
   Ukf ukf(problem, options, StreamsOf(problem));
@@ -28,15 +28,15 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   EXPECT_TRUE(HasEvent(first, EventKind::kGuarded));
   EXPECT_FALSE(ukf.diverged());
   EXPECT_GT(ValueOf(ukf.state(), "target.depth"), 0.0);
-  // The points are now close enough: no event.
+  // The sigma points are now close enough to the estimate, so there is no event.
   for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), EventKind::kGuarded));
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
-  // Three seconds later the uncertainty is metres: the event is reported again.
+  // Three seconds later the uncertainty is several metres, so the event is reported again.
   EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), EventKind::kGuarded));
 }
 
-/// Constant at 1; throws for any other value.
+/// The value 1 is constant. Any other value causes an exception.
 struct Stubborn : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -59,7 +59,7 @@ TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
       << report.events.back().text;
 }
 
-/// z = x + 5 + n: linear, but defined for x > 0 only.
+/// Measures z = x + 5 + n. h is linear but defined only for x > 0.
 struct Near : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -82,9 +82,9 @@ Problem NearZero(double x) {
   return problem;
 }
 
-// The estimate is as little as 1e-3 sigma from the edge of the domain, so the points are 1e-3 sigma
-// from the estimate. For a linear h, the moments equal those of the EKF at any spread. The rounding
-// error at the narrowest spread is eps 5 / (2 c^2) = 6e-10.
+// The estimate is down to 1e-3 sigma from the edge of the domain. The sigma points are then 1e-3
+// sigma from the estimate. For a linear h the moments equal those of the EKF at any spread. At the
+// narrowest spread the rounding error is eps 5 / (2 c^2) = 6e-10.
 TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   for (const double x : {0.05, 9e-4, 1e-4, 2e-5}) {
     const Problem problem = NearZero(x);
@@ -103,7 +103,7 @@ TEST(Ukf, NarrowPointsKeepTheMomentsOfALinearSensor) {
   }
 }
 
-// Points so close to the estimate would yield only rounding errors.
+// So close to the estimate, sigma points would give only rounding errors.
 TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
   for (const double x : {1e-7, 3e-10}) {
     const Problem problem = NearZero(x);
@@ -119,7 +119,8 @@ TEST(Ukf, PointsThatCannotBeDrawnNearEnoughLeaveTheMeasurementOut) {
         "spread; their spread is divided by 64");
     EXPECT_FALSE(ukf.diverged());
     EXPECT_EQ(ValueOf(ukf.state(), "p.x"), x);
-    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());  // reported once
+    // The event is reported once.
+    EXPECT_TRUE(ukf.Process(FrameAt(0.0, {{0, 5.02}})).events.empty());
   }
 }
 

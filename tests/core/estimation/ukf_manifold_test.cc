@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Unscented filter on blocks of every geometry, and on a state without a covariance.
+// Tests the unscented filter on blocks of every geometry, and on a state without a covariance.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 constexpr double kPriorSigma = 0.02, kWalkSigma = 0.01, kSensorSigma = 0.02;
 
-/// x' = x (+) w, w ~ N(0, kWalkSigma^2 I)
+/// Motion model x' = x (+) w, w ~ N(0, kWalkSigma^2 I).
 template <class G>
 struct Wandering : Motion<G::kTangent, G> {
   static constexpr std::array kBlocks{Quantity{"x"}};
@@ -32,7 +32,7 @@ struct Wandering : Motion<G::kTangent, G> {
   }
 };
 
-/// Returns a problem with `n` tangent elements in blocks of the geometry G, each with its own
+/// Returns a problem with `n` tangent elements in blocks of the geometry G. Each block has its own
 /// sensor.
 template <class G>
 Problem Wanderers(int n) {
@@ -73,10 +73,10 @@ std::vector<double> Disturbed(const Geometry& geometry, const std::vector<double
 using GeometryAlphaSize = std::tuple<std::uint32_t, double, int>;
 class UkfOf : public ::testing::TestWithParam<GeometryAlphaSize> {};
 
-// The covariances are isotropic: every step adds Q, and the measured block has 1/P+ = 1/P + 1/R.
-// The points are c sigma from the estimate, c^2 <= 60, which changes moments by a fraction c^2
-// sigma^2 / 12 <= 2e-3. The estimates change by that fraction of an innovation of 0.04 at each
-// correction.
+// The covariances are isotropic. Every step adds Q, and for the measured block 1/P+ = 1/P + 1/R.
+// The sigma points are c sigma from the estimate, c^2 <= 60. This changes moments by a fraction c^2
+// sigma^2 / 12 <= 2e-3. Each correction changes the estimates by this fraction of an innovation of
+// 0.04.
 TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
   const auto [number, alpha, n] = GetParam();
   const Problem problem = WanderersOf(number, n);
@@ -125,7 +125,7 @@ std::string NameOf(const ::testing::TestParamInfo<GeometryAlphaSize>& one) {
          std::to_string(std::lround(-std::log10(std::get<1>(one.param)))) + "_n" +
          std::to_string(std::get<2>(one.param));
 }
-/// Returns the numbers of all geometries of a state.
+/// Returns the numbers of all geometries that a state can have.
 std::vector<std::uint32_t> GeometriesOfStates() {
   std::vector<std::uint32_t> numbers;
   for (const GeometryRow* row : detail::kGeometryRows) {
@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Many, UkfOf,
                                             ::testing::Values(30)),
                          NameOf);
 
-/// v' = v - dt k |v| v + w. The derivative dv'/dv is NaN at v = 0, for which v' is 0.
+/// Motion model v' = v - dt k |v| v + w. At v = 0, v' is 0, but the derivative dv'/dv is NaN.
 struct Dragged : Motion<2, Vec<2>> {
   static constexpr std::array kBlocks{Quantity{"v", "m/s", "", "x,y"}};
   template <class T>
@@ -156,8 +156,8 @@ struct Dragged : Motion<2, Vec<2>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 0.1; }
 };
 
-// N = 4, so c = 2: the points of v are at 2 sigma, and the step multiplies them by
-// 1 - 0.3 dt 2 sigma.
+// N = 4, so c = 2: the sigma points of v are at 2 sigma. The step multiplies them by 1 - 0.3 dt 2
+// sigma.
 TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   Problem problem;
   const SharedMotion model = MakeMotion(Dragged(), "dragged");
@@ -181,7 +181,7 @@ TEST(Ukf, NeedsNoDerivativeOfTheMotion) {
   EXPECT_NEAR(ukf.state().value(v)[0], 0.0, 1e-15);
 }
 
-/// Either v' or Qw is NaN for steps beyond 1 s.
+/// In steps of more than 1 s, Qw is NaN if `in_noise`; otherwise v' is NaN.
 struct Breaking : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"v"}};
   bool in_noise = false;
@@ -218,7 +218,7 @@ template <class G>
 void ExpectReportsOfTheEkf() {
   const Problem problem = WithStatus(Wanderers<G>(6), "", BlockStatus::kConstant);
   Ekf ekf(problem, {}, StreamsOf(problem));
-  Ukf ukf(problem, {}, StreamsOf(problem));  // kappa = 0
+  Ukf ukf(problem, {}, StreamsOf(problem));  // kappa is 0
   Random random(42);
   for (int k = 0; k < 3; ++k) {
     Frame frame = FrameAt(0.1 * k, {});

@@ -15,8 +15,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-// P is singular at first (v is known exactly), Q has rank 1, and the noise of the points is not
-// small.
+// At first P is singular, because v is known exactly. Q has rank 1, and the noise of the
+// measurements is not small.
 TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
   Problem problem = MovingPoint(0.7);
   problem.priors[1].covariance.setZero();
@@ -55,7 +55,7 @@ TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
   }
 }
 
-/// z = x^2 + n
+/// Measures z = x^2 + n.
 struct Square : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -70,8 +70,8 @@ struct Square : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
-// x ~ N(m, s^2): E[x^2] = m^2 + s^2, Var[x^2] = 4 m^2 s^2 + 2 s^4, Cov[x, x^2] = 2 m s^2; exact for
-// c^2 = 3 and beta = 0.
+// If x ~ N(m, s^2), then E[x^2] = m^2 + s^2, Var[x^2] = 4 m^2 s^2 + 2 s^4 and Cov[x, x^2] = 2 m
+// s^2. The filter is exact for c^2 = 3 and beta = 0.
 TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   Problem problem;
   AddMotion(problem, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
@@ -91,7 +91,7 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.x", "p.x"), v - k * k * s, 1e-13);
 }
 
-/// An orientation with a random rotation w ~ N(0, sigma^2 I) per step: q' = q Exp(w).
+/// An orientation that rotates by a random w ~ N(0, sigma^2 I) in each step: q' = q Exp(w).
 struct TurningOrientation : Motion<3, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"}};
   double sigma;
@@ -120,7 +120,7 @@ struct Compass : Sensor<UnitQuaternion, UnitQuaternion> {
   }
 };
 
-/// Returns a problem whose orientation starts at (1, 0, 0, 0) +- 0.05 rad.
+/// Returns a problem with an orientation that starts at (1, 0, 0, 0) +- 0.05 rad.
 Problem Orientation() {
   Problem problem;
   MotionBinding binding{"body", MakeMotion(TurningOrientation(0.01), "turning"), {}};
@@ -136,8 +136,9 @@ Problem Orientation() {
   return problem;
 }
 
-// Isotropic covariances and an identity measurement: 1/P+ = 1/(P + Q) + 1/R at every orientation.
-// The estimate is on the great circle to the measurement, to second order in sigma.
+// The covariances are isotropic, and the orientation is measured directly. So 1/P+ = 1/(P + Q) +
+// 1/R at every orientation. To second order in sigma, the estimate is on the great circle to the
+// measurement.
 TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   const Problem problem = Orientation();
   UkfOptions options;
@@ -165,7 +166,8 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
     ASSERT_NEAR(Eigen::Map<const Eigen::Vector4d>(q).norm(), 1.0, 1e-12);
     double between[3];
     UnitQuaternion::Minus(q, ekf.state().value(0), between);
-    // Points at sqrt(6) sigma change the moments by a fraction of sigma^2 / 12, here at most 1e-3.
+    // Sigma points at sqrt(6) sigma change the moments by a fraction sigma^2 / 12, which is at most
+    // 1e-3 here.
     ASSERT_LT(Eigen::Map<const Eigen::Vector3d>(between).norm(), 1e-3) << k;
     ASSERT_LT((ukf.state().covariance().Dense() - p * Eigen::Matrix3d::Identity()).norm(), 0.01 * p)
         << k;
@@ -173,8 +175,8 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   EXPECT_GT(truth.angularDistance(Eigen::Quaterniond::Identity()), 1.0);
 }
 
-// The disparity sensor requires sigma points closer to the estimate in the joint update. The gate
-// and the report of the other sensor use its points with the full spread.
+// In the joint update the disparity sensor needs sigma points closer to the estimate. The gate and
+// the report of the other sensor use its sigma points with the full spread.
 TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   Problem problem = DepthFilter();
   problem.priors[0].covariance(0) = 1.0;
@@ -196,7 +198,7 @@ TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
   EXPECT_EQ(square.s, single.measurements()[0].s);
 }
 
-/// z = x_1 + n
+/// Measures z = x_1 + n.
 struct First : Sensor<Vec<1>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x", "", "", "x,y"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -219,7 +221,8 @@ TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   Prior prior;
   prior.block = 0;
   prior.mean = {1.0, 2.0};
-  prior.covariance = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished();  // eigenvalue -0.1
+  // One eigenvalue is -0.1.
+  prior.covariance = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished();
   problem.priors.push_back(prior);
   problem.motions.push_back(binding);
   AddSensor(problem, "first", MakeSensor(First{}, "first"), {"p.x"});
@@ -245,12 +248,13 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
   EXPECT_EQ(ValueOf(ukf.state(), "template.inverse_distance"), 3.3);
   EXPECT_NEAR(CovarianceOf(ukf.state(), "template.inverse_distance", "template.inverse_distance"),
               0.25, 1e-15);
-  // h' = 3.3 Z is linear: S is that of the Kalman filter, R = (2/300 h^3)^2 at the prediction.
+  // h' = 3.3 Z is linear, so S equals that of the Kalman filter, with R = (2/300 h^3)^2 at the
+  // prediction.
   const double h = 0.35 * 3.3, sigma = 2.0 / 300.0 * h * h * h;
   EXPECT_NEAR(report.measurements()[1].s[0], 3.3 * 3.3 * 0.01 + sigma * sigma, 1e-14);
 }
 
-// x' = x + v dt, but x is constant.
+// The model computes x' = x + v dt, but block x is constant.
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);
@@ -266,8 +270,8 @@ TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   EXPECT_NEAR(CovarianceOf(ukf.state(), "p.v", "p.v"), 4.0 + 0.49 * 0.25, 1e-12);
 }
 
-// The system is linear, so all three filters agree. Block v is constant: it is neither moved nor
-// corrected.
+// The system is linear, so all three filters agree. Block v is constant: no filter moves or
+// corrects it.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   Problem problem;
   const SharedMotion model = testing::ConstantVelocityMotion(0.7);

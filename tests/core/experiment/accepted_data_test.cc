@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// An estimator that uses only the measurements that an earlier filter accepted.
+// Tests an estimator that uses only the measurements that an earlier filter accepted.
 #include "support/driven.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
@@ -10,11 +10,11 @@ namespace {
 
 constexpr int kFrames = 80;
 
-/// SwingingTarget whose scale measurement is wrong by 0.5 on every eleventh frame, starting with
-/// frame 5. If `outliers` is false, those measurements are missing.
+/// A SwingingTarget whose scale measurement has an error of 0.5 in frames 5, 16, 27 and so on. If
+/// `outliers` is false, these measurements are missing.
 class WithOutliers : public SwingingTarget {
  public:
-  /// `late`: swaps frames 3 i and 3 i + 1, so that every third frame is out of sequence.
+  /// If `late`, frames 3 i and 3 i + 1 are swapped, so every third frame is out of sequence.
   WithOutliers(bool outliers, bool late) : SwingingTarget(0) {
     SwingingTarget target(kFrames);
     SourceFrame frame;
@@ -59,7 +59,7 @@ Experiment MakeFiltered(bool late) {
   return experiment;
 }
 
-/// Returns the state of an ekf without a gate, run on the data without outliers.
+/// Returns the state of an ekf without a gate after the data without outliers.
 std::vector<double> Clean() {
   Experiment clean;
   clean.source = std::make_unique<WithOutliers>(false, false);
@@ -90,7 +90,7 @@ TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   EXPECT_EQ(experiment.estimators[1].estimator->state().values(), Clean());
 }
 
-/// Source of the given frames and streams.
+/// A source with the given frames and streams.
 class GivenFrames : public Source {
  public:
   GivenFrames(std::vector<StreamInfo> streams, std::vector<Frame> frames)
@@ -109,8 +109,8 @@ class GivenFrames : public Source {
   std::size_t next_ = 0;
 };
 
-/// Builds a chain of three ekf: the first has a gate, each of the others uses the measurements that
-/// the ekf before it accepted.
+/// Builds a chain of three ekf. The first has a gate. Each of the others uses the measurements that
+/// the previous ekf accepted.
 Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
                      std::vector<Frame> frames) {
   Experiment experiment;
@@ -127,8 +127,8 @@ Experiment MakeChain(const Problem& problem, std::vector<StreamInfo> streams,
   return experiment;
 }
 
-// No sensor uses the odometry stream: all its values are passed on, also in a frame whose fix is
-// gated.
+// No sensor uses the odometry stream, so all its values are passed on. This also holds for a frame
+// whose fix is gated.
 TEST(AcceptedBy, PassesOnTheControlInputs) {
   Problem problem;
   AddMotion(problem, "car", MakeMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
@@ -150,8 +150,8 @@ TEST(AcceptedBy, PassesOnTheControlInputs) {
   }
 }
 
-/// Builds a chain for two landmarks in front of a camera at rest. The pixel of the first landmark
-/// is wrong by 0.5 in the second frame.
+/// Builds a chain for two landmarks in front of a camera at rest. In the second frame the pixel of
+/// the first landmark has an error of 0.5.
 Experiment MakeChainOfMaps() {
   const Problem problem = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
   return MakeChain(problem, {{"tracks", 2}},
@@ -160,7 +160,8 @@ Experiment MakeChainOfMaps() {
                     FrameOf(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
 }
 
-// The stream has several measurements per frame: some initialise a landmark, and one is gated.
+// The stream has several measurements in each frame. Some of them initialise a landmark, and one is
+// gated.
 TEST(AcceptedBy, MayFollowAFollower) {
   for (const OutOfSequence order : {OutOfSequence::kReject, OutOfSequence::kRollback}) {
     Experiment experiment = MakeChainOfMaps();
@@ -194,7 +195,7 @@ struct Once : Ekf {
   bool gone_ = false;
 };
 
-// The frame at which the filter ended still counts: the filter accepted its measurements.
+// The frame at which the filter ends is still used, because the filter accepted its measurements.
 TEST(AcceptedBy, AFilterThatEndedAcceptsNothingMore) {
   Experiment experiment = MakeFiltered(false);
   EstimatorSpec& filter = experiment.estimators[0];

@@ -18,8 +18,8 @@ namespace {
 
 using testing::FrameAt;
 
-/// Returns frame k of a target at depth 0.3 + 0.1 sin(t). Its measurements have errors of a pixel
-/// and more; every third frame has no disparity.
+/// Returns frame k of a target at depth 0.3 + 0.1 sin(t). The measurements have errors of at least
+/// one pixel. Every third frame has no disparity.
 SourceFrame SwingingFrame(int k) {
   const double t_s = 0.1 * k, depth = 0.3 + 0.1 * std::sin(t_s), wobble = std::sin(37.0 * k);
   SourceFrame frame{FrameAt(t_s, {{1, depth / 0.3 + 0.01 * wobble}}),
@@ -31,7 +31,8 @@ SourceFrame SwingingFrame(int k) {
 
 const std::vector<StreamInfo> kTruths = {{"depth"}, {"depth_rate"}, {"inverse_distance"}};
 
-// Compares the bound with the information form, whose derivatives are written out at truth.
+// Compares the bound with the information form. Its derivatives at the truth are written out by
+// hand.
 TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
   const Problem problem = testing::DepthFilter();
   CramerRaoBound bound(problem, testing::StreamsOf(problem), kTruths);
@@ -62,7 +63,7 @@ TEST(CramerRaoBound, IsTheInverseOfTheInformationAtTruth) {
   }
 }
 
-/// x' = x + (x - x^3 + w) dt, w ~ N(0, 1).
+/// Motion model x' = x + (x - x^3 + w) dt, w ~ N(0, 1).
 struct DoubleWell : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -76,7 +77,7 @@ TEST(CramerRaoBound, TakesTheMotionAtTruth) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(DoubleWell(), "double_well"), {{"x", 5.0, 0.5}});
   testing::AddSensor(problem, "z", testing::LinearSensor(1.0, 0.4), {"p.x"});
-  problem.initial_time_s = -0.1;  // one step before the first frame, from nearly the same state
+  problem.initial_time_s = -0.1;  // one step before the first frame; the state is nearly the same
   CramerRaoBound bound(problem, testing::StreamsOf(problem), {{"x"}});
   const double dt_s = 0.1, q = dt_s * dt_s;
   double p = 0.25, before = 0.0;
@@ -105,8 +106,8 @@ TEST(CramerRaoBound, OfALinearProblemIsTheCovarianceOfTheKalmanFilter) {
   }
 }
 
-// A robust loss, a Schmidt (consider) gain and a Jacobian at the implied state make a filter worse,
-// but do not change the bound.
+// A robust loss, a Schmidt (consider) gain and a Jacobian at the implied state make a filter worse.
+// They do not change the bound.
 TEST(CramerRaoBound, IsThatOfTheBestFilter) {
   Problem worse = testing::DepthFilter();
   worse.sensors[0].loss = {LossKind::kCauchy, 0.1};
@@ -167,8 +168,8 @@ Eigen::Vector2d Pixel(const Eigen::Vector3d& r, const Eigen::Vector3d& p) {
   return {h.x() / h.z(), h.y() / h.z()};
 }
 
-/// Whether frame k sees landmark id: the first time in frame id, then in all frames but every
-/// fourth.
+/// Returns true if frame k sees landmark `id`. The landmark is first seen in frame `id`, and then
+/// in all frames but every fourth.
 bool Sees(int k, int id) { return k >= id && (k == id || (k + id) % 4 != 0); }
 
 SourceFrame MappingFrame(int k, double noise) {
@@ -186,8 +187,8 @@ SourceFrame MappingFrame(int k, double noise) {
   return frame;
 }
 
-/// Fisher information of the camera positions of frames 0 to `last` and of five landmarks, by
-/// central differences.
+/// Computes the Fisher information by central differences. The unknowns are the camera positions in
+/// frames 0 to `last` and five landmarks.
 class JointInformation {
  public:
   explicit JointInformation(int last) : x_(3 * (last + 6)) {
@@ -209,8 +210,8 @@ class JointInformation {
     }
     information_ += j.transpose() * j;
   }
-  /// Returns the covariance of the position in frame `last`, given the landmarks seen up to that
-  /// frame.
+  /// Returns the covariance of the position in frame `last`. Uses only the landmarks seen up to
+  /// that frame.
   Eigen::Matrix3d Covariance(int last) const {
     const Eigen::Index n = 3 * (last + 1 + std::min(last + 1, 5));
     return information_.topLeftCorner(n, n).inverse().block<3, 3>(3 * last, 3 * last);
@@ -233,7 +234,7 @@ Eigen::Matrix3d CovarianceByInformation(int last) {
   }
   for (int id = 0; id < 5 && id <= last; ++id) {
     const int p = last + 1 + id;
-    joint.Add([&](const Vector& x) {  // the prior of the inverse distance
+    joint.Add([&](const Vector& x) {  // the residual of the prior of the inverse distance
       return Vector(Vector::Constant(1, 1.0 / (at(x, p) - at(x, id)).norm() / 0.25));
     });
     for (int k = id; k <= last; ++k) {
@@ -245,7 +246,7 @@ Eigen::Matrix3d CovarianceByInformation(int last) {
 }
 
 // Compares the bound of a trajectory and a map with the joint information. The mean of the landmark
-// prior and the noise of the data must not influence the bound.
+// prior and the noise of the data must have no influence on the bound.
 template <class Model>
 void ExpectJointBound(const Model& model, double max_linearity_index) {
   LandmarkOptions options = testing::WithPrior(0.8, 0.25);
@@ -268,7 +269,7 @@ TEST(CramerRaoBound, OfAMapIsThatOfPathAndPointsTogether) {
   }
 }
 
-/// A camera that turns at 0.3 rad/s about its y axis while it walks at random.
+/// A camera that rotates at 0.3 rad/s about its y axis. Its position performs a random walk.
 struct TurningWalk : Motion<6, Vec<3>, UnitQuaternion> {
   static constexpr std::array kBlocks{testing::kPosition, Quantity{"orientation"}};
   template <class T>
@@ -283,7 +284,7 @@ struct TurningWalk : Motion<6, Vec<3>, UnitQuaternion> {
   }
 };
 
-/// Pixel of a landmark seen by a TurningWalk camera.
+/// Measures the pixel of a landmark in a TurningWalk camera.
 struct TurnedPixels : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>, UnitVector, Vec<1>>,
                       testing::Pinhole {
   static constexpr std::array kRoles{
@@ -344,8 +345,8 @@ Problem TurningSystem() {
   return problem;
 }
 
-/// Compares the bound with an ekf whose data are exact and which starts at truth, so that its
-/// Jacobians are evaluated at truth. The data of the bound have noise.
+/// Compares the bound with an ekf. The ekf starts at the truth and has exact data, so its Jacobians
+/// are evaluated at the truth. The data of the bound have noise.
 void ExpectThatOfExactData(const Problem& problem, const std::vector<StreamInfo>& truths,
                            const CramerRaoBound::TrueLandmark& place,
                            const std::function<SourceFrame(int k, double noise)>& frame) {
@@ -361,7 +362,7 @@ void ExpectThatOfExactData(const Problem& problem, const std::vector<StreamInfo>
   }
 }
 
-// The landmarks are at 2 m, as the prior states, and all are seen from the start.
+// The landmarks are at 2 m, which is the prior mean. All of them are seen from the start.
 TEST(CramerRaoBound, OfATurningCamera) {
   const auto place = [](std::int64_t id) -> std::optional<Point> {
     const Eigen::Vector3d ray(0.2 * double(id) - 0.3, 0.2 * std::sin(3.0 * double(id)), 1.0);
@@ -386,8 +387,8 @@ TEST(CramerRaoBound, OfATurningCamera) {
   ExpectThatOfExactData(TurningSystem(), {{"position", 3}, {"orientation", 4}}, place, frame);
 }
 
-// The landmarks are measured in all three coordinates, so they need no prior. Two of them are known
-// beforehand, one of the two exactly.
+// All three coordinates of a landmark are measured, so no prior is needed. Two landmarks are known
+// beforehand, one of them exactly.
 TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   LandmarkOptions options;
   options.known = {{0, *PlaceOf(0), 0.02}, {1, *PlaceOf(1), 0.0}};
@@ -395,7 +396,7 @@ TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   const auto frame = [](int k, double noise) {
     SourceFrame made{{TimestampFromSeconds(0.1 * k), {}}, {{0.0, 0.0, 0.0}}};
     for (int id = k < 3 ? 2 : 0; id < 5;
-         ++id) {  // landmarks 0 and 1, which are known, are seen later
+         ++id) {  // Landmarks 0 and 1, which are known, are first seen in frame 3.
       const Point p = *PlaceOf(id);
       made.measurements.push_back({made.timestamp,
                                    0,
@@ -408,7 +409,7 @@ TEST(CramerRaoBound, OfLandmarksMeasuredWholeOrKnown) {
   ExpectThatOfExactData(problem, {{"position", 3}}, PlaceOf, frame);
 }
 
-/// Offset to a landmark on the ground, which has two coordinates.
+/// Measures the offset to a landmark on the ground, which has two coordinates.
 struct OnGround : Sensor<Vec<2>, Vec<3>, Vec<2>> {
   static constexpr std::array kRoles{testing::kPosition,
                                      Quantity{"landmark", "m", "", "x,y", testing::kOfLandmark}};
@@ -430,7 +431,8 @@ struct OnGround : Sensor<Vec<2>, Vec<3>, Vec<2>> {
   }
 };
 
-/// Pixel of a point that is initialised on its ray, at the distance of the prior.
+/// Measures the pixel of a point. The point is initialised on its ray, at the distance of the
+/// prior.
 struct XyzByPrior : testing::XyzPixels {
   static constexpr int kInitialises = 1, kPrior = 1;
   XyzByPrior() : XyzPixels(0.01) {}

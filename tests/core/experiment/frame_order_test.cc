@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 36, 37: late frames and equal timestamps, frame by frame.
+// Faults 36 and 37 of tests/faults/README.md: late frames and equal timestamps, frame by frame.
 #include <algorithm>
 #include <stdexcept>
 
@@ -18,13 +18,13 @@ INSTANTIATE_TEST_SUITE_P(Policies, FrameOrder,
                            return of.param == OutOfSequence::kBuffer ? "buffer" : "rollback";
                          });
 
-/// Returns the frame of FrameAt, without truth.
+/// Returns FrameAt(t_s, values) as a frame without truth.
 SourceFrame GivenAt(double t_s, const std::vector<std::pair<int, double>>& values) {
   return {FrameAt(t_s, values)};
 }
 
-/// Source of the given frames; frame k is in line k + 2 of rows.csv. With `then_fails`, it throws
-/// after the last frame.
+/// A source with the given frames. Frame k is in line k + 2 of rows.csv. If `then_fails`, the
+/// source throws after the last frame.
 class Given : public SwingingTarget {
  public:
   explicit Given(std::vector<SourceFrame> frames, bool then_fails = false)
@@ -55,7 +55,8 @@ Experiment MakeGiven(std::vector<SourceFrame> frames, OutOfSequence order,
 }
 
 TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
-  // A frame 0.1 s older than the newest is in the window; one that is a nanosecond older is not.
+  // A frame that is 0.1 s older than the newest is within the window. A frame that is a nanosecond
+  // older is not.
   SourceFrame beyond = GivenAt(0.2, {{0, 80.0}, {1, 1.0}});
   beyond.timestamp -= 1;
   Experiment experiment = MakeGiven(
@@ -119,7 +120,7 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
   }
 }
 
-// A source may return the measurements of one frame in an order other than that of the sensors.
+// In a frame of the source, the measurements may have another order than the sensors.
 TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
   for (const bool swapped : {false, true}) {
     const TemporaryFolder folder;
@@ -137,7 +138,7 @@ TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
   }
 }
 
-// Each measurement keeps the line number of its own frame when frames are merged.
+// When frames are merged, each measurement keeps the line number of its own frame.
 TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   Experiment experiment = MakeGiven(
       {GivenAt(0.0, {{0, 80.0}, {1, 1.0}}), GivenAt(0.0, {{2, 5.0}}), GivenAt(0.0, {{2, 5.0}})},
@@ -198,7 +199,8 @@ TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
 }
 
 TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
-  // Both sensors reject a negative depth as out of domain, from the second frame on.
+  // Both sensors are undefined for a negative depth, so from the second frame on they reject it as
+  // out of domain.
   const std::vector<SourceFrame> frames = {GivenAt(0.0, {}), GivenAt(0.05, {{0, 80.0}}),
                                            GivenAt(0.1, {{0, 80.0}}), GivenAt(0.15, {{0, 80.0}})};
   std::vector<Timestamp> ends;
@@ -243,7 +245,7 @@ struct Mortal : Ekf {
   bool failed_ = false;
 };
 
-// The depth is negative, so the estimator diverges at the first frame; it fails at the third.
+// The depth is negative, so the estimator diverges at the first frame. It fails at the third frame.
 TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
   std::vector<SourceFrame> frames;
   for (int k = 0; k < 8; ++k) frames.push_back(GivenAt(0.05 * k, {{0, 80.0 - k}, {1, 1.0}}));
@@ -292,7 +294,7 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
 }
 
-/// An ekf that records the timestamps of its frames in a list shared with its copies.
+/// An ekf that records the timestamps of its frames. All copies share the same list.
 struct Watching : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
@@ -331,7 +333,7 @@ struct Throwing : Ekf {
 };
 
 TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
-  // All frames are within the window: none is released before the third is processed.
+  // All frames are within the window, so no frame is released before the third frame is processed.
   Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}}),
                                      GivenAt(0.04, {{1, 1.0}}), GivenAt(0.06, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
@@ -346,12 +348,13 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   EXPECT_EQ(result.frames, 2);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
   for (const EstimatorSpec& one :
-       experiment.estimators) {  // both: the first estimator had already processed the third frame
+       // Checks both estimators: the first had already processed the third frame.
+       experiment.estimators) {
     EXPECT_EQ(one.estimator->timestamp(), TimestampFromSeconds(0.02));
   }
 }
 
-/// An estimator without Clone, which Rollback needs.
+/// An estimator that does not implement Clone, which Rollback needs.
 class Forward : public Estimator {
  public:
   explicit Forward(const Problem& problem) : state_(problem.InitialState()) {}

@@ -24,7 +24,7 @@ TEST(ImpliedState, OfASensorThatInitialisesAlone) {
   ASSERT_TRUE(depth);
   EXPECT_FALSE(depth->uses_true_roles());
   EXPECT_EQ(problem.layout[depth->block()].name, "target.depth");
-  const double d = 65.0, none = -1.0;  // px; f B = 26 px m
+  const double d = 65.0, none = -1.0;  // in px; f B = 26 px m
   EXPECT_DOUBLE_EQ(depth->From({}, &d).value(), 0.4);
   EXPECT_FALSE(depth->From({}, &none));
 }
@@ -35,7 +35,7 @@ TEST(ImpliedState, OfAnotherWithItsRestAtTruth) {
   const auto depth = ImpliedState::Of(problem, scale, {{"depth", 1}, {"inverse_distance", 1}});
   ASSERT_TRUE(depth);
   EXPECT_TRUE(depth->uses_true_roles());
-  const double z = 1.25;  // lambda Z
+  const double z = 1.25;  // z = lambda Z
   EXPECT_NEAR(depth->From({{0.3}, {2.5}}, &z).value(), 0.5, 1e-12);
   EXPECT_FALSE(depth->From({{0.3}, {}}, &z)) << "lambda is not known at this time";
   EXPECT_FALSE(ImpliedState::Of(problem, scale, {{"depth", 1}})) << "nor at any";

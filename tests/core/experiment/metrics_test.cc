@@ -42,7 +42,7 @@ class FakeSource : public Source {
   std::vector<StreamInfo> streams_, truths_;
 };
 
-/// Metrics of one estimator, whose states the test sets.
+/// Metrics of one estimator. The test sets the states of the estimator.
 class MetricsOf {
  public:
   MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0)
@@ -58,7 +58,7 @@ class MetricsOf {
 
   State& state() { return state_; }
   std::vector<bool>& in_segment() { return in_segment_; }
-  /// Adds the current state as the estimate at the next timestamp, 0.1 s later.
+  /// Adds the current state as the estimate at the next timestamp, which is 0.1 s later.
   void Add(const std::vector<std::vector<double>>& truth, const UpdateReport& report = {}) {
     SourceFrame frame;
     frame.timestamp = timestamp_;
@@ -87,7 +87,7 @@ StateLayout Scalars(const std::vector<std::string>& names) {
   return layout;
 }
 
-/// Returns the metrics of a state of one scalar `a.x` with variance 4 m^2.
+/// Returns the metrics of a state with one scalar `a.x`, whose variance is 4 m^2.
 MetricsOf OneScalar(int segments = 0) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1}}, segments);
   const double zero = 0.0;
@@ -97,9 +97,9 @@ MetricsOf OneScalar(int segments = 0) {
 
 TEST(Metrics, TakesErrorsByHand) {
   MetricsOf one = OneScalar();
-  one.Add({{3.0}});   // error -3 m, sigma 2 m: inside 1.96 sigma
-  one.Add({{-4.0}});  // error 4 m: outside 3.92 m
-  one.Add({{}});      // truth unknown
+  one.Add({{3.0}});   // error -3 m, sigma 2 m: within 1.96 sigma
+  one.Add({{-4.0}});  // error 4 m: more than 1.96 sigma, 3.92 m
+  one.Add({{}});      // the truth is unknown
   const auto metrics = one.Finish();
   EXPECT_DOUBLE_EQ(metrics.at("rmse:a.x"), std::sqrt(12.5));
   EXPECT_DOUBLE_EQ(metrics.at("final_error:a.x"), 4.0);
@@ -110,7 +110,7 @@ TEST(Metrics, TakesErrorsByHand) {
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
 
-// The elements of an orientation and of a direction have no unit, but their errors are in rad.
+// The elements of an orientation and of a direction have no unit. Their errors are in rad.
 TEST(Metrics, ErrorsOfRotationsAreInRad) {
   StateLayout layout;
   layout.Declare("a.q", "a", SpaceOf("q", "", Geometry::UnitQuaternion()));
@@ -142,7 +142,7 @@ TEST(Metrics, TakesErrorsOnTheManifold) {
   layout.Declare("a.attitude", "a", SpaceOf("attitude", "rad", Geometry::UnitQuaternion()));
   MetricsOf one(layout, {{"heading", 1}, {"attitude", 4}});
   const double heading = -kPi + 0.02;
-  // A rotation by 0.2 rad about x, as the negative quaternion.
+  // The quaternion is negative and describes a rotation by 0.2 rad about x.
   const double attitude[4] = {-std::cos(0.1), -std::sin(0.1), 0.0, 0.0};
   one.state().Add(0, &heading, Eigen::MatrixXd::Identity(1, 1));
   one.state().Add(1, attitude, Eigen::MatrixXd::Identity(3, 3));
@@ -154,8 +154,8 @@ TEST(Metrics, TakesErrorsOnTheManifold) {
 }
 
 TEST(Metrics, TakesTheErrorWhereTheCovarianceIs) {
-  // The basis of the tangent space differs between the points: e must use the basis at the
-  // estimate.
+  // The basis of the tangent space differs from point to point. The error e must use the basis at
+  // the estimate.
   StateLayout layout;
   layout.Declare("a.bearing", "a", SpaceOf("bearing", "", Geometry::UnitVector()));
   MetricsOf one(layout, {{"bearing", 3}});
@@ -167,7 +167,7 @@ TEST(Metrics, TakesTheErrorWhereTheCovarianceIs) {
   EXPECT_NEAR(one.Finish().at("nees.mean:a"), 0.5, 1e-9);
 }
 
-/// Returns the blocks that have a metric if every truth is 1 and every state is 0.
+/// Sets every truth to 1 and every state to 0. Returns the blocks that have a metric.
 std::vector<std::string> Matched(const std::vector<std::string>& blocks,
                                  const std::vector<StreamInfo>& truths) {
   MetricsOf one(Scalars(blocks), truths);
@@ -188,9 +188,10 @@ std::vector<std::string> Matched(const std::vector<std::string>& blocks,
 TEST(Metrics, MatchesTruthsByName) {
   using Names = std::vector<std::string>;
   EXPECT_EQ(Matched({"a.x", "b.y"}, {{"x", 1}, {"b.y", 1}}), (Names{"a.x", "b.y"}));
-  EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}}), Names{});  // ambiguous: matches both blocks
+  // Ambiguous: x may belong to both blocks.
+  EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}}), Names{});
   EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}, {"b.x", 1}}), Names{"b.x"});
-  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});  // a different size
+  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});  // the truth has another size than the block
   EXPECT_EQ(Matched({"a.x"}, {{"a", 1}, {"ax", 1}}), Names{});
 }
 
@@ -217,7 +218,8 @@ TEST(Metrics, LeavesOutBlocksWithoutValueOrCovariance) {
 }
 
 TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
-  // The elements are correlated and differ widely in size: variances 4 and 1e-6, correlation 0.6.
+  // The elements are correlated and differ widely in size. Their variances are 4 and 1e-6, and
+  // their correlation is 0.6.
   Eigen::Matrix2d p;
   p << 4.0, 0.6 * 2.0 * 1e-3, 0.6 * 2.0 * 1e-3, 1e-6;
   const Eigen::Matrix2d root = p.llt().matrixL();
@@ -233,8 +235,8 @@ TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
     one.Add({{-error[0]}, {-error[1]}});
   }
   const auto metrics = one.Finish();
-  // chi2(2) / 2 has variance 1; a share s has variance s (1 - s). The tolerance is five standard
-  // deviations.
+  // chi2(2) / 2 has variance 1, and a share s has variance s (1 - s). The tolerance is five
+  // standard deviations.
   EXPECT_NEAR(metrics.at("nees.mean:a"), 1.0, 5.0 / std::sqrt(n));
   EXPECT_NEAR(metrics.at("nees.within95:a"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
   EXPECT_NEAR(metrics.at("coverage95:a.x"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
@@ -245,7 +247,7 @@ TEST(Metrics, BoundsOfTheNeesAreThoseOfIndependentErrors) {
   Random random(1);
   for (int i = 0; i < 2000; ++i) one.Add({{2.0 * random.Normal()}});
   const auto metrics = one.Finish();
-  // White errors: tau is 1, except for sampling error.
+  // The errors are white, so tau is 1 apart from a sampling error.
   const Interval bounds = ConsistencyBounds(1.0, 2000.0);
   EXPECT_EQ(metrics.at("nees.dof:a"), 1.0);
   EXPECT_NEAR(metrics.at("nees.low:a"), bounds.low, 0.3 * (1.0 - bounds.low));
@@ -300,12 +302,12 @@ TEST(Metrics, AnEstimateThatIsNotFiniteSpoilsItsRmse) {
 
 TEST(Metrics, LagIsInMilliseconds) {
   MetricsOf one = OneScalar();
-  for (int i = 0; i < 152; ++i) {  // a delay of 2.5 samples of 100 ms
+  for (int i = 0; i < 152; ++i) {  // the delay is 2.5 samples of 100 ms
     one.state().values()[0] = std::sin(0.083 * (i - 2.5));
     one.Add({{std::sin(0.083 * i)}});
   }
   EXPECT_NEAR(one.Finish().at("lag_ms:a.x"), 250.0, 1.0);
-  one.Skip(50'000'000);  // after this gap the sampling is not even
+  one.Skip(50'000'000);  // after this gap the samples are not evenly spaced
   one.Add({{0.0}});
   EXPECT_EQ(one.Finish().count("lag_ms:a.x"), 0u);
 }
@@ -317,7 +319,7 @@ TEST(Metrics, LagOfALongRunIsThatOfItsBeginning) {
     one.state().values()[0] = x(i - 1.5);
     one.Add({{x(i)}});
   }
-  one.Skip(50'000'000);  // neither the gap nor the later samples count
+  one.Skip(50'000'000);  // neither the gap nor the later samples have an effect
   for (int i = 0; i < 1000; ++i) one.Add({{0.0}});
   EXPECT_NEAR(one.Finish().at("lag_ms:a.x"), 150.0, 1.0);
 }
@@ -338,8 +340,8 @@ TEST(Metrics, LagOfAnAngleSeesNoJumps) {
 
 TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   MetricsOf one = OneScalar();
-  for (int i = 0; i < 19; ++i) one.Add({{20.1}});  // sigma 2 m
-  one.Add({{20.0}});                               // 10 sigma exactly: inside
+  for (int i = 0; i < 19; ++i) one.Add({{20.1}});  // sigma is 2 m
+  one.Add({{20.0}});                               // exactly 10 sigma counts as inside
   for (int i = 0; i < 19; ++i) one.Add({{20.1}});
   EXPECT_TRUE(one.metrics().events().empty());
   one.Add({{21.0}});
@@ -353,7 +355,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
             "a.x: the error, 21 m, exceeded 10 sigma for 20 timestamps in a row; sigma is 2 m");
 }
 
-// The truth has sigma 3 m and the filter 2 m: the error has the variance 13 m^2.
+// The truth has a sigma of 3 m and the filter one of 2 m, so the error has the variance 13 m^2.
 TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1, 3.0}});
   const double zero = 0.0;
@@ -368,13 +370,14 @@ TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
   ASSERT_EQ(one.metrics().events().size(), 1u);
 }
 
-// A filter with nearly zero variance is compared with a truth of sigma 0.1 m: errors beyond 10
-// sigma are still detected.
+// A filter with nearly zero variance is compared with a truth of sigma 0.1 m. Errors beyond 10
+// sigma are still found.
 TEST(Metrics, AMeasuredTruthTellsOfAFilterThatIsTooSure) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1, 0.1}});
   const double zero = 0.0;
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 1e-12));
-  for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});  // drifts; 1 m at the 20th timestamp
+  // The error grows to 1 m at the 20th timestamp.
+  for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});
   ASSERT_EQ(one.metrics().events().size(), 1u);
   EXPECT_EQ(one.metrics().events()[0].kind, EventKind::kInconsistent);
 }
@@ -431,7 +434,7 @@ TEST(Metrics, BoundsOfTheNisCountFrames) {
   const Interval all = ConsistencyBounds(2.0, 50.0);
   EXPECT_DOUBLE_EQ(one.Finish().at("nis.low:stereo"), all.low);
   EXPECT_DOUBLE_EQ(one.Finish().at("nis.high:stereo"), all.high);
-  // A gated measurement had a NIS of at least the threshold, 9.
+  // A gated measurement had a NIS of at least the threshold, which is 9.
   report.Clear();
   report.Add() = ReportOf(Outcome::kGated, 9.0, 2);
   one.Add({{0.0}}, report);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 36, 37: frames that are not in the order of their timestamps.
+// Faults 36 and 37 of tests/faults/README.md: frames that are not in the order of their timestamps.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kWindow_s = 0.2;  // six frame intervals of the simulator
 
-/// All types of filter, and a smoother, which waits for all frames.
+/// Config with all types of filter, and with a smoother, which waits for all frames.
 constexpr const char* kFilters = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -42,8 +42,8 @@ evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// Blocks that are initialised from their first measurement, and a gate so narrow that sensors need
-/// rejection recovery. The results therefore depend on more of the filter than its state.
+/// Blocks are initialised from their first measurement. The gate is so narrow that sensors need
+/// rejection recovery. So the results depend on more of the filter than the state.
 constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -63,13 +63,14 @@ estimators:
   inflate: {type: ekf, gate: 0.5, rejection_recovery: {after: 3, action: inflate}}
 )";
 
-/// Frames of a source, each delayed by a random time of at most `most_s`; the first by `most_s`.
-/// With `split`, each measurement arrives in a frame of its own, as does truth.
+/// A source whose frames are delayed by a random time of at most `most_s`. The first frame is
+/// delayed by exactly `most_s`. If `split`, each measurement and the truth arrive in frames of
+/// their own.
 class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
     std::mt19937_64 random(7);
-    std::multimap<Timestamp, SourceFrame> arrivals;  // equal timestamps in the order of insertion
+    std::multimap<Timestamp, SourceFrame> arrivals;  // equal times keep the order of insertion
     const auto add = [&](SourceFrame frame) {
       const auto most = static_cast<std::uint64_t>(TimestampFromSeconds(most_s));
       const auto delay = static_cast<Timestamp>(arrivals.empty() ? most : random() % (most + 1));
@@ -100,7 +101,7 @@ class Delayed : public Source {
   std::size_t next_ = 0;
 };
 
-/// Runs the experiment of the config with delayed frames and records it in `folder`.
+/// Runs the experiment of the config with delayed frames. Records the run in `folder`.
 RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSequence order,
                         double most_s, bool split = false) {
   const Config config = Config::FromText(text, "order.yaml");
@@ -156,7 +157,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     EXPECT_LE(late.arrivals.longest_lag, TimestampFromSeconds(kWindow_s));
     EXPECT_EQ(late.arrivals.dropped, 0);
     ExpectSameBytes(here / "in_order", here / "late");
-    // Without reordering, the same frames lead to different counts.
+    // If the frames are not reordered, the counts are different.
     const RunResult rejected =
         RecordDelayed(config, here / "rejected", OutOfSequence::kReject, kWindow_s);
     EXPECT_NE(rejected.estimators[0].counts, in_order.estimators[0].counts);
@@ -181,7 +182,7 @@ TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirTimestamp) {
   EXPECT_TRUE(Read(folder_ / "whole/truth.csv") == Read(folder_ / "late/truth.csv"));
 }
 
-/// Returns the message with which BuildExperiment rejects kFilters with `time` appended.
+/// Appends `time` to kFilters. Returns the message with which BuildExperiment rejects this config.
 std::string Refused(const std::string& time) {
   std::string text;
   const Config config = Config::FromText(std::string(kFilters) + time + '\n', "order.yaml");
@@ -209,7 +210,7 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(ranks.size(), experiment.source->streams().size());
   EXPECT_EQ(ranks["disparity"], 0);
   EXPECT_EQ(ranks["inverse_scale"], 1);
-  EXPECT_EQ(ranks["disparity_all"], 2);  // a stream without a sensor
+  EXPECT_EQ(ranks["disparity_all"], 2);  // no sensor uses this stream
   EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
             "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
             "'window_s', the largest lag of an out-of-sequence frame");

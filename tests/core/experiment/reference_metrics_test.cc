@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Metrics against an estimator as the reference, in place of truth.
+// Tests metrics relative to a reference estimator, which replaces the truth.
 #include <malloc.h>
 
 #include <cmath>
@@ -12,8 +12,8 @@
 namespace alidade::testing {
 namespace {
 
-/// A smoother whose estimate of the depth is 0.3 m at all frames but the first. With `fails`, it
-/// fails instead.
+/// A smoother that estimates a depth of 0.3 m at all frames except the first. If `fails`, it fails
+/// instead.
 struct Known : Estimator {
   Known(const Problem& problem, bool fails) : state_(problem.InitialState()), failed_(fails) {}
   void Start(Timestamp) override {}
@@ -67,7 +67,8 @@ Experiment MakeCompared(bool fails = false) {
   return experiment;
 }
 
-/// Returns the depth that an ekf estimates at each frame.
+/// Returns the depth that an ekf estimates at each frame. If `alone`, this is the second estimator,
+/// otherwise the first.
 std::vector<double> Depths(bool alone) {
   Experiment experiment = MakeExperiment();
   Estimator& ekf = *experiment.estimators[alone ? 1 : 0].estimator;
@@ -107,15 +108,16 @@ TEST(Reference, MayBeAnyEstimatorOfTheRun) {
               std::abs(0.3 - alone.back()), 1e-12);
 }
 
-// The covariance of an estimator describes its error relative to truth, not its distance from
-// another estimator. NIS needs neither.
+// The covariance of an estimator describes its error relative to truth. It does not describe the
+// distance from another estimator. NIS uses neither of the two.
 TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   Experiment experiment = MakeCompared();
   const RunResult run = alidade::Run(experiment, {});
   for (const EstimatorResult& one : run.estimators) {
     EXPECT_EQ(one.metrics.count("coverage95:target.depth"), 0u);
     EXPECT_EQ(one.metrics.count("nees.mean:target"), 0u);
-    EXPECT_FALSE(one.diverged);  // although the ekf is a hundred sigma from the reference
+    // No estimator diverged, although the ekf is a hundred sigma from the reference.
+    EXPECT_FALSE(one.diverged);
   }
   EXPECT_EQ(run.estimators[0].metrics.count("nis.mean:disparity"), 1u);
   EXPECT_EQ(run.estimators[2].metrics.size(), 0u);  // the reference is not compared with itself
@@ -135,7 +137,7 @@ TEST(Reference, ThatFailedIsNone) {
             std::string::npos);
 }
 
-/// Source that measures the growth of the heap, in bytes, from its first to its last frame.
+/// A source that measures by how many bytes the heap grows from the first frame to the last.
 class Counting : public Blind {
  public:
   Counting(int frames, std::size_t& grown) : Blind(frames), grown_(grown) {}
@@ -155,8 +157,8 @@ class Counting : public Blind {
   std::size_t& grown_;
 };
 
-// P of a state with 302 elements has 0.7 MB: the covariances of 100 frames of two estimators would
-// need 146 MB. Their values need 0.5 MB.
+// The P of a state with 302 elements takes 0.7 MB. The covariances of 100 frames of two estimators
+// would take 146 MB, and their values 0.5 MB.
 TEST(Reference, KeepsNoCovariances) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   std::size_t grown = 0;
@@ -182,7 +184,7 @@ TEST(Reference, KeepsNoCovariances) {
   EXPECT_LT(grown, std::size_t{10} << 20);
 }
 
-/// Source that throws after `left_` frames, before the smoother has run.
+/// A source that throws after `left_` frames, so the smoother does not run.
 class Torn : public Blind {
  public:
   using Blind::Blind;
@@ -202,7 +204,7 @@ TEST(Reference, WithoutEstimatesIsNone) {
   EXPECT_EQ(run.code, ExitCode::kBadData);
   EXPECT_EQ(run.withheld,
             "no reference: estimator 'known' has no estimates, the comparison with it is withheld");
-  // An online filter has the estimates up to the error.
+  // An online filter has estimates up to the error.
   Experiment online = MakeCompared();
   online.source = std::make_unique<Torn>(60);
   online.reference = 1;

@@ -17,7 +17,7 @@ namespace {
 
 using testing::MakeExperiment;
 
-/// Motion that becomes infinite at the first step.
+/// The value becomes infinite in the first step.
 struct Exploding : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -46,7 +46,7 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
       << result.reason;
   EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
   EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
-  // The event has the timestamp of the failed step, too.
+  // The event also has the timestamp of the failed step.
   EXPECT_EQ(result.estimators[2].events.back().timestamp, TimestampFromSeconds(0.033));
   // The other estimators processed all frames.
   EXPECT_EQ(result.frames, 60);
@@ -82,7 +82,7 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
       << result.reason;
 }
 
-/// A smoother whose depth is 1 m at the first frame and a millimetre more at each further frame.
+/// A smoother whose depth is 1 m at the first frame and grows by 1 mm at each further frame.
 struct Hindsight : Estimator {
   explicit Hindsight(const Problem& problem) : state_(problem.InitialState()) {}
   void Start(Timestamp) override {}
@@ -134,7 +134,7 @@ TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
   EXPECT_EQ(std::ranges::count(events, "all is known", &Event::text), 1);
 }
 
-/// A smoother that fails in Smooth without an estimate.
+/// A smoother that fails in Smooth and has no estimate.
 struct Speechless : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override {
@@ -178,7 +178,7 @@ TEST(Run, AStopAfterAFailureIsStillAFailure) {
   EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
 }
 
-/// Source that is interrupted by a signal while it waits for frame 7, as a pipe may be.
+/// A source that waits for frame 7, as for a pipe, and is interrupted by a signal.
 struct SignalledSource : Source {
   explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
   const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
@@ -205,7 +205,7 @@ TEST(Run, ASignalToItsSourceAfterAFailureIsStillAFailure) {
   }
 }
 
-/// A smoother that a signal stops.
+/// A smoother that is stopped by a signal.
 struct Interrupted : Hindsight {
   using Hindsight::Hindsight;
   void Smooth(const Emit&) override { throw Error(ExitCode::kStopped, "a signal"); }
@@ -229,7 +229,7 @@ TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
   EXPECT_EQ(std::ranges::count(events, EventKind::kStopped, &Event::kind), 1);
 }
 
-/// Random walk with steps N(0, 0.1^2) each second, measured with noise of sigma 1.
+/// A random walk with steps N(0, 0.1^2), one each second. It is measured with noise of sigma 1.
 class Walking : public testing::SwingingTarget {
  public:
   explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
@@ -248,8 +248,8 @@ class Walking : public testing::SwingingTarget {
   int k_ = 0;
 };
 
-/// Returns the result of a filter on Walking that assumes `factor` times the true standard
-/// deviations.
+/// Runs a filter on Walking and returns its result. The filter assumes `factor` times the true
+/// standard deviations.
 EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   Experiment experiment;
   experiment.source = std::make_unique<Walking>(seed);
@@ -292,7 +292,8 @@ TEST(Run, AnUnderconfidentFilterIsAnEvent) {
   EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
 }
 
-// 5 % of 200 runs are 10 runs, with a standard deviation of 3; the bounds of the NEES are wider.
+// 10 of 200 runs, 5 %, are expected outside the bounds, with a standard deviation of 3. The bounds
+// of the NEES are wider.
 TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
   std::size_t nees = 0, nis = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
@@ -305,7 +306,7 @@ TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
   EXPECT_GE(nis, 2u);
 }
 
-/// z = x + n, all angles.
+/// Measures a heading: z = x + n.
 struct Compass : Sensor<Angle, Angle> {
   static constexpr std::array kRoles{Quantity{"heading", "rad"}};
   static constexpr Quantity kMeasurement{"heading", "rad"};
@@ -320,7 +321,7 @@ struct Compass : Sensor<Angle, Angle> {
   }
 };
 
-/// A heading that turns at random.
+/// A heading that performs a random walk.
 struct Turn : Motion<1, Angle> {
   static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
   template <class T>
@@ -330,8 +331,8 @@ struct Turn : Motion<1, Angle> {
   void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.2 * std::sqrt(dt_s); }
 };
 
-/// A heading that turns at a constant rate and is measured ten times a second, in units of `unit`
-/// rad, wrapped or not.
+/// A heading that rotates at a constant rate and is measured ten times a second. Measurements are
+/// in rad times `unit`, wrapped to one turn or not.
 class Turning : public testing::SwingingTarget {
  public:
   Turning(double rate_rad_s, double unit, bool wrapped)
@@ -382,7 +383,7 @@ TEST(Run, DegreesForRadiansAreAnEvent) {
   }
 }
 
-// The heading is either wrapped to one turn or counted over several turns.
+// The measured heading is wrapped to one turn, or it is counted over several turns.
 TEST(Run, RadiansAreNoEvent) {
   for (const double gate : {1.0, 0.9999}) {
     for (const double rate : {0.0, 0.3, 0.9, -0.9}) {
@@ -395,16 +396,16 @@ TEST(Run, RadiansAreNoEvent) {
 }
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
-  Experiment experiment = MakeExperiment();  // 60 frames, every 33 ms
+  Experiment experiment = MakeExperiment();  // 60 frames, 33 ms apart
   EstimatorSpec& ekf = experiment.estimators[0];
   ekf.problem.initial_time_s = 49.5 * 0.033;
   ekf.estimator = std::make_unique<Ekf>(ekf.problem, EkfOptions{}, experiment.source->streams());
   const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
   EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
-  // The prior, 0.35 m, has an RMS error of 80 mm over the first 50 frames. After them, only the
-  // first update has a large error, 75 mm because of curvature: sqrt(75^2 / 10) mm, and a little
-  // for the oscillation.
+  // The prior, 0.35 m, has an RMS error of 80 mm over the first 50 frames. After these frames only
+  // the first update has a large error, 75 mm, caused by curvature. The expected RMSE is
+  // sqrt(75^2 / 10) mm plus a little for the oscillation.
   EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
 }
 
@@ -424,7 +425,8 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   EstimatorSpec& ekf = experiment.estimators[0];
   const SharedSensor linear = testing::LinearSensor(1.0, 1.0);
   testing::AddSensor(ekf.problem, "elsewhere", linear, {"target.depth"});
-  for (Prior& prior : ekf.problem.priors) prior.covariance *= 1e-12;  // certain of a wrong value
+  // Makes the filter certain of a wrong value.
+  for (Prior& prior : ekf.problem.priors) prior.covariance *= 1e-12;
   EkfOptions options;
   options.gate = 1e-6;
   options.rejection_recovery = RejectionRecovery::kNone;
@@ -436,7 +438,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
                    "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
 }
 
-/// Source that throws an error after five frames.
+/// A source that throws an Error after five frames.
 class Failing : public testing::SwingingTarget {
  public:
   explicit Failing(ExitCode code) : SwingingTarget(60), code_(code) {}
@@ -450,7 +452,7 @@ class Failing : public testing::SwingingTarget {
   int count_ = 0;
 };
 
-/// Source of a speed and a fix each second.
+/// A source with a speed and a fix each second.
 class EachSecond : public testing::SwingingTarget {
  public:
   explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
@@ -466,7 +468,7 @@ class EachSecond : public testing::SwingingTarget {
   double t_s_ = 0.0;
 };
 
-// Each input arrives too late: the run reports one event and a count.
+// Each input arrives too late. The run reports this with one event and a count.
 TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   Experiment experiment;
   experiment.source = std::make_unique<EachSecond>(100);
@@ -496,7 +498,7 @@ TEST(Run, BadDataKeepsWhatWasDone) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
-/// Source that throws a logic_error after five frames: a defect of the program.
+/// A source that throws a logic_error after five frames, which is a defect of the program.
 class Breaking : public testing::SwingingTarget {
  public:
   Breaking() : SwingingTarget(60) {}
@@ -562,7 +564,7 @@ TEST(Run, ADefectIsAResultToo) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
-/// Source that applies `spoil` to its fourth frame.
+/// A source that changes its fourth frame with `spoil`.
 class Spoiling : public testing::SwingingTarget {
  public:
   explicit Spoiling(void (*spoil)(SourceFrame&)) : SwingingTarget(60), spoil_(spoil) {}
@@ -626,7 +628,7 @@ TEST(Experiment, KeysAndScalarsOfAConfig) {
       Config::FromText("a: {model: b, list: [c, {d: 1.5}]}\ne: 'f g'", "test.yaml");
   EXPECT_EQ(KeysAndScalarsOf(config),
             (std::set<std::string>{"a", "model", "b", "list", "c", "d", "1.5", "e", "f g"}));
-  EXPECT_THROW(config.root().RejectUnread(), Error);  // no key is marked as read
+  EXPECT_THROW(config.root().RejectUnread(), Error);  // no key was marked as read
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ TEST(AlignBySimilarity, AndTrajectoryAlignmentRefuseTheSame) {
   EXPECT_TRUE(refused(points.leftCols(2), points.leftCols(2)));
   EXPECT_TRUE(refused(points, still));
   EXPECT_TRUE(refused(still, points));
-  // Two sets of points whose deviations are uncorrelated except for rounding.
+  // The deviations of the two sets of points are uncorrelated except for rounding.
   Matrix3Xd one = still, other = still;
   for (int k = 0; k < 12; ++k) {
     one(0, k) += k % 2 == 0 ? 1.0 : -1.0;
@@ -74,7 +74,7 @@ TEST(AlignBySimilarity, AndTrajectoryAlignmentRefuseTheSame) {
   EXPECT_TRUE(refused(one, other));
 }
 
-/// Trajectory of 40 points on a curve.
+/// Returns a trajectory of 40 points on a curve.
 std::vector<Eigen::Vector3d> TurningPath() {
   std::vector<Eigen::Vector3d> path;
   for (int k = 0; k < 40; ++k) {
@@ -96,8 +96,8 @@ TEST(TrajectoryAlignment, FindsASimilarity) {
   EXPECT_LT(aligned->rmse, 1e-6);
 }
 
-// Compares with Eigen's umeyama, which needs all points at once. A mirrored trajectory needs the
-// sign of D.
+// Compares with umeyama of Eigen, which needs all points at once. For a mirrored trajectory the
+// sign of D matters.
 TEST(TrajectoryAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
   for (const double mirror : {1.0, -1.0}) {
     const std::vector<Eigen::Vector3d> path = TurningPath();

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// The squares of x' = a x + sqrt(1 - a^2) w have rho(k) = a^(2 k), tau = (1 + a^2) / (1 - a^2).
+// The squares of x' = a x + sqrt(1 - a^2) w have rho(k) = a^(2 k) and tau = (1 + a^2) / (1 - a^2).
 TEST(AutocorrelationTime, IsThatOfAFirstOrderProcess) {
   for (const double a : {0.0, 0.7, 0.95}) {
     Random random(5);
@@ -32,12 +32,13 @@ TEST(AutocorrelationTime, IsThatOfAFirstOrderProcess) {
 TEST(AutocorrelationTime, IsFromOneToTheLength) {
   EXPECT_EQ(AutocorrelationTime({}, 1.0), 1.0);
   EXPECT_EQ(AutocorrelationTime({1.0, 1.0}, 1.0), 1.0);
-  // A constant far from its mean: rho(k) = (n - k) / n, all pairs: tau = n.
+  // A constant series is far from the expected mean, so rho(k) = (n - k) / n. The sum over all
+  // pairs gives tau = n.
   EXPECT_NEAR(AutocorrelationTime(std::vector<double>(100, 58.0), 1.0), 100.0, 1e-9);
 }
 
 TEST(Lag, FindsTheShiftOfASineToAHundredthOfASample) {
-  // Two periods of 75.76 samples, as in [Ekf2017]; scale and offset do not matter.
+  // The series has two periods of 75.76 samples, as in [Ekf2017]. Scale and offset have no effect.
   const double rate = 2.0 * kPi * 0.4 * 0.033;
   for (const double shift : {0.0, 0.3, -0.45, 0.5, 3.7, -6.25, 11.2}) {
     std::vector<double> reference, signal;
@@ -62,12 +63,12 @@ TEST(Lag, FindsTheShiftOfARamp) {
   const auto straight = [](double i) { return 50.0 - 0.8 * i; };
   const auto bent = [](double i) { return 50.0 - 0.8 * i + 0.002 * i * i; };
   for (const double shift : {0.0, 0.3, -3.6, 11.2}) {
-    // The lag of a straight line is exact: the mean square is a parabola of the shift.
+    // The lag of a straight line is exact, because the mean square is a parabola in the shift.
     EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
     EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
   }
-  // Noise of 0.3 at a slope of 0.8 per sample: its mean over 100 samples shifts the lag by
-  // 0.3 / sqrt(100) / 0.8 samples.
+  // Noise of sigma 0.3 is added to a slope of 0.8 per sample. Over 100 samples its mean shifts the
+  // lag by 0.3 / sqrt(100) / 0.8 samples.
   Random random(1);
   const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
   EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
@@ -77,12 +78,12 @@ TEST(Lag, OfARampTakesAnOffsetForDelay) {
   const auto ramp = [](double i) { return 0.5 * i; };
   const auto low = [&](double i) {
     return ramp(i) - 1.0;
-  };  // 1 at a slope of 0.5 per sample: 2 samples
+  };  // a step of 1 at a slope of 0.5 per sample is a lag of 2 samples
   EXPECT_NEAR(Lag(Sampled(60, 3.0, low), Sampled(60, 0.0, ramp), 1.0), 5.0, 1e-9);
 }
 
 TEST(Lag, IsUnknownAtTheEdgeOfTheSearch) {
-  // The search extends to a quarter of the 80 samples.
+  // The search range is a quarter of the 80 samples.
   const auto ramp = [](double i) { return 0.5 * i; };
   const auto pulse = [](double i) { return std::exp(-0.02 * (i - 25.0) * (i - 25.0)); };
   EXPECT_NEAR(Lag(Sampled(80, 19.0, ramp), Sampled(80, 0.0, ramp), 1.0), 19.0, 1e-9);
@@ -104,11 +105,11 @@ TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
-// The series is 3, 3, 1.5, then 1. Its centred RMS is:
+// The series is 3, 3, 1.5, and then 1. Its centred RMS is:
 // value 4  sqrt((9 + 9 + 2.25 + 4) / 7) = 1.86
 // value 5  sqrt((18 + 2.25 + 6) / 9) = 1.71
 // value 6  sqrt((9 + 2.25 + 7) / 9) = 1.42
-// value 7  sqrt((2.25 + 8) / 9) = 1.07, the first within 20 % of 1
+// value 7  sqrt((2.25 + 8) / 9) = 1.07, which is the first within 20 % of 1
 TEST(Settling, CountsUntilTheCentredRmsStaysInTheBand) {
   std::vector<double> rms(60, 1.0);
   rms[0] = rms[1] = 3.0;
@@ -117,19 +118,19 @@ TEST(Settling, CountsUntilTheCentredRmsStaysInTheBand) {
   EXPECT_EQ(SettlingOf(rms).count, 7.0);
   for (double& value : rms) value *= 1e-6;
   EXPECT_EQ(SettlingOf(rms).count, 7.0);
-  rms[30] = 3e-6;  // the median does not change; sqrt((9 + 8) / 9) = 1.37 up to value 35
+  rms[30] = 3e-6;  // the median stays the same; up to value 35 the RMS is sqrt((9 + 8) / 9) = 1.37
   EXPECT_EQ(SettlingOf(rms).count, 36.0);
 }
 
-// Only the first value is a peak: the centred RMS is 1.4, sqrt((1.96 + 2) / 3) = 1.15, ... The
-// series has settled from the second value on. A series without a peak has settled from its first
-// value on.
+// Only the first value is a peak. The centred RMS is 1.4, then sqrt((1.96 + 2) / 3) = 1.15, and so
+// on. So the series has settled from the second value on. A series without a peak has settled from
+// its first value on.
 TEST(Settling, ResolvesSingleValues) {
   std::vector<double> rms(60, 1.0);
   EXPECT_EQ(SettlingOf(rms).count, 1.0);
   rms[0] = 1.4;
   EXPECT_EQ(SettlingOf(rms).count, 2.0);
-  rms[1] = 1.4;  // sqrt((2 * 1.96 + 1) / 3) = 1.28, sqrt((2 * 1.96 + 3) / 5) = 1.18
+  rms[1] = 1.4;  // RMS sqrt((2 * 1.96 + 1) / 3) = 1.28, sqrt((2 * 1.96 + 3) / 5) = 1.18
   EXPECT_EQ(SettlingOf(rms).count, 3.0);
   EXPECT_EQ(SettlingOf(std::vector<double>(40, 0.0)).count, 1.0);
 }

@@ -24,7 +24,7 @@ TEST(FollowLinks, LeadsToWhatIsThereOrIsNot) {
   fs::create_symlink("nothing", folder / "dangling");
   EXPECT_EQ(FollowLinks(folder / "a/./b/"), folder / "a/b");
   EXPECT_EQ(FollowLinks(folder / "relative/../x"),
-            folder / "a/x");  // `..` applies to the target of the link, as in the kernel
+            folder / "a/x");  // As in the kernel, `..` applies to the target of the link.
   EXPECT_EQ(FollowLinks(folder / "absolute/b"), folder / "a/b");
   EXPECT_EQ(FollowLinks(folder / "dangling"), folder / "nothing");
 }

@@ -46,7 +46,7 @@ TEST(JsonText, WritesNumbersThatReadBack) {
 
 TEST(JsonText, ReplacesWhatIsNotUtf8) {
   EXPECT_EQ(JsonText("a\xFF"), "\"a\xEF\xBF\xBD\"\n");
-  EXPECT_EQ(JsonText("\xC3"), "\"\xEF\xBF\xBD\"\n");  // a truncated character
+  EXPECT_EQ(JsonText("\xC3"), "\"\xEF\xBF\xBD\"\n");  // the UTF-8 character is truncated
   EXPECT_EQ(JsonText("\xC3\xA9 \"\\\n\x01"), "\"\xC3\xA9 \\\"\\\\\\n\\u0001\"\n");
   EXPECT_EQ(JsonText({{"k\xFF", 1}}), "{\n  \"k\xEF\xBF\xBD\": 1\n}\n");
 }

@@ -48,7 +48,7 @@ TEST(Log, GivesEachSinkItsLevelAndAbove) {
     EXPECT_TRUE(IsLogged(LogLevel::kDebug));
     EXPECT_FALSE(IsLogged(LogLevel::kTrace));
     Log(LogLevel::kTrace, "t");
-    Log(LogLevel::kDebug, "{d}");  // printed as it is, not used as a format
+    Log(LogLevel::kDebug, "{d}");  // the text is printed as it is, not used as a format
     Log(LogLevel::kInfo, "i");
     Log(LogLevel::kWarning, "w");
     Log(LogLevel::kError, "e");
@@ -110,7 +110,7 @@ TEST(LogScope, NamesOneRunOfManyAndLimitsItsLevel) {
                                 "warning: seed 8: inner", "warning: after"}));
 }
 
-// Four threads log 500 messages each, while another thread adds and removes sinks.
+// Four threads log 500 messages each. Another thread adds and removes sinks at the same time.
 TEST(Log, TakesMessagesFromSeveralThreads) {
   Messages messages;
   const LogSubscription sink(LogLevel::kInfo, Into(messages));

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-// Examples of NIST for FIPS 180-4: messages of one block, two blocks and none.
+// Examples of NIST for FIPS 180-4: a message of one block, one of two blocks, and an empty message.
 TEST(Sha256, AgreesWithTheStandard) {
   EXPECT_EQ(internal::Sha256("abc"),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dual numbers and the functions that wrap an author's model for the plugin ABI.
+// Tests dual numbers, and the functions that wrap an author's model for the plugin ABI.
 #include "alidade/model/autodiff.h"
 
 #include <gtest/gtest.h>
@@ -29,12 +29,12 @@ using testing::SensorJacobian;
 using testing::StepResult;
 using testing::StepWithJacobians;
 
-/// Whether a plugin call left its outputs unchanged.
+/// Returns true if a plugin call left its outputs unchanged.
 bool NotWritten(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double x) { return x == kPoison; });
 }
 
-/// q' = q Exp((u + w) dt)
+/// Motion model q' = q Exp((u + w) dt).
 struct Turn : Motion<3, UnitQuaternion> {
   using Input = Vec<3>;
   static constexpr std::array kBlocks{Quantity{"orientation"}};
@@ -97,7 +97,7 @@ TEST(AutodiffMotion, OutOfDomainWritesNothing) {
 }
 
 TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
-  // The host of this project passes zeros; another host may pass null, as the ABI allows.
+  // The host of this project passes zeros. Another host may pass null, which the ABI allows.
   const auto turn = AbiMotion<Turn>();
   const AlidadeInstance& c = turn->instance().c();
   const Blocks x{{1, 0, 0, 0}};
@@ -141,7 +141,7 @@ TEST(AutodiffMotion, TheJacobianByTheControlInputIsThatOfDifferences) {
   EXPECT_EQ(b[3], kPoison) << "the stride is kept";
 }
 
-/// x' = x + w, with an analytic Jacobian that throws after writing.
+/// Motion model x' = x + w. The analytic Jacobian writes its output and then throws.
 struct Faulty : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   explicit Faulty(Params&) {}
@@ -172,7 +172,7 @@ TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
   EXPECT_TRUE(NotWritten({f, g, l}));
 }
 
-/// Bearing of a point from a pose: an angle, with an optional role for a bias.
+/// Measures the bearing of a point from a pose. The role of the bias is optional.
 struct Bearing : Sensor<Angle, Vec<2>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
                                      Quantity{"bias", "rad", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -227,7 +227,7 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   EXPECT_TRUE(NotWritten({z}));
 }
 
-/// z = x, with an analytic Jacobian that throws after writing if x < 0.
+/// Measures z = x. If x < 0, the analytic Jacobian writes its output and then throws.
 struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -262,8 +262,8 @@ TEST(AutodiffSensor, AnAnalyticJacobianThatThrowsWritesNothing) {
   EXPECT_EQ(by_y, 0.0);
 }
 
-/// Displacement of a point from a camera, with an inverse measurement model and roles of different
-/// sizes.
+/// Measures the displacement of a point from a camera. The sensor has an inverse measurement model
+/// and roles of different sizes.
 struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
                                      Quantity{"camera", "m", "", "x,y,z"}};
@@ -286,7 +286,7 @@ struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   }
 };
 
-/// z = x, with an analytic Jacobian so large that it is copied as a whole.
+/// Measures z = x. The analytic Jacobian is so large that it is copied as a whole.
 struct Wide : Sensor<Vec<20>, Vec<20>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   template <class T>

@@ -14,7 +14,7 @@ namespace {
 using testing::kPlusOfGeometries;
 using testing::PlusOfGeometry;
 
-/// Returns the geometry of the kind; a vector has three elements.
+/// Returns the geometry with the number `kind`. A vector has three elements.
 Geometry Of(std::uint32_t kind) {
   switch (kind) {
     case ALIDADE_ANGLE:

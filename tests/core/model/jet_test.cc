@@ -13,8 +13,8 @@ namespace {
 
 using Jet2 = Jet<double, 2>;
 
-/// Compares f(x, y) with central differences, h = 1e-5. Their errors are h^2 f'''/6 and the
-/// rounding error 1e-16/h, both below 1e-8 for functions and derivatives of order 1 to 100.
+/// Compares f(x, y) with central differences of step h = 1e-5. Their errors are h^2 f'''/6 and a
+/// rounding error of 1e-16/h. Both are below 1e-8 for functions and derivatives of order 1 to 100.
 template <class F>
 void ExpectDerivatives(const F& f, double x, double y) {
   constexpr double kStep = 1e-5, kTolerance = 1e-8;
@@ -129,7 +129,7 @@ TEST(Jet, DecisionsAreThoseOfTheValue) {
   EXPECT_TRUE(isinf(Jet2(infinity)) && isnan(Jet2(infinity) - infinity));
 }
 
-/// Computes a formula with vector operations of Eigen, for any number type.
+/// Computes a formula with vector operations of Eigen. Works with any number type.
 template <class T>
 T WithEigen(const T& a, const T& b) {
   const Eigen::Matrix<T, 3, 1> x(a, b, T(2.0)), y = x.cross(Eigen::Matrix<T, 3, 1>(b, a, a));

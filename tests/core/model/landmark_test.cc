@@ -17,7 +17,7 @@ using testing::Vec3;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// A camera at kPosition with orientation kTurn, and a point 4 m away.
+// The camera is at kPosition with the orientation kTurn. The point is 4 m away from it.
 const Vec3 kPosition{0.4, -1.1, 0.3};
 const std::array<double, 4> kTurn{0.8, 0.2, -0.4, 0.4};
 const Vec3 kPoint{1.4, 0.9, 3.6};
@@ -34,13 +34,13 @@ Ray<double> RayOf(const Blocks& blocks) {
 }
 
 TEST(Landmark, InverseDepthHasTheAnglesOfMonoSlam) {
-  // theta = 90 deg, phi = 30 deg: m = (cos 30, -sin 30, 0)
+  // theta = 90 deg and phi = 30 deg, so m = (cos 30, -sin 30, 0).
   const double y[6] = {1, 2, 3, kPi / 2, kPi / 6, 0.25};
   const Ray<double> ray = InverseDepth::ToRay(y);
   EXPECT_NEAR(ray.direction[0], std::sqrt(3.0) / 2, 1e-15);
   EXPECT_NEAR(ray.direction[1], -0.5, 1e-15);
   EXPECT_NEAR(ray.direction[2], 0.0, 1e-15);
-  // The point is 4 m from the anchor.
+  // The point is 4 m away from the anchor.
   double p[3];
   ASSERT_TRUE(Xyz::FromRay(ray, p));
   EXPECT_NEAR(p[0], 1 + 2 * std::sqrt(3.0), 1e-14);
@@ -49,7 +49,7 @@ TEST(Landmark, InverseDepthHasTheAnglesOfMonoSlam) {
 }
 
 TEST(Landmark, AllFormsAreSeenAlike) {
-  Vec3 along, seen;  // R_CW (p - r)
+  Vec3 along, seen;  // seen = R_CW (p - r)
   for (std::size_t i = 0; i < 3; ++i) along[i] = kPoint[i] - kPosition[i];
   UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
   const Vec3 anchor{-0.5, 0.2, -0.8};
@@ -71,7 +71,7 @@ TEST(Landmark, IsSeenAtInfinityTheSameFromEverywhere) {
 }
 
 TEST(Landmark, IsPlacedWhereItIsSeen) {
-  const Vec3 h{0.3, -0.2, 1.7};  // not of unit length
+  const Vec3 h{0.3, -0.2, 1.7};  // h does not have unit length
   ForEachRepresentation([&](auto representation) {
     using Representation = decltype(representation);
     double y[detail::Blocks<Representation>::kAmbient], p[3];
@@ -81,7 +81,7 @@ TEST(Landmark, IsPlacedWhereItIsSeen) {
     for (std::size_t i = 0; i < 3; ++i) along[i] = p[i] - kPosition[i];
     UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
     const double scale =
-        4.0 / std::sqrt(0.09 + 0.04 + 1.7 * 1.7);  // 4 m away in the direction of h
+        4.0 / std::sqrt(0.09 + 0.04 + 1.7 * 1.7);  // The point is 4 m away in the direction of h.
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen[i], scale * h[i], 1e-14);
   });
 }
@@ -124,7 +124,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
   });
 }
 
-// FAULTS 40, 83
+// Faults 40 and 83 of tests/faults/README.md.
 TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};
@@ -135,7 +135,7 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
 }
 
 TEST(Landmark, LinearityIndexIsThatOfCivera) {
-  // The anchor is at the origin, the point 4 m ahead, and the camera 3 m to the side:
+  // The anchor is at the origin, the point is 4 m ahead, and the camera is 3 m to the side:
   // d1 = 5 m, cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
   const double y[6] = {0, 0, 0, 0, 0, 0.25};
   const double beside[3] = {3, 0, 0};

@@ -11,7 +11,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// A rotation and a direction that walk at random and also rotate about axes of their own.
+/// A rotation and a direction perform a random walk. Each also rotates about an axis of its own.
 struct Wander : Motion<5, UnitQuaternion, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"},
                                       Quantity{"u", "", "", "x,y,z"}};
@@ -27,7 +27,7 @@ struct Wander : Motion<5, UnitQuaternion, UnitVector> {
   }
 };
 
-/// z = R(q) u, which correlates the two blocks.
+/// Measures z = R(q) u, which correlates the two blocks.
 struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
   static constexpr std::array kRoles{Quantity{"q", "", "", "w,x,y,z"},
                                      Quantity{"u", "", "", "x,y,z"}};
@@ -47,7 +47,7 @@ struct Turned : Sensor<Vec<3>, UnitQuaternion, UnitVector> {
   }
 };
 
-/// Measures a direction, with different noise in its two tangent directions.
+/// Measures a direction. The noise differs between its two tangent directions.
 struct Direction : Sensor<UnitVector, UnitVector> {
   static constexpr std::array kRoles{Quantity{"u", "", "", "x,y,z"}};
   static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
@@ -82,7 +82,7 @@ Problem WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
   return problem;
 }
 
-// Corrections are up to 0.5 rad: P must rotate with the unit vector.
+// Corrections are up to 0.5 rad, so P must rotate with the unit vector.
 TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
   const Eigen::Matrix3d p_q = Eigen::Vector3d(0.3, 0.2, 0.1).asDiagonal();
   Eigen::Matrix2d p_u;
@@ -124,7 +124,7 @@ TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
   EXPECT_TRUE(above && below);
 }
 
-/// An angle that increases steadily and that the model does not wrap.
+/// An angle that increases steadily. The model does not wrap it.
 struct Spin : Motion<1, Angle> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}};
   template <class T>

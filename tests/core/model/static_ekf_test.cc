@@ -95,7 +95,7 @@ TEST(StaticEkf, HoldsDiscreteNoiseOverAGapOfManySteps) {
   }
 }
 
-/// Two elements with correlated noise and two roles of two elements each.
+/// Measures two elements with correlated noise. Each of the two roles has two elements.
 struct Difference : Sensor<Vec<2>, Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"a", "m", "", "x,y"}, Quantity{"b", "m", "", "x,y"}};
   static constexpr Quantity kMeasurement{"z", "m", "", "x,y"};
@@ -123,7 +123,7 @@ TEST(StaticEkf, UpdatesWithVectorsAndDerivedJacobiansAsTheTextbookSays) {
   filter.Set<2>(v, 0.5 * own);
   constexpr double kDt = 0.5;
   ASSERT_EQ(filter.Predict(kDt), Status::kOk);
-  // Computed by hand, in the order a, b, v.
+  // The expected values are computed by hand, in the order a, b, v.
   Eigen::Matrix<double, 6, 6> f = Eigen::Matrix<double, 6, 6>::Identity(), p = f, q = 0.0 * f;
   p.setZero();
   p.block<2, 2>(0, 0) = own;
@@ -179,7 +179,7 @@ TEST(StaticEkf, WhatCannotBeUsedChangesNothing) {
   EXPECT_EQ(filter.Update<kDepth>(stereo, &d), StaticOutcome::kOutOfDomain);
 }
 
-/// x' = 2 x + w, which overflows eventually.
+/// Motion model x' = 2 x + w, which overflows after some steps.
 struct Doubling : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
@@ -189,7 +189,7 @@ struct Doubling : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-/// z = x_1 of two elements, with sigma 1.
+/// Measures z = x_1 with sigma 1. x has two elements.
 struct First : Sensor<Vec<1>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -216,7 +216,7 @@ TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
   p(0) = 0.5 * largest;
   const double three = 3.0;
   filter.Set<0>(&three, p);
-  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // P, four times as large, overflows
+  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // P becomes four times as large and overflows
   EXPECT_EQ(*filter.value<0>(), 3.0);
   EXPECT_EQ(filter.covariance(), p);
   filter.Set<0>(3.0, 1.0);
@@ -224,7 +224,7 @@ TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
   EXPECT_EQ(*filter.value<0>(), 6.0);
 }
 
-// r = 1e150, S = 2: the NIS of 5e299 is finite, but K r = 5e302 makes x_2 overflow.
+// r = 1e150 and S = 2. The NIS of 5e299 is finite, but K r = 5e302 makes x_2 overflow.
 TEST(StaticEkf, AnUpdateToWhatIsNotFiniteIsReportedAndChangesNothing) {
   const double largest = std::numeric_limits<double>::max();
   StaticEkf<Constant<2>> filter{Constant<2>(2)};

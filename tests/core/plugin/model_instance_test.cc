@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of the descriptions that a plugin supplies.
+// Tests how the descriptions that a plugin supplies are checked.
 #include "alidade/plugin/model_instance.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-/// A sensor implemented directly against the C header. It is valid unless a test changes it.
+/// A sensor written directly against the C header. It is valid unless a test changes it.
 struct HandWritten {
   HandWritten() {
     role.struct_size = output.struct_size = sizeof(AlidadeSpace);
@@ -40,7 +40,7 @@ struct HandWritten {
     instance.description = &description;
     instance.sensor = &sensor;
   }
-  /// Turns a space into a product of two scalars, `a` and `b`.
+  /// Turns `space` into a product of two scalars, `a` and `b`.
   void Divide(AlidadeSpace& space) {
     parts[0] = parts[1] = output;
     parts[0].name = "a";
@@ -158,7 +158,7 @@ TEST(ModelInstance, IgnoresHintsThatItDoesNotKnow) {
 }
 
 TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
-  // A plugin in another language may not support null.
+  // A plugin written in another language may not support null.
   HandWritten hand;
   AlidadeMotion motion{};
   motion.struct_size = sizeof(motion);

@@ -15,7 +15,7 @@ namespace {
 using internal::AddOuterProduct;
 using internal::Joseph;
 
-constexpr double kRounding = 1e-12;  // sums of about 10 products of numbers of order 10
+constexpr double kRounding = 1e-12;  // for sums of about 10 products of numbers of order 10
 
 TEST(Covariance, BlocksAreThoseOfTheSymmetricMatrix) {
   Random random(1);
@@ -58,8 +58,8 @@ TEST(Covariance, JosephAndTheOuterProductAgreeForTheOptimalGain) {
   EXPECT_LT((a.Dense() - b.Dense()).norm(), 1e-11 * a.Dense().norm());
 }
 
-// The gain is zero for some rows and not optimal for the others. Expected are Joseph's form and the
-// formula relative to the optimal gain: P - W W' + E E', E = (K - K*) L.
+// The gain is zero for some rows and not optimal for the others. Joseph's form must equal the
+// formula relative to the optimal gain K*: P - W W' + E E', E = (K - K*) L.
 TEST(Covariance, JosephAndTheOuterProductsAgreeForAnyGain) {
   Random random(14);
   Covariance joseph = RandomCovariance({3, 2, 3}, random);

@@ -20,7 +20,8 @@ using Eigen::VectorXd;
 
 constexpr double kKernelRounding = 1e-11;
 
-/// An update of n states by measurements with the given numbers of rows, and its dense matrices.
+/// An update of n states, together with its dense matrices. `rows` contains the number of rows of
+/// each measurement.
 struct KernelProblem {
   KernelProblem(int n, const std::vector<int>& rows, Random& random)
       : size(n), stride(PaddedSize(n)), capacity(2) {
@@ -35,7 +36,7 @@ struct KernelProblem {
     for (const int k : rows) {
       One& one = ones.emplace_back();
       for (int c = 0; c < std::min(n, 5); ++c) one.columns.push_back((7 * at + 3 * c) % n);
-      one.columns.push_back(one.columns.front());  // two roles of one block
+      one.columns.push_back(one.columns.front());  // two roles have the same block
       one.h = RandomMatrix(k, std::ssize(one.columns), random);
       const MatrixXd l = RandomMatrix(k, k, random);
       R.block(at, at, k, k) = l * l.transpose() + MatrixXd::Identity(k, k);
@@ -47,7 +48,7 @@ struct KernelProblem {
     }
   }
 
-  /// Prepares the memory of the update for these kernels.
+  /// Prepares the memory of the update for `kernels`.
   Update Begin(const Kernels& kernels) {
     const auto number = [](int count) { return static_cast<std::size_t>(count); };
     const int rows = PaddedSize(capacity);
@@ -59,7 +60,7 @@ struct KernelProblem {
     for (int j = 0; j < size; ++j) {
       for (int i = j; i < size; ++i) update.p(i, j) = p(i, j);
       for (int i = 0; i < j; ++i)
-        update.p.data[j * stride + i] = 7.0;  // the upper triangle is not used
+        update.p.data[j * stride + i] = 7.0;  // The upper triangle is not used.
     }
     update.capacity = capacity;
     update.panel_rows = kernels.panel_rows;
@@ -110,8 +111,8 @@ double RelativeDifference(const MatrixXd& a, const MatrixXd& b) {
   return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());
 }
 
-/// Calls test(kernels, n) for all kernels that this processor supports, with sizes below, at and
-/// above that of their panels.
+/// Calls test(kernels, n) for all kernels that this processor supports. The sizes n are below, at
+/// and above the panel size of the kernels.
 template <class Test>
 void ForAllKernels(const Test& test) {
   for (int n = 1; n <= 8; ++n) {
@@ -189,7 +190,7 @@ TEST(Kernels, AStepIsThatOfTheTextbook) {
       Update update = problem.Begin(kernels);
       std::vector<int> rows;
       for (int i = 0; i < k; ++i)
-        rows.push_back((n - 1 + i * (n - 1)) % n);  // not in ascending order
+        rows.push_back((n - 1 + i * (n - 1)) % n);  // The rows are not in ascending order.
       for (const int width : {0, 1, 3}) {
         const RowMajor f = RandomMatrix(k, k, random), l = RandomMatrix(k, width, random),
                        cross = 0.1 * RandomMatrix(k, k, random);

@@ -25,7 +25,7 @@ using Values = std::array<double, 7>;
 struct Case {
   const char* name;
   Geometry geometry;
-  double largest;  ///< step for which (2) holds
+  double largest;  ///< largest step for which law (2) holds
 };
 
 class GeometryLaws : public ::testing::TestWithParam<Case> {
@@ -77,8 +77,8 @@ TEST_P(GeometryLaws, HoldAtRandomPointsAndStepsOfEverySize) {
 }
 
 TEST_P(GeometryLaws, SmallStepsKeepTheirDigits) {
-  // The derivative must not jump at the change from sin(d)/d to its series. The relative error
-  // counts, not the absolute one.
+  // The derivative must not jump when sin(d)/d changes to its series. So the relative error is
+  // checked, not the absolute error.
   const Values x = [&] {
     Values identity{};
     std::ranges::copy(geometry_.Identity(), identity.begin());
@@ -113,7 +113,8 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
       below[c] -= kStep;
       const Values up = Minus(Plus(x, above), y), down = Minus(Plus(x, below), y);
       for (std::size_t r = 0; r < n; ++r) {
-        // Rounding error of 1e-16 divided by the step, and the square of the step.
+        // The tolerance covers the rounding error, 1e-16 divided by the step, and the square of the
+        // step.
         EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
       }
     }
@@ -122,7 +123,8 @@ TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
 
 TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   constexpr double kTransport =
-      1e-11;  // rounding error / (1 + from . to); the smallest divisor here is 1e-4
+      // The tolerance is the rounding error / (1 + from . to). The smallest divisor here is 1e-4.
+      1e-11;
   const int n = geometry_.tangent;
   for (int i = 0; i < kPoints; ++i) {
     const Values from = Point(), to = Point();
@@ -252,7 +254,7 @@ TEST(UnitQuaternion, QuarterTurnAboutZ) {
   EXPECT_NEAR(q[3], std::sqrt(0.5), 1e-15);
 }
 
-/// Returns d/dt of x (+) t d at t = 1, in the tangent space at the end point, by central
+/// Returns d/dt of x (+) t d at t = 1 in the tangent space at the end point. Uses central
 /// differences.
 std::array<double, 2> VelocityAtTheEnd(const double* x, const double* d) {
   const Geometry geometry = Geometry::UnitVector();
@@ -284,14 +286,14 @@ TEST(UnitVector, TransportCarriesTheVelocityOfAGeodesicAlongIt) {
     for (int row = 0; row < 2; ++row) {
       const double carried = j[2 * row] * d[0] + j[2 * row + 1] * d[1];
       EXPECT_NEAR(carried, velocity[row],
-                  1e-8);  // central differences: step^2 and rounding error / step
+                  1e-8);  // Central differences have errors of step^2 and of rounding error / step.
       EXPECT_NEAR(carried, -homeward[row], 1e-12);
     }
   }
 }
 
 TEST(UnitVector, TransportKeepsOrientation) {
-  // An orthogonal J could still be a reflection; det J = 1 everywhere, also across the
+  // An orthogonal J could still be a reflection. det J = 1 must hold everywhere, also across the
   // discontinuity of the basis.
   const Geometry geometry = Geometry::UnitVector();
   const double from[3] = {std::sqrt(1 - 1e-6), 0, 1e-3}, to[3] = {std::sqrt(1 - 1e-6), 0, -1e-3};
@@ -308,7 +310,7 @@ TEST(UnitVector, MinusIsTrueUpToTheAntipode) {
     double y[3], back[2];
     geometry.Plus(x, d, y);
     geometry.Minus(y, x, back);
-    // The direction comes from a vector of length `short_of` with rounding errors.
+    // The direction is computed from a vector of length `short_of`, which has rounding errors.
     const double tolerance = 2e-15 / short_of;
     EXPECT_NEAR(back[0], d[0], tolerance);
     EXPECT_NEAR(back[1], d[1], tolerance);
@@ -366,7 +368,7 @@ TEST(Geometry, NormaliseDoesNotChangeAValueWhoseLengthIsNotFinite) {
 
 TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
   for (const GeometryRow* row : detail::kGeometryRows) {
-    if (row->ambient == 0) continue;  // the model determines the size
+    if (row->ambient == 0) continue;  // the model determines the size of this geometry
     SCOPED_TRACE(row->name);
     EXPECT_EQ(FindGeometry(row->number), row);
     const Geometry geometry(row->number);
@@ -384,7 +386,7 @@ TEST(GeometryTable, NamesAsManyElementsAsThereAre) {
   EXPECT_EQ(FindGeometry(99), nullptr);
 }
 
-// Compares with the derivative by dual numbers, up to rounding.
+// Compares with derivatives by dual numbers. Only rounding errors are allowed.
 TEST(GeometryTable, DerivativesInClosedFormAreThoseOfPlus) {
   const auto visit = [&]<class G>(G) {
     const Geometry geometry = Geometry::Of<G>();

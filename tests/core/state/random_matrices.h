@@ -14,7 +14,7 @@ inline Eigen::MatrixXd RandomMatrix(Eigen::Index rows, Eigen::Index columns, Ran
   return m;
 }
 
-/// Returns a full random covariance of blocks with the given sizes.
+/// Returns a full random covariance. `parts` contains the sizes of its blocks.
 inline Covariance RandomCovariance(const std::vector<int>& parts, Random& random) {
   Covariance p;
   for (const int rows : parts) p.Add(rows);

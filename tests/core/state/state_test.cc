@@ -20,7 +20,7 @@ void Move(State& state, const Eigen::VectorXd& dx) {
 
 Space Named(const Geometry& geometry) { return {"value", "m", "", {""}, geometry, 0}; }
 
-/// Returns a state of the correlated blocks a (2), b (1) and c (2).
+/// Returns a state with the correlated blocks a (2 elements), b (1) and c (2).
 State Abc() {
   State state;
   const double zero[2] = {1.0, 2.0};
@@ -48,7 +48,7 @@ TEST(State, InitialiseCarriesTheCorrelationsOfWhatItCameFrom) {
   State state = Abc();
   const BlockId a = state.layout().Find("s.a"), b = state.layout().Find("s.b");
   const BlockId y = state.Declare("s.y", "s", Named(Geometry::Vector(1)));
-  // y = (1, -2) a + 3 b + n,  n ~ N(0, 0.25)
+  // Adds y = (1, -2) a + 3 b + n, n ~ N(0, 0.25).
   const Eigen::RowVector3d j(1.0, -2.0, 3.0);
   const double value = 7.0;
   state.Initialise(std::array{y}, &value, std::array{a, b}, j,
@@ -106,7 +106,7 @@ TEST(State, DropKeepsTheRestAndFillsTheGap) {
   State state = Abc();
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
   state.Remove(state.layout().Find("s.a"));
-  // Block c, the last one of the same size, moved to the position of a.
+  // Block c is the last block of the same size, so it was moved to the position of a.
   EXPECT_EQ(state.covariance().size(), 3);
   EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
   EXPECT_EQ(state.layout()[state.layout().Find("s.c")].tangent_offset, 0);
@@ -196,7 +196,7 @@ TEST(State, MovesOnTheManifold) {
   const BlockId q = state.Declare("s.q", "s", Named(Geometry::UnitQuaternion()));
   const double identity[4] = {1, 0, 0, 0};
   state.Add(q, identity, Eigen::Matrix3d::Identity());
-  // A half turn about z in two quarter turns.
+  // The quaternion rotates by half a turn about z, in two quarter turns.
   const double quarter = std::acos(0.0);
   Move(state, Eigen::Vector3d(0, 0, quarter));
   Move(state, Eigen::Vector3d(0, 0, quarter));
@@ -221,7 +221,7 @@ TEST(State, MoveToTransportsTheCovarianceOfADirection) {
 TEST(StateLayout, ABlockIsDeclaredLikeAnotherOfTheSameLayout) {
   StateLayout layout;
   layout.Declare("s.a", "s", Named(Geometry::UnitQuaternion()));
-  for (int i = 0; i < 20; ++i) {  // reallocates the blocks
+  for (int i = 0; i < 20; ++i) {  // declares so many blocks that they are reallocated
     const Block& first = layout[0];
     const BlockId id = layout.Declare("s." + std::to_string(i), first.owner, first.space);
     EXPECT_EQ(layout[id].owner, "s");

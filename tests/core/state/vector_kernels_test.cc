@@ -21,13 +21,13 @@ MatrixXd Drawn(Eigen::Index rows, Eigen::Index columns, Random& random) {
   return m;
 }
 
-/// Returns the largest difference of two matrices, relative to the largest element of the second.
+/// Returns the largest difference of two matrices, divided by the largest element of the second.
 double Difference(const MatrixXd& a, const MatrixXd& b) {
   if (b.size() == 0) return 0.0;
   return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());
 }
 
-/// Sizes below, at and above the numbers of rows that one loop iteration processes.
+/// Row counts below, at and above the number of rows that one loop iteration processes.
 constexpr Eigen::Index kRowCounts[] = {0, 1, 2, 3, 7, 8, 23, 24, 25, 49, 193, 300};
 
 TEST(VectorKernels, ProductsAreThoseOfEigen) {

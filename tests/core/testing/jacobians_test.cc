@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// z = b x y with a factor b that is supplied with the measurement. The analytic dz/dy is
+/// Measures z = b x y. The factor b is supplied with the measurement. The analytic dz/dy is
 /// multiplied by kFault.
 template <int kFault>
 struct Scaled : Sensor<Vec<1>, Vec<1>, Vec<1>> {
@@ -37,7 +37,7 @@ struct Scaled : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-// z = 2 x y at x = 3, y = 5: dz/dx = 10, dz/dy = 6.
+// z = 2 x y at x = 3 and y = 5, so dz/dx = 10 and dz/dy = 6.
 TEST(Jacobians, OfASensorAreThoseOfTheModelAndOfDifferences) {
   const double factor = 2.0;
   const SharedSensor right = MakeSensor(Scaled<1>()), wrong = MakeSensor(Scaled<2>());
@@ -47,13 +47,13 @@ TEST(Jacobians, OfASensorAreThoseOfTheModelAndOfDifferences) {
   for (const SharedSensor& sensor : {right, wrong}) {
     const std::vector<double> numeric = NumericSensorJacobian(sensor, roles, &factor);
     EXPECT_LT(LargestDifference(numeric, {10.0, 6.0}),
-              1e-11);  // rounding error of 30, divided by 1e-3
+              1e-11);  // The tolerance is the rounding error of 30, divided by 1e-3.
   }
   EXPECT_THROW(SensorJacobian(right, {{-1.0}, {5.0}}, &factor), ContractViolation);
   EXPECT_THROW(NumericSensorJacobian(right, {{1e-4}, {5.0}}, &factor), ContractViolation);
 }
 
-/// p1 = p + sin(h) dt + w0 h,  h1 = h + u dt + w1
+/// Motion model p1 = p + sin(h) dt + w0 h, h1 = h + u dt + w1.
 struct Driven : Motion<2, Vec<1>, Angle> {
   static constexpr std::array kBlocks{Quantity{"p"}, Quantity{"h"}};
   using Input = Vec<1>;
@@ -73,7 +73,7 @@ TEST(Jacobians, OfAStepAreThoseOfTheModelAndOfDifferences) {
   const Blocks x{{1.0}, {h}};
   const std::vector<double> f{1.0, std::cos(h) * dt_s + w[0], 0.0, 1.0}, g{h, 0.0, 0.0, 1.0};
   const Blocks next{{1.0 + std::sin(h) * dt_s + w[0] * h},
-                    {h + u * dt_s - 2.0 * std::acos(-1.0)}};  // 3.2 is beyond pi
+                    {h + u * dt_s - 2.0 * std::acos(-1.0)}};  // h + u dt = 3.2 is beyond pi
   for (const StepResult& step :
        {StepWithJacobians(motion, x, &u, w, dt_s), NumericStep(motion, x, &u, w, dt_s)}) {
     for (std::size_t i = 0; i < next.size(); ++i) {

@@ -153,7 +153,7 @@ TEST_F(MergeCli, RefusesWhatIsNoFinishedShard) {
   Write("s2/finished_runs.jsonl", runs.substr(runs.find('\n') + 1));
   ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:1: is not the run of seed 8");
   Write("s2/finished_runs.jsonl", runs + runs);
-  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is a surplus line");
+  ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl:4: is a line after the last run");
   fs::remove(folder_ / "s2/finished_runs.jsonl");
   ExpectRefused({"s1", "s2"}, "s2/finished_runs.jsonl: cannot be read", 66);
   std::string stopped = summary;

@@ -147,7 +147,7 @@ TEST_F(ReplayCli, NamesARowThatChanged) {
   const std::string out = ExpectDifferent();
   EXPECT_TRUE(Contains(out, "differs: out/ekf/estimates.csv:2:1: now '0.0")) << out;
   EXPECT_TRUE(Contains(out, "', was '7.7")) << out;
-  EXPECT_TRUE(Contains(out, "differs: out/truth.csv:154:1: ends here now\n")) << out;
+  EXPECT_TRUE(Contains(out, "differs: out/truth.csv:154:1: now ends before this row\n")) << out;
   EXPECT_TRUE(Contains(out, "differs: out/expected.csv: has been removed\n")) << out;
   EXPECT_TRUE(Contains(out, "\nout: 3 of ")) << out;
   const Outcome replay = Call({"replay", "out", "--json"});
@@ -170,7 +170,7 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   before_.clear();
   const Outcome piped = Call({"replay", "out"});
   EXPECT_EQ(piped.code, 66);
-  EXPECT_TRUE(Contains(piped.err, "its data came from '-', which can be read only once"))
+  EXPECT_TRUE(Contains(piped.err, "the data came from '-', which can be read only once"))
       << piped.err;
   Make({"run", "config.yaml", "--no-figures", "--force"});
   std::string record = Read("out/run.json");

@@ -394,7 +394,7 @@ TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
   ASSERT_EQ(sweep.code, 0) << sweep.err;
   const std::string words =
       "\nerrors are differences from estimator 'bad', an estimate itself: no coverage, no NEES; "
-      "withheld in 2 of 2 runs, in which it failed, diverged or had no estimates\n";
+      "withheld in 2 of 2 runs, in which the reference failed, diverged or had no estimates\n";
   EXPECT_TRUE(Contains(sweep.out, words)) << sweep.out;
   EXPECT_TRUE(Contains(Read("out/table.md"), words)) << Read("out/table.md");
   EXPECT_EQ(Json("out/sweep.json").root().At("withheld").Number(), 2);
@@ -446,8 +446,8 @@ TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
 TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"source.noise",
-       "error: --vary: 'source.noise' names no key to vary; expected KEY=v1,v2,..."},
-      {"=1,2", "'=1,2' names no key to vary"},
+       "error: --vary: 'source.noise' does not name a key to vary; expected KEY=v1,v2,..."},
+      {"=1,2", "'=1,2' does not name a key to vary"},
       {"a.b=1,,2", "'a.b=1,,2' has an empty value"},
       {"a.b=", "'a.b=' has an empty value"},
       {"a.b=[1,2", "has an unclosed bracket or quote"},

@@ -226,7 +226,7 @@ TEST_F(RunView, RefusesWhatItCannotShow) {
   EXPECT_EQ(blind.code, 78);
   EXPECT_TRUE(Contains(blind.err,
                        "source: the source has no images to show; expected a source that measures "
-                       "in images, or draws them from `surfaces`"))
+                       "in images, or draws images from `surfaces`"))
       << blind.err;
   EXPECT_FALSE(Exists("run"));
   EXPECT_FALSE(Exists("v.avi"));
@@ -267,7 +267,7 @@ TEST_F(RunView, AWindowNeedsADisplay) {
   EXPECT_EQ(outcome.code, 73);
   EXPECT_TRUE(Contains(outcome.err,
                        "--view: there is no display: DISPLAY is not set; expected a graphical "
-                       "session; --save-video FILE.avi does not need it"))
+                       "session; --save-video FILE.avi does not need a display"))
       << outcome.err;
   EXPECT_FALSE(Exists("run"));
 

@@ -101,9 +101,9 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
 SharedSensor BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
 /// Excludes observations: sets BundleObservation::used to false if h is undefined or |z (-) h|^2 is
-/// not finite at the values of the problem, otherwise to true. h is undefined for a point behind the
-/// camera. For a projective camera, h is undefined for a point in the plane of the camera. Returns
-/// the number of excluded observations.
+/// not finite at the values of the problem, otherwise to true. h is undefined for a point behind
+/// the camera. For a projective camera, h is undefined for a point in the plane of the camera.
+/// Returns the number of excluded observations.
 int ExcludeUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Computes the unweighted RMS reprojection error of the used observations:

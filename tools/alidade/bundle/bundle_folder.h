@@ -16,8 +16,8 @@ class OutputFolder;
 /// Output folder of a bundle adjustment.
 ///
 ///   file         rows
-///   problem.EXT  adjusted problem in the format of the input; omitted for tracks. EXT is txt (bal),
-///                out (bundler) or bin (libmv)
+///   problem.EXT  adjusted problem in the format of the input; omitted for tracks. EXT is txt
+///                (bal), out (bundler) or bin (libmv)
 ///   poses.tum    t x y z qx qy qz qw, world_from_cam, of registered cameras; t is the time in s or
 ///                the number of the camera
 ///   points.csv   point,x,y,z

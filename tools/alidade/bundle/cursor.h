@@ -11,8 +11,9 @@
 
 namespace alidade::internal {
 
-/// Reader of numbers separated by white space. The parameter `quantity` of a function is the name of
-/// the expected value in error messages, as in `a focal length`. Errors: kBadData with the position in the file.
+/// Reader of numbers separated by white space. The parameter `quantity` of a function is the name
+/// of the expected value in error messages, as in `a focal length`. Errors: kBadData with the
+/// position in the file.
 class BundleCursor {
  public:
   BundleCursor(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kLens = 8;  // f, cx, cy, k1, k2, k3, p1, p2
 
-/// Reader of 32-bit numbers in either byte order. The parameter `quantity` of a function is the name
-/// of the value in error messages.
+/// Reader of 32-bit numbers in either byte order. The parameter `quantity` of a function is the
+/// name of the value in error messages.
 class BinaryReader {
  public:
   BinaryReader(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {

@@ -12,8 +12,8 @@
 namespace alidade {
 namespace {
 
-/// Reads the next row and checks that it has the `count` columns `names`. Skips a header that begins
-/// with `frame`. Returns false at the end of the file.
+/// Reads the next row and checks that it has the `count` columns `names`. Skips a header that
+/// begins with `frame`. Returns false at the end of the file.
 bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
   const bool first = rows.line() == 0;
   if (!rows.Next() || (first && rows.text(0) == "frame" && !rows.Next())) return false;
@@ -121,8 +121,9 @@ Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
 ///
 ///   point = (sum W)^-1 sum W y,   W = (J J')^+
 ///
-/// An observation of a single camera constrains the point only across the ray. The weight of a stereo pair along the ray
-/// decreases with the distance of y. Returns nullopt if the rays are almost parallel.
+/// An observation of a single camera constrains the point only across the ray. The weight of a
+/// stereo pair along the ray decreases with the distance of y. Returns nullopt if the rays are
+/// almost parallel.
 std::optional<std::array<double, 3>> Triangulate(
     const SensorModel& sensor, const BundleProblem& problem,
     const std::vector<BundleObservation>& observations) {
@@ -154,8 +155,8 @@ std::optional<std::array<double, 3>> Triangulate(
   return point;
 }
 
-/// Creates the sensor of a problem of tracks from the camera file. Errors name that file. Sets `text`
-/// to the YAML of the sensor.
+/// Creates the sensor of a problem of tracks from the camera file. Errors name that file. Sets
+/// `text` to the YAML of the sensor.
 SharedSensor TrackSensor(const BundleTracks& sources, int dims, const PluginHost& host,
                          std::string& text) {
   Config config = Config::FromFile(sources.camera);

@@ -39,9 +39,9 @@ struct Finding {
 std::vector<Finding> CheckModel(const PluginEntry& entry, const Node& parameters,
                                 const CheckOptions& options = {});
 
-/// Finds sensors and motion models. `plugin` is a file, the name of a file on the search path without
-/// `alidade_` and `.so`, or the name of a model. If `model` is not empty, only the model of that name
-/// is returned. Error: kPlugin if no model matches.
+/// Finds sensors and motion models. `plugin` is a file, the name of a file on the search path
+/// without `alidade_` and `.so`, or the name of a model. If `model` is not empty, only the model of
+/// that name is returned. Error: kPlugin if no model matches.
 std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& plugin,
                                     const std::string& model = "");
 

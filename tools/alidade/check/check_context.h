@@ -12,8 +12,8 @@
 /// Checks of `alidade check`: one function for each check.
 namespace alidade::internal {
 
-/// Tested state: the values of all slots of a model. If Predict is defined, the measurement slot of a
-/// sensor contains the result of Predict.
+/// Tested state: the values of all slots of a model. If Predict is defined, the measurement slot of
+/// a sensor contains the result of Predict.
 struct CheckedState {
   Values values;
   bool defined = false;  ///< true: Predict or Step is defined at the state
@@ -41,7 +41,8 @@ class Context {
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Creates another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
-  /// Destroys `model` and records the destruction as a call. Error: kPlugin if the destruction throws.
+  /// Destroys `model` and records the destruction as a call. Error: kPlugin if the destruction
+  /// throws.
   void Destroy(std::unique_ptr<ModelUnderTest> model) const;
   /// Returns the inputs of `f` at a state.
   static Values Inputs(const Function& f, const CheckedState& state);

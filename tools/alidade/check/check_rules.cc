@@ -19,8 +19,8 @@ extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 namespace alidade::internal {
 namespace {
 
-/// Calls `test(function, state)` for each function at each state. A noise function is tested only at
-/// defined states. Returns the first failure, or "" if no test fails.
+/// Calls `test(function, state)` for each function at each state. A noise function is tested only
+/// at defined states. Returns the first failure, or "" if no test fails.
 template <class Test>
 std::string FirstFailure(Context& context, const Test& test) {
   for (const Function& f : context.model().functions) {

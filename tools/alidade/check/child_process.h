@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-/// Runs a function in a child process. If the function crashes, exits, hangs or exhausts memory, the
-/// program continues.
+/// Runs a function in a child process. If the function crashes, exits, hangs or exhausts memory,
+/// the program continues.
 namespace alidade::internal {
 
 /// Current call of a child process, stored in memory that is shared with the parent process. If the

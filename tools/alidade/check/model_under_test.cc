@@ -44,8 +44,8 @@ std::vector<int> FirstSlots(int count) {
   return slots;
 }
 
-/// Copies `root`, the n x n noise factor of the config, to `l`. Returns false if the config does not
-/// contain a factor.
+/// Copies `root`, the n x n noise factor of the config, to `l`. Returns false if the config does
+/// not contain a factor.
 bool CopyConfigNoise(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
   for (int i = 0; i < n && !root.empty(); ++i) std::copy_n(root.data() + i * n, n, l + i * stride);
   return !root.empty();

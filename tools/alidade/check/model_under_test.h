@@ -47,8 +47,8 @@ struct Shape {
   int rows, columns;
 };
 
-/// One function of the plugin ABI. The concatenated Jacobians are the derivatives of all outputs with
-/// respect to the first `differentiated` inputs, in tangent coordinates.
+/// One function of the plugin ABI. The concatenated Jacobians are the derivatives of all outputs
+/// with respect to the first `differentiated` inputs, in tangent coordinates.
 struct Function {
   std::string name;        ///< name in the C++ interface: `Predict`
   std::vector<int> slots;  ///< the inputs, as indices into ModelUnderTest::slots

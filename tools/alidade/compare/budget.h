@@ -37,8 +37,8 @@ struct PredictedCpuTime {
 
 /// Predicts the CPU time from the first ten frames. The experiment cannot be used afterwards. The
 /// cost of one solve of all data is assumed to be proportional to N, the number of frames. The cost
-/// of a solve at every frame is assumed to be proportional to N^2. Returns nullopt if the source does
-/// not report N, or if the run failed.
+/// of a solve at every frame is assumed to be proportional to N^2. Returns nullopt if the source
+/// does not report N, or if the run failed.
 std::optional<PredictedCpuTime> PredictCpuTime(Experiment& experiment);
 
 }  // namespace alidade::internal

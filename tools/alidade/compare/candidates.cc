@@ -35,9 +35,9 @@ std::string FolderName(const ComparedRun& run) {
       .string();
 }
 
-/// Moves the estimators out of the runs. If there are several runs, the folder of the run is prefixed
-/// to the name of each estimator. The prefix is the name of the folder if it is unique, otherwise
-/// the path.
+/// Moves the estimators out of the runs. If there are several runs, the folder of the run is
+/// prefixed to the name of each estimator. The prefix is the name of the folder if it is unique,
+/// otherwise the path.
 std::vector<Candidate> ExtractCandidates(std::vector<ComparedRun>& runs) {
   std::vector<Candidate> candidates;
   for (ComparedRun& run : runs) {
@@ -77,8 +77,8 @@ const Candidate* FindFirst(const std::vector<Candidate>& candidates,
 }
 
 /// Finds the batch that is the reference of `estimator`: the batch of all data if `smoothed`,
-/// otherwise the batch of the data up to each frame. A batch of all measurements has priority over a
-/// batch of the measurements that a filter accepted. If no batch of the same problem is usable, a
+/// otherwise the batch of the data up to each frame. A batch of all measurements has priority over
+/// a batch of the measurements that a filter accepted. If no batch of the same problem is usable, a
 /// usable batch with the same sensors but other overrides (for example a robust loss) is returned.
 const Candidate* FindBatch(const Candidate& estimator, const std::vector<Candidate>& candidates,
                            bool smoothed) {
@@ -246,8 +246,8 @@ bool NeedsNoTruth(const std::string& key) {
   return metric != nullptr && !metric->needs_truth;
 }
 
-/// Adds the mean CPU time for a frame. For a batch of all data, the time of the filter from which the
-/// batch starts is a separate value.
+/// Adds the mean CPU time for a frame. For a batch of all data, the time of the filter from which
+/// the batch starts is a separate value.
 void AddCpuTime(const Candidate& estimator, ComparedEstimator& compared) {
   const internal::CpuTime& cpu = estimator.cpu;
   const auto frames = static_cast<double>(estimator.run->frames);

@@ -29,9 +29,9 @@ inline bool SmoothsAllData(const EstimatorResult& result) {
 [[noreturn]] void RefuseFilter(const std::string& name, bool is_estimator,
                                const std::vector<std::string>& filters);
 
-/// Computes the distances in m over the landmarks that both maps contain. `map` is the RMS difference
-/// of the positions. `map.sim3` is the RMS difference after alignment by the similarity that
-/// minimises this difference [Umeyama1991].
+/// Computes the distances in m over the landmarks that both maps contain. `map` is the RMS
+/// difference of the positions. `map.sim3` is the RMS difference after alignment by the similarity
+/// that minimises this difference [Umeyama1991].
 std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
                                                   const EstimatorResult& reference);
 

@@ -13,23 +13,23 @@
 #include "alidade/sweep/sweep.h"
 
 /// Comparison of estimators over the same data, and decomposition of their differences
-/// (docs/compare.md). The reference of each estimator is a batch of the same data. A filter uses past
-/// data only, so it is not compared with a smoother of all data.
+/// (docs/compare.md). The reference of each estimator is a batch of the same data. A filter uses
+/// past data only, so it is not compared with a smoother of all data.
 namespace alidade {
 
 /// Options of a comparison.
 struct CompareOptions {
-  /// Reference of the errors: `truth`, or the name of an estimator. If it is empty, the reference is
-  /// truth if it is known, otherwise the batch.
+  /// Reference of the errors: `truth`, or the name of an estimator. If it is empty, the reference
+  /// is truth if it is known, otherwise the batch.
   std::string reference;
   std::string filter;  ///< the filter whose error is decomposed; "": the first filter
   /// True: the error decomposition is computed, and missing estimators are added to the config.
   bool decompose = true;
   /// True: the comparison is over several seeds. The source is read once for each seed.
   bool over_seeds = false;
-  /// Time budget, s. Over seeds, a run other than the first is not started if it would end after the
-  /// budget (wall clock). For a single run, the CPU time of each estimator is predicted from the
-  /// first frames. An estimator is not added if the sum of these times would exceed the budget.
+  /// Time budget, s. Over seeds, a run other than the first is not started if it would end after
+  /// the budget (wall clock). For a single run, the CPU time of each estimator is predicted from
+  /// the first frames. An estimator is not added if the sum of these times would exceed the budget.
   std::optional<double> budget_s = {};
 };
 
@@ -76,10 +76,10 @@ enum class DecompositionKind {
 /// Returns `linearisation`, `smoothing` or `rejected_measurements`.
 const char* ToString(DecompositionKind kind);
 
-/// One step from the filter to the batch. `rmsd:BLOCK` and `rmsd.sigmas:OWNER` are differences between
-/// the two estimators. `rmse.from:BLOCK` and `rmse.to:BLOCK` are the RMSE of `estimator` and
-/// `reference` relative to truth. Only kRejected has the values `measurements` and `rejected`. If
-/// `at_end` is true, the values are those of the last frame, and BLOCK may also be `map` or
+/// One step from the filter to the batch. `rmsd:BLOCK` and `rmsd.sigmas:OWNER` are differences
+/// between the two estimators. `rmse.from:BLOCK` and `rmse.to:BLOCK` are the RMSE of `estimator`
+/// and `reference` relative to truth. Only kRejected has the values `measurements` and `rejected`.
+/// If `at_end` is true, the values are those of the last frame, and BLOCK may also be `map` or
 /// `map.sim3`.
 struct DecompositionStep {
   DecompositionKind kind = DecompositionKind::kLinearisation;
@@ -111,25 +111,25 @@ struct ComparedExperiment {
   std::string filter;              ///< filter whose error is decomposed; "": no filter
   std::vector<std::string> added;  ///< names of the added estimators
   std::vector<std::string> notes;  ///< added estimators; estimators left out, with the reason
-  /// Note for steps that lack an estimator because of the budget. It is empty if the budget does not
-  /// exclude an estimator.
+  /// Note for steps that lack an estimator because of the budget. It is empty if the budget does
+  /// not exclude an estimator.
   std::string beyond_budget = {};
 };
 
-/// Builds the experiment of a config and adds the estimators that the comparison needs: the batch of
-/// all data, the full-information filter, the batch of the accepted measurements, and the smoother.
-/// Each of these has the sensors, overrides and steps of the filter. An estimator is left out if it
-/// does not support the problem, or if it would exceed the budget of a single run. Errors: those of
-/// BuildExperiment(); kUsage if an estimator in `options` does not exist, or if `options.filter` is
-/// not an online filter.
+/// Builds the experiment of a config and adds the estimators that the comparison needs: the batch
+/// of all data, the full-information filter, the batch of the accepted measurements, and the
+/// smoother. Each of these has the sensors, overrides and steps of the filter. An estimator is left
+/// out if it does not support the problem, or if it would exceed the budget of a single run.
+/// Errors: those of BuildExperiment(); kUsage if an estimator in `options` does not exist, or if
+/// `options.filter` is not an online filter.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
                                            const CompareOptions& options);
 
 /// Observer that compares the estimators of a run.
 class RunComparer : public RunObserver {
  public:
-  /// Adds a CPU clock to each estimator of the experiment. If `over_seeds`, the run is one of several
-  /// seeds, and the errors at each timestamp are recorded.
+  /// Adds a CPU clock to each estimator of the experiment. If `over_seeds`, the run is one of
+  /// several seeds, and the errors at each timestamp are recorded.
   explicit RunComparer(Experiment& experiment, bool over_seeds = false);
   ~RunComparer() override;
   RunComparer(const RunComparer&) = delete;
@@ -138,8 +138,8 @@ class RunComparer : public RunObserver {
   void OnFrame(const SourceFrame& frame) override;
   void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
-  /// Returns the comparison. Call this function once, after the run. Error: kUsage if an estimator in
-  /// `options` does not exist.
+  /// Returns the comparison. Call this function once, after the run. Error: kUsage if an estimator
+  /// in `options` does not exist.
   Comparison Finish(const RunResult& result, const CompareOptions& options);
 
  private:
@@ -147,9 +147,9 @@ class RunComparer : public RunObserver {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Compares the estimators of finished runs, which are read from their folders. If there are several
-/// folders, the names are `FOLDER/NAME`. Errors: kUsage if a folder is given twice; kInputMissing;
-/// kBadData if the runs have different measurements; those of RunComparer.
+/// Compares the estimators of finished runs, which are read from their folders. If there are
+/// several folders, the names are `FOLDER/NAME`. Errors: kUsage if a folder is given twice;
+/// kInputMissing; kBadData if the runs have different measurements; those of RunComparer.
 Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
                           const CompareOptions& options);
 
@@ -159,13 +159,13 @@ struct ComparedSeeds {
   SweepResult sweep;
   std::int64_t beyond_budget = 0;  ///< number of runs that the budget excludes
 };
-/// Runs a config once for each seed, and compares the estimators. The values of an estimator exclude
-/// the runs in which that estimator diverged. Errors: those of Sweep and of RunComparer.
+/// Runs a config once for each seed, and compares the estimators. The values of an estimator
+/// exclude the runs in which that estimator diverged. Errors: those of Sweep and of RunComparer.
 ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options);
 
-/// Summarises at least one comparison of the same estimators. Computes the mean and the quantiles of
-/// each value, and the statistics over all runs.
+/// Summarises at least one comparison of the same estimators. Computes the mean and the quantiles
+/// of each value, and the statistics over all runs.
 Comparison Summarise(const std::vector<Comparison>& comparisons);
 
 /// Writes report.html of a comparison over several seeds, the figures of errors, average NEES and

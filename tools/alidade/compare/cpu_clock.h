@@ -16,8 +16,8 @@ struct CpuTime {
   double smoothing_s = 0.0;  ///< time after the last frame; excludes the receiver of the estimates
 };
 
-/// Returns `estimator` with a clock that adds the CPU time to `time`. The estimates do not change. A
-/// clone of the estimator has no clock.
+/// Returns `estimator` with a clock that adds the CPU time to `time`. The estimates do not change.
+/// A clone of the estimator has no clock.
 std::unique_ptr<Estimator> WithCpuClock(std::unique_ptr<Estimator> estimator,
                                         std::shared_ptr<CpuTime> time);
 

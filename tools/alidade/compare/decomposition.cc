@@ -45,8 +45,8 @@ StepEstimators FindStepEstimators(const Candidate& filter,
   return found;
 }
 
-/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`. If `at_end`, the subject is BLOCK of
-/// `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step does not compare the metric.
+/// Returns the subject of an error metric: BLOCK of `rmse:BLOCK`. If `at_end`, the subject is BLOCK
+/// of `final_error:BLOCK`, `map` or `map.sim3`. Returns "" if a step does not compare the metric.
 std::string SubjectOf(const std::string& metric, bool at_end) {
   if (at_end && metric == "map.rmse") return "map";
   if (at_end && metric == "map.sim3.rmse") return "map.sim3";

@@ -25,8 +25,8 @@ struct Distance {
 /// geometry.
 Distance DistanceBetween(const Series& series, const Series& reference);
 
-/// Aligns the trajectories of a block in two series. Returns nullopt if the block is not a vector of
-/// three elements, or if the points do not determine a similarity.
+/// Aligns the trajectories of a block in two series. Returns nullopt if the block is not a vector
+/// of three elements, or if the points do not determine a similarity.
 std::optional<SimilarityFit> AlignTrajectories(const Series& series, const Series& reference,
                                                const std::string& block);
 

@@ -12,17 +12,17 @@
 
 namespace alidade::internal {
 
-/// Recorder of the errors of one estimator during a run. For an online estimator it also records the
-/// CramerRaoBound, a lower bound of the mean square error of any online estimator. In a long run it
-/// retains only every n-th timestamp, n a power of two, to limit the memory.
+/// Recorder of the errors of one estimator during a run. For an online estimator it also records
+/// the CramerRaoBound, a lower bound of the mean square error of any online estimator. In a long
+/// run it retains only every n-th timestamp, n a power of two, to limit the memory.
 class ErrorRecorder {
  public:
   static constexpr std::size_t kMaxTimestamps = 2048;
 
   ErrorRecorder(const EstimatorSpec& spec, const Experiment& experiment);
   void Add(const SourceFrame& frame, const State& state);
-  /// Returns the recorded errors and the mean ratios to the bound. Call this function once, after the
-  /// run.
+  /// Returns the recorded errors and the mean ratios to the bound. Call this function once, after
+  /// the run.
   ErrorSeries Finish();
 
  private:

@@ -122,8 +122,8 @@ void AppendRow(Series& series, const EstimateCells& cells, const std::vector<dou
   for (const std::size_t cell : cells.sigmas) series.covariances.push_back(row[cell] * row[cell]);
 }
 
-/// Reads estimates.csv. Returns the number of rows that contain a value that is not finite. An empty
-/// cell, which represents a missing value, does not count.
+/// Reads estimates.csv. Returns the number of rows that contain a value that is not finite. An
+/// empty cell, which represents a missing value, does not count.
 std::int64_t ReadEstimates(const fs::path& file, const EstimateCells& cells, std::int64_t rows,
                            Series& series) {
   std::int64_t not_finite = 0;

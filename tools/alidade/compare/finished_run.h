@@ -51,9 +51,9 @@ struct ComparedRun {
 /// the files do not match.
 ComparedRun ReadRun(const std::filesystem::path& folder);
 
-/// Refuses runs whose measurements have different hashes. Returns notes on other differences between
-/// the runs: different truths, or different settings that concern all estimators. Error: kBadData
-/// with both folders, both hashes and the first timestamp that differs.
+/// Refuses runs whose measurements have different hashes. Returns notes on other differences
+/// between the runs: different truths, or different settings that concern all estimators. Error:
+/// kBadData with both folders, both hashes and the first timestamp that differs.
 std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs);
 
 }  // namespace alidade::internal

@@ -12,8 +12,8 @@
 namespace alidade::internal {
 
 /// Value in a JSON file, with the file name and the key path for messages; the counterpart of Node.
-/// The parsed JSON value must outlive the JsonNode. Errors: kBadData with the file, the key path and
-/// the expected value.
+/// The parsed JSON value must outlive the JsonNode. Errors: kBadData with the file, the key path
+/// and the expected value.
 class JsonNode {
  public:
   JsonNode(const Json& json, std::string file) : json_(&json), file_(std::move(file)) {}

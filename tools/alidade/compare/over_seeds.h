@@ -18,8 +18,8 @@ namespace alidade {
 struct Ratio {
   double error = 0.0, reference_error = 0.0;
   std::int64_t runs = 1;
-  /// Interval that contains the ratio with probability 0.95, computed by a paired bootstrap over the
-  /// runs. It is nullopt for a single run.
+  /// Interval that contains the ratio with probability 0.95, computed by a paired bootstrap over
+  /// the runs. It is nullopt for a single run.
   std::optional<Interval> interval = {};
 
   double value() const { return error / reference_error; }
@@ -56,8 +56,8 @@ struct ErrorSeries {
   std::string no_bound_reason = {};  ///< reason why there is no bound; "" if there is a bound
 };
 
-/// Errors of one estimator at each timestamp, over N runs. N is at least two, and may differ between
-/// timestamps.
+/// Errors of one estimator at each timestamp, over N runs. N is at least two, and may differ
+/// between timestamps.
 struct OverTime {
   /// Error of one block at each timestamp.
   struct Error {
@@ -83,8 +83,8 @@ struct OverTime {
   std::map<std::string, AverageNees> nees;  ///< by owner; NaN if unknown
 };
 
-/// Computes the statistics of runs with the same blocks. Uses only timestamps that occur in at least
-/// two runs.
+/// Computes the statistics of runs with the same blocks. Uses only timestamps that occur in at
+/// least two runs.
 OverTime ComputeOverTime(const std::vector<const ErrorSeries*>& runs);
 
 }  // namespace alidade

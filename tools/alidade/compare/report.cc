@@ -83,8 +83,8 @@ std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKin
   return sorted_rows;
 }
 
-/// Returns rows with the mean, and for several runs with [p05, p95]. The three numbers are formatted
-/// as columns of one table, so all numbers of a row have the same unit.
+/// Returns rows with the mean, and for several runs with [p05, p95]. The three numbers are
+/// formatted as columns of one table, so all numbers of a row have the same unit.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
   RunResult result;
@@ -121,8 +121,8 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// Adds the references of the columns to a table. If all references are equal, their name is added to
-/// the title, otherwise a row is added.
+/// Adds the references of the columns to a table. If all references are equal, their name is added
+/// to the title, otherwise a row is added.
 void AppendReferences(const std::vector<std::string>& references, Section& section) {
   std::set<std::string> distinct(references.begin(), references.end());
   distinct.erase("");
@@ -136,8 +136,8 @@ void AppendReferences(const std::vector<std::string>& references, Section& secti
   }
 }
 
-/// Returns the table of estimators with their references. If the reference is missing in some runs, a
-/// row reports the number of runs with a reference.
+/// Returns the table of estimators with their references. If the reference is missing in some runs,
+/// a row reports the number of runs with a reference.
 Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
                 const std::string& title, std::string ComparedEstimator::*reference,
                 std::int64_t ComparedEstimator::*reference_runs,
@@ -164,7 +164,8 @@ Section TableOf(const std::vector<ComparedEstimator>& estimators, bool several,
   return section;
 }
 
-/// Returns the rows of a section. The main rows are errors if truth is known, otherwise differences.
+/// Returns the rows of a section. The main rows are errors if truth is known, otherwise
+/// differences.
 std::vector<RowKind> KindsOf(const Comparison& comparison, MetricSection section, ReportRows rows) {
   const bool has_cpu_time = std::ranges::any_of(
       comparison.estimators,
@@ -251,8 +252,8 @@ std::map<std::string, Spread> WithKind(const std::map<std::string, Spread>& valu
   return found;
 }
 
-/// Formats the distances in sigmas in descending order, as in `0.06 (target)`. Sets `largest` to the
-/// largest distance.
+/// Formats the distances in sigmas in descending order, as in `0.06 (target)`. Sets `largest` to
+/// the largest distance.
 std::string DistancesText(const DecompositionStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
   const std::string kind = "rmsd.sigmas:";

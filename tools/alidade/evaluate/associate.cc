@@ -21,8 +21,9 @@ double DoubleSeconds(Timestamp timestamp) {
   return static_cast<double>(static_cast<long double>(timestamp) / 1e9L);
 }
 
-/// Returns |a - b|, computed with doubles as in evo. The resolution is 0.2 us for a clock that counts
-/// from 1970. If a timestamp lies midway between two others, the same one is nearer as in evo.
+/// Returns |a - b|, computed with doubles as in evo. The resolution is 0.2 us for a clock that
+/// counts from 1970. If a timestamp lies midway between two others, the same one is nearer as in
+/// evo.
 double TimeDistance(Timestamp a, Timestamp b) {
   return std::abs(DoubleSeconds(a) - DoubleSeconds(b));
 }

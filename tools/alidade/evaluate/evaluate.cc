@@ -14,8 +14,8 @@
 namespace alidade {
 namespace {
 
-/// Returns the axes with a positive variance in at least one pose. A planar pose has fewer than 3 such
-/// axes.
+/// Returns the axes with a positive variance in at least one pose. A planar pose has fewer than 3
+/// such axes.
 std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {

@@ -15,8 +15,8 @@
 
 namespace alidade {
 
-/// Transformation that is applied to the estimate before errors are computed. It fits the positions of
-/// the estimate to those of the reference by least squares [Umeyama1991].
+/// Transformation that is applied to the estimate before errors are computed. It fits the positions
+/// of the estimate to those of the reference by least squares [Umeyama1991].
 enum class Alignment {
   kNone,
   kScale,   ///< only the scale of kSim3, no rotation or translation
@@ -31,9 +31,9 @@ const char* ToString(Alignment alignment);
 /// Transforms the trajectory to the world of the reference. The result has no covariances.
 Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate);
 
-/// Computes the transformation of `estimate` to `reference` from the first `poses` poses of both (0:
-/// all poses). Pose i of both trajectories must match. Errors: kBadData if there are fewer than 3
-/// poses. For a scale also kBadData if all positions are at one point or are uncorrelated.
+/// Computes the transformation of `estimate` to `reference` from the first `poses` poses of both
+/// (0: all poses). Pose i of both trajectories must match. Errors: kBadData if there are fewer than
+/// 3 poses. For a scale also kBadData if all positions are at one point or are uncorrelated.
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses = 0);
 
@@ -46,11 +46,11 @@ struct Matches {
 /// Matches each pose of the shorter trajectory with the nearest pose in time of the longer
 /// trajectory, if their times differ by at most `max_diff`. If two poses are equally near, the
 /// earlier one is used. If both trajectories are equally long, the estimate counts as the shorter
-/// one. Several poses may match the same pose, as in evo. `offset` is added to the timestamps of the
-/// estimate. Poses are matched by row if neither trajectory has timestamps. Two KITTI files are
+/// one. Several poses may match the same pose, as in evo. `offset` is added to the timestamps of
+/// the estimate. Poses are matched by row if neither trajectory has timestamps. Two KITTI files are
 /// matched by row unless both have timestamps.
-/// Errors: kBadData if no poses match, if trajectories to match by row differ in length, if only one
-/// trajectory has timestamps, or if the offset is out of the range of a timestamp.
+/// Errors: kBadData if no poses match, if trajectories to match by row differ in length, if only
+/// one trajectory has timestamps, or if the offset is out of the range of a timestamp.
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Timestamp max_diff,
                   Timestamp offset);
 
@@ -87,11 +87,11 @@ struct PairOptions {
 };
 /// Returns pairs (i, j), i < j, of poses of the estimate.
 /// Consecutive pairs: a pair ends at the first pose that is at least delta after the start of the
-/// pair. Metres are measured along the trajectory, and angles are accumulated. In metres, as in evo,
-/// the first pair starts at the first pose that is at least delta after the first pose.
+/// pair. Metres are measured along the trajectory, and angles are accumulated. In metres, as in
+/// evo, the first pair starts at the first pose that is at least delta after the first pose.
 /// All pairs: for each i, j is the pose whose distance from i is nearest to delta. For angles, j is
-/// each pose whose rotation from i is within the tolerance of delta. Error: kBadData if there are no
-/// pairs.
+/// each pose whose rotation from i is within the tolerance of delta. Error: kBadData if there are
+/// no pairs.
 std::vector<std::pair<int, int>> PairsOf(const Trajectory& estimate, const PairOptions& options);
 
 /// Statistics of n errors e: rmse = sqrt(mean e^2), std = sqrt(mean (e - mean e)^2), sse = sum e^2.

@@ -6,9 +6,9 @@
 
 #include "alidade/evaluate/evaluate.h"
 
-/// Reports of evaluations. Each report includes the alignment, the scale of the alignment, the number
-/// of matched and possible poses, and the time tolerance. An evaluation with an error has the entry
-/// `failed`.
+/// Reports of evaluations. Each report includes the alignment, the scale of the alignment, the
+/// number of matched and possible poses, and the time tolerance. An evaluation with an error has
+/// the entry `failed`.
 namespace alidade {
 
 /// Returns a text for a terminal. For one evaluation it contains all statistics, for several

@@ -51,8 +51,8 @@ double Median(std::vector<double> values) {
 
 /// Determines the unit of timestamps from the median t of their values and the median d of their
 /// differences. The unit is the first of s, ms, us and ns that is plausible for a clock that counts
-/// from 1970. If there is none, it is the first that is plausible for a clock that counts from any
-/// start:
+/// from 1970. If no unit is plausible, it is the first that is plausible for a clock that counts
+/// from any start:
 ///
 ///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
 ///   from any start           t < 9.2e9 s,   d < 1000 s for the unit s, otherwise d < 2 s
@@ -214,8 +214,8 @@ class TrajectoryReader {
     }
   }
 
-  /// Warns if the trajectory starts at the origin, and the first orientation is the identity only in
-  /// the other order of quaternions.
+  /// Warns if the trajectory starts at the origin, and the first orientation is the identity only
+  /// in the other order of quaternions.
   void CheckFirstQuaternion() {
     if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
     const Trajectory reordered = trajectory_.Select({0}).WithOtherQuaternionOrder();
@@ -282,7 +282,8 @@ std::filesystem::path DedicatedTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
 
-/// Finds the timestamp file in the folder of a KITTI file. Returns an empty path if it does not exist.
+/// Finds the timestamp file in the folder of a KITTI file. Returns an empty path if it does not
+/// exist.
 std::filesystem::path FindTimes(const std::filesystem::path& file) {
   for (const std::filesystem::path& name :
        {DedicatedTimes(file), std::filesystem::path("times.txt")}) {

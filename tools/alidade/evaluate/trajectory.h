@@ -15,8 +15,8 @@ namespace alidade {
 ///
 ///   kTum    t x y z qx qy qz qw                t in s; separated by blanks
 ///   kTum    t x y z qx qy qz qw Pr11 Pr12 Pr13 Pr22 Pr23 Pr33 Pt11 Pt12 Pt13 Pt22 Pt23 Pt33
-///                                              covariances of rotation, rad^2, in the body frame, and
-///                                              of position, m^2, in the world frame
+///                                              covariances of rotation, rad^2, in the body frame,
+///                                              and of position, m^2, in the world frame
 ///   kKitti  r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z    no timestamp
 ///   kEuroc  t,x,y,z,qw,qx,qy,qz[,...]          t in ns, 8 or 17 columns; separated by commas
 enum class TrajectoryFormat { kDetect, kTum, kKitti, kEuroc };
@@ -73,16 +73,16 @@ struct TrajectoryFile {
 };
 
 /// Finds the reference. `path` is the reference file itself, a folder with truth.tum or
-/// groundtruth.tum, or an EuRoC sequence with state_groundtruth_estimate0. Error: kInputMissing if a
-/// folder does not contain a reference.
+/// groundtruth.tum, or an EuRoC sequence with state_groundtruth_estimate0. Error: kInputMissing if
+/// a folder does not contain a reference.
 TrajectoryFile ReferenceAt(const std::filesystem::path& path);
 
 /// Finds truth.tum of a run. `path` is the run folder or the folder of an estimator in it. Errors:
 /// kInputMissing if truth.tum does not exist; kUsage if `path` is not a folder.
 TrajectoryFile TruthOf(const std::filesystem::path& path);
 
-/// Finds the estimated trajectories. `path` is a trajectory file, a run folder with one trajectory for
-/// each estimator, or the folder of an estimator. Files with covariances are preferred. Error:
+/// Finds the estimated trajectories. `path` is a trajectory file, a run folder with one trajectory
+/// for each estimator, or the folder of an estimator. Files with covariances are preferred. Error:
 /// kInputMissing if a folder does not contain a trajectory.
 std::vector<TrajectoryFile> EstimatesAt(const std::filesystem::path& path);
 

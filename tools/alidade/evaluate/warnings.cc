@@ -53,8 +53,8 @@ bool IsNamedLikeTruth(const std::string& file) {
   return false;
 }
 
-/// Difference between the orientations of two trajectories in the same world: a common turn d of the
-/// body, ref = est Exp(d), and the rms deviation of the poses from this turn.
+/// Difference between the orientations of two trajectories in the same world: a common turn d of
+/// the body, ref = est Exp(d), and the rms deviation of the poses from this turn.
 struct BodyTurn {
   double turn_deg, spread_deg;
 };

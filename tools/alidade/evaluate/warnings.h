@@ -9,8 +9,8 @@
 namespace alidade::internal {
 
 /// Returns warnings of conditions under which the results of an evaluation are misleading.
-/// `reference` and `estimate` are the trajectories as read from files. `matches` contains the indices
-/// of the evaluated poses.
+/// `reference` and `estimate` are the trajectories as read from files. `matches` contains the
+/// indices of the evaluated poses.
 std::vector<std::string> EvaluationWarnings(const Evaluation& evaluation, const Matches& matches,
                                             const Trajectory& reference,
                                             const Trajectory& estimate);

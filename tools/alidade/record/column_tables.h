@@ -15,11 +15,11 @@
 #include "alidade/record/recorded_run.h"
 #include "alidade/state/element_names.h"
 
-/// Columns of the csv files of a run folder, one table for each file. To add a column, add an entry
-/// to the table.
+/// Columns of the csv files of a run folder. There is one table for each file. To add a column, add
+/// an entry to the table.
 namespace alidade::internal {
 
-/// Returns columns with a letter and a number: `v0`, `v1` and so on.
+/// Returns columns whose names are a letter and a number: `v0`, `v1` and so on.
 inline std::vector<Column> NumberedColumns(const std::string& letter, std::size_t count) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < count; ++i) columns.push_back({letter + std::to_string(i), "", ""});
@@ -34,7 +34,7 @@ inline void WriteFinite(double value, CsvFile& file) {
 // measurements.csv
 
 struct MeasurementLayout {
-  std::size_t width, known_width;  ///< numbers of columns, from the widest stream
+  std::size_t width, known_width;  ///< numbers of columns that the widest stream needs
 };
 struct MeasurementRow {
   const Measurement& measurement;
@@ -52,7 +52,8 @@ inline constexpr std::array kMeasurementColumns =
          [](const auto&, const MeasurementRow& row, CsvFile& file) {
            file.Landmark(row.measurement.landmark);
          }},
-        {"v", "of the stream", "the values; as many columns as the widest stream needs",
+        {"v", "of the stream",
+         "values of the measurement; the widest stream determines the number of columns",
          [](const MeasurementLayout& layout, const MeasurementRow& row, CsvFile& file) {
            file.Numbers(row.measurement.values.data(), row.measurement.values.size(), layout.width);
          },
@@ -78,7 +79,7 @@ struct TruthLayout {
 inline constexpr std::array kTruthColumns = std::to_array<ColumnInfo<TruthLayout, SourceFrame>>({
     {"t_s", "s", "timestamp of the frame",
      [](const auto&, const SourceFrame& frame, CsvFile& file) { file.Time(frame.timestamp); }},
-    {"truth", "of the block", "each element of each truth, with the names of the source",
+    {"truth", "of the block", "each element of each truth; the source provides the names",
      [](const TruthLayout& layout, const SourceFrame& frame, CsvFile& file) {
        for (std::size_t t = 0; t < layout.truths.size(); ++t) {
          const auto size = static_cast<std::size_t>(layout.truths[t].size);
@@ -114,7 +115,7 @@ inline constexpr std::array kExpectedColumns =
          [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Time(row.timestamp); }},
         {"stream", "", "stream of the source",
          [](const auto&, const ExpectedRow& row, CsvFile& file) { file.Text(row.stream); }},
-        {"v", "of the stream", "h at truth",
+        {"v", "of the stream", "prediction h at the true state",
          [](const ExpectedLayout& layout, const ExpectedRow& row, CsvFile& file) {
            file.Numbers(row.values.data(), row.values.size(), layout.width);
          },
@@ -145,7 +146,8 @@ inline constexpr std::array kImpliedColumns = std::to_array<ColumnInfo<ImpliedLa
      [](const ImpliedLayout& layout) { return layout.blocks; }, "`block`"},
 });
 
-// NAME/estimates.csv and NAME/errors.csv: the timestamp, then the entries below for each block.
+// NAME/estimates.csv and NAME/errors.csv. The first column is the timestamp. The columns below
+// follow for each block.
 
 inline const Column kTimeColumn{"t_s", "s", "t_s"};
 
@@ -162,19 +164,20 @@ struct BlockRow {
   const SourceFrame& frame;
   const State& state;
 
-  /// Returns the truth of a block; null if it is unknown.
+  /// Returns the truth of a block. Returns null if the truth is unknown.
   const double* TruthOf(const BlockLayout& block) const {
     const auto truth = static_cast<std::size_t>(block.truth);
     const bool is_known = truth < frame.truth.size() && !frame.truth[truth].empty();
     return is_known ? frame.truth[truth].data() : nullptr;
   }
-  /// Returns the value of a block; empty if the block has no value.
+  /// Returns the value of a block. The result is empty if the block has no value.
   std::vector<double> ValuesOf(const BlockLayout& block) const {
     if (!state.layout()[block.id].present) return {};
     const double* const values = state.value(block.id);
     return {values, values + block.ambient()};
   }
-  /// Returns e = x (-) x_true in the tangent space at x; empty if x or x_true is unknown.
+  /// Returns e = x (-) x_true in the tangent space at x. The result is empty if x or x_true is
+  /// unknown.
   std::vector<double> ErrorOf(const BlockLayout& block) const {
     const double* const truth = TruthOf(block);
     if (truth == nullptr || !state.layout()[block.id].present) return {};
@@ -183,7 +186,7 @@ struct BlockRow {
     for (double& element : error) element = 0.0 - element;
     return error;
   }
-  /// Returns sqrt(P_ii); empty if the block has no covariance.
+  /// Returns sqrt(P_ii). The result is empty if the block has no covariance.
   std::vector<double> SigmasOf(const BlockLayout& block) const {
     const Block& state_block = state.layout()[block.id];
     std::vector<double> sigmas;
@@ -198,7 +201,7 @@ struct BlockRow {
 std::vector<BlockLayout> BlockLayoutsOf(const Problem& problem,
                                         const std::vector<StreamInfo>& truths);
 
-/// Columns of one quantity in a file that has them for each block.
+/// Columns of one quantity, such as `sigma`, in a file that repeats these columns for each block.
 struct BlockColumnInfo {
   const char* quantity;
   const char* names;                         ///< names of the columns, for the documentation
@@ -207,10 +210,11 @@ struct BlockColumnInfo {
   std::size_t (BlockLayout::*size)() const;  ///< number of columns
   std::vector<Column> (*columns)(const BlockLayout& block);
   std::vector<double> (*numbers)(const BlockLayout& block,
-                                 const BlockRow& row);  ///< empty: empty cells
+                                 const BlockRow& row);  ///< empty result: empty cells
 };
 
-/// Returns a column for each tangent element of a block. Its name is `prefix` and the element.
+/// Returns a column for each tangent element of a block. The name of a column is `prefix` and the
+/// element.
 inline std::vector<Column> TangentColumns(const BlockLayout& block, const std::string& prefix) {
   std::vector<Column> columns;
   for (const std::string& name : TangentNames(block.name, block.space)) {
@@ -347,7 +351,8 @@ struct GainLayout {
 struct GainRow {
   Timestamp timestamp;
   const std::string& sensor;
-  const std::vector<const double*>& cells;  ///< by element; null: element of another sensor
+  const std::vector<const double*>&
+      cells;  ///< one for each element; null: element of another sensor
 };
 inline constexpr std::array kGainColumns = std::to_array<ColumnInfo<GainLayout, GainRow>>({
     {"t_s", "s", "timestamp of the frame",
@@ -391,7 +396,7 @@ inline constexpr std::array kReprojectionColumns =
     });
 
 inline constexpr std::array kEventColumns = std::to_array<ColumnInfo<NoLayout, Event>>({
-    {"t_s", "s", "timestamp of the frame; empty for the whole run",
+    {"t_s", "s", "timestamp of the frame; empty if the event concerns the whole run",
      [](const auto&, const Event& event, CsvFile& file) { file.Time(event.timestamp); }},
     {"kind", "", "kind of the event, see [Events](run_folder.md#events)",
      [](const auto&, const Event& event, CsvFile& file) { file.Text(ToString(event.kind)); }},
@@ -403,15 +408,16 @@ inline constexpr std::array kLandmarkColumns =
     std::to_array<ColumnInfo<NoLayout, LandmarkEstimate>>({
         {"id", "", "id of the measurements",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Integer(landmark.id); }},
-        {"generation", "", "number of landmarks of this id that were deleted before",
+        {"generation", "", "number of earlier landmarks with this id, which were deleted",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Integer(landmark.generation);
          }},
-        {"representation", "", "representation in the state; empty if the sensor defines its own",
+        {"representation", "",
+         "representation in the state; empty if the sensor defines its own representation",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Text(landmark.representation ? ToString(*landmark.representation) : "");
          }},
-        {"x", "m", "position in the world",
+        {"x", "m", "position in the world frame",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[0], file); }},
         {"y", "m", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.position[1], file); }},
@@ -452,11 +458,11 @@ inline constexpr std::array kLandmarkColumns =
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(0, 2), file); }},
         {"cov_yz", "m^2", "",
          [](const auto&, const auto& l, CsvFile& file) { WriteFinite(l.covariance(1, 2), file); }},
-        {"status", "", "`kept`: in the state at the end; `removed`: removed before",
+        {"status", "", "`kept`: in the final state; `removed`: removed during the run",
          [](const auto&, const auto& landmark, CsvFile& file) {
            file.Text(landmark.removed == kNoTimestamp ? "kept" : "removed");
          }},
-        {"removed_s", "s", "timestamp of the removal; empty if it was not removed",
+        {"removed_s", "s", "timestamp of the removal; empty if the landmark was not removed",
          [](const auto&, const auto& landmark, CsvFile& file) { file.Time(landmark.removed); }},
     });
 
@@ -465,7 +471,7 @@ struct TimingLayout {
 };
 struct TimingRow {
   Timestamp timestamp;
-  const std::vector<std::optional<double>>& wall_s;  ///< by estimator
+  const std::vector<std::optional<double>>& wall_s;  ///< one for each estimator
 };
 inline constexpr std::array kTimingColumns = std::to_array<ColumnInfo<TimingLayout, TimingRow>>({
     {"t_s", "s", "timestamp of the frame",

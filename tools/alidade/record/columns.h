@@ -15,16 +15,16 @@ namespace alidade::internal {
 struct Column {
   std::string name;
   std::string unit;          ///< "" if there is no unit, or if it depends on the row
-  std::string quantity;      ///< ColumnInfo::quantity of its entry
-  std::string subject = {};  ///< block, sensor or estimator of the column, or ""
+  std::string quantity;      ///< ColumnInfo::quantity of the entry in the table
+  std::string subject = {};  ///< block, sensor or estimator of the column; may be empty
 };
 
-/// Entry in the column table of a file: a single column, or several columns of one quantity.
-/// `Layout` determines the columns, `Row` their cells.
+/// Entry in the column table of a file: a single column, or several columns of one quantity. A
+/// `Layout` determines the columns, a `Row` the cells.
 template <class Layout, class Row>
 struct ColumnInfo {
-  const char* quantity;  ///< also the name of a single column
-  const char* unit;      ///< unit of a single column; of several columns for the documentation
+  const char* quantity;  ///< quantity, and name of a single column
+  const char* unit;      ///< unit of a single column; otherwise only for the documentation
   const char* meaning;   ///< for the documentation, in Markdown
   void (*write)(const Layout& layout, const Row& row, CsvFile& file);
   std::vector<Column> (*columns)(const Layout& layout) = nullptr;  ///< null: a single column
@@ -57,13 +57,13 @@ void WriteCells(const std::array<ColumnInfo<Layout, Row>, n>& table, const Layou
 /// Columns of all csv files of a run folder, by file name. `columns.json` contains them.
 using RunColumns = std::map<std::string, std::vector<Column>>;
 
-/// Creates a csv file with these columns and adds them to `run_columns`. Errors: kCannotCreate,
-/// kIo.
+/// Creates a csv file with `columns`, and adds these columns to `run_columns`. Errors:
+/// kCannotCreate, kIo.
 CsvFile CreateCsv(const OutputFolder& folder, const std::string& name, std::vector<Column> columns,
                   RunColumns& run_columns);
 
-/// Returns the text of `columns.json`: FILE: [{name, unit, quantity, subject}, ...]. The keys
-/// `unit` and `subject` are omitted if they are "".
+/// Returns the text of `columns.json`. Its entries are FILE: [{name, unit, quantity, subject},
+/// ...]. The keys `unit` and `subject` are omitted if their values are empty.
 std::string ColumnsJson(const RunColumns& run_columns);
 
 }  // namespace alidade::internal

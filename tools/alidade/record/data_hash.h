@@ -9,29 +9,30 @@
 
 namespace alidade::internal {
 
-/// SHA-256 of the data of a run's source. It depends on the values only, not on their text or
-/// simulator.
+/// SHA-256 of the data of a source. The hash depends only on the values. It does not depend on the
+/// text in a data file or on the simulator.
 ///
-///   measurements   timestamp of each frame; stream, landmark, values and covariance of each of its
-///                  measurements, sorted by the name of the stream
+///   measurements   timestamp of each frame; stream, landmark, values and covariance of each
+///                  measurement in the frame, sorted by the name of the stream
 ///   truth          timestamp, name and values of each known truth of a frame
 ///
-/// A number contributes 8 bytes, the lowest first. 0 and -0 are equal, and so are all NaNs.
+/// A number contributes 8 bytes, the lowest byte first. 0 and -0 have the same bytes, and so do all
+/// NaNs.
 class DataHash {
  public:
   DataHash(std::vector<StreamInfo> streams, std::vector<StreamInfo> truths);
 
   void Add(const SourceFrame& frame);
-  /// Returns the hash of the measurements so far, 64 hexadecimal digits.
+  /// Returns the hash of all measurements so far, as 64 hexadecimal digits.
   std::string measurements() const { return measurements_.Digest(); }
-  /// Returns the hash of the truths so far; "" if no frame had a truth.
+  /// Returns the hash of all truths so far. Returns "" if no frame contained a truth.
   std::string truth() const { return has_truth_ ? truth_.Digest() : ""; }
 
  private:
   std::vector<StreamInfo> streams_, truths_;
   Sha256Stream measurements_, truth_;
   bool has_truth_ = false;
-  std::string bytes_;  ///< bytes of one frame; a member to reuse its memory
+  std::string bytes_;  ///< bytes of one frame; a member, so the memory is reused
 };
 
 }  // namespace alidade::internal

@@ -22,7 +22,7 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
   file_ = CreateCsv(folder, estimator + "/errors.csv", std::move(columns), run_columns);
 }
 
-/// Records the elements that have a known error, and those that have a variance.
+/// Records which elements have a known error, and which have a variance above zero.
 void ErrorsFile::Record(const BlockRow& row) {
   std::size_t first = 0;
   for (const BlockLayout& block : blocks_) {

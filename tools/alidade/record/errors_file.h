@@ -10,20 +10,21 @@
 
 namespace alidade::internal {
 
-/// Writer of `NAME/errors.csv`, which exists if the source names the truth of a block:
+/// Writer of `NAME/errors.csv`. The file exists if the source provides the truth of a block:
 ///
-///   e      = x (-) x_true    each tangent element, in the tangent space at the estimate, like P
-///   sigma  = sqrt(P_ii)      of the estimate only, without the uncertainty of the truth
+///   e      = x (-) x_true    each tangent element; like P, in the tangent space at the estimate
+///   sigma  = sqrt(P_ii)      uncertainty of the estimate only, not of the truth
 ///
-/// e is computed as -(x_true (-) x), which is equal for vectors, angles and rotations. The error of
-/// a rotation is in the body frame, rad.
+/// e is computed as -(x_true (-) x), which equals x (-) x_true for vectors, angles and rotations.
+/// The error of a rotation is in the body frame, rad.
 class ErrorsFile {
  public:
-  /// `blocks` are all blocks of the problem. Creates no file if no block has a truth.
+  /// `blocks` are all blocks of the problem. If no block has a truth, the file is not created.
   ErrorsFile(const OutputFolder& folder, const std::string& estimator,
              const std::vector<BlockLayout>& blocks, RunColumns& run_columns);
 
-  /// Writes a row. A cell is empty if its value, truth or covariance is unknown. Error: kIo.
+  /// Writes a row. A cell is empty if the value, the truth or the covariance is unknown. Error:
+  /// kIo.
   void Add(const SourceFrame& frame, const State& state);
   /// Closes the file. Error: kIo.
   void Close();

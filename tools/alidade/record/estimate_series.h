@@ -8,44 +8,45 @@
 #include "alidade/estimation/problem.h"
 #include "alidade/state/state.h"
 
-/// Estimates of a whole run, for comparison with those of another estimator.
+/// Estimates of one estimator over a whole run, for comparison with another estimator.
 namespace alidade::internal {
 
 /// Block of a series; `name` is `owner.block`.
 struct SeriesBlock {
   std::string name, unit;
   Geometry geometry;
-  bool constant = false;  ///< the block has no covariance
+  bool constant = false;  ///< true: the block has no covariance
 
   std::string owner() const { return name.substr(0, name.find('.')); }
 };
 
-/// Returns the initial blocks of a problem.
+/// Returns the blocks of the initial state of a problem.
 std::vector<SeriesBlock> SeriesBlocksOf(const Problem& problem);
 
-/// Appends the lower triangle of P of the first `blocks` blocks to `cells`, row by row. Elements of
-/// blocks without covariance are NaN.
+/// Appends the lower triangle of P to `cells`, row by row, for the first `blocks` blocks. Elements
+/// of blocks without covariance are NaN.
 void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells);
 
-/// Estimates of one estimator by timestamp. N is the sum of ambient sizes, n of tangent sizes.
+/// Estimates of one estimator at each timestamp. N is the sum of the ambient sizes of all blocks.
 struct Series {
-  /// With more tangent elements, a series contains variances only, to limit its size.
+  /// Largest number of tangent elements with a joint covariance. A larger series contains only
+  /// variances, to limit the memory.
   static constexpr int kMaxJoint = 64;
 
   std::vector<SeriesBlock> blocks;
   std::vector<Timestamp> timestamps;
-  std::vector<double> values;  ///< N for each timestamp; NaN if a block has no value
-  /// For each timestamp, the lower triangle of P row by row if `joint`, else its diagonal. Elements
-  /// of blocks without covariance are NaN.
+  std::vector<double> values;  ///< N numbers for each timestamp; NaN if a block has no value
+  /// Covariances of each timestamp. If `joint`, the lower triangle of P row by row, otherwise the
+  /// diagonal of P. Elements of blocks without covariance are NaN.
   std::vector<double> covariances;
   bool joint = true;
 
   int ambient() const;
   int tangent() const;
-  /// Returns how many numbers of `covariances` belong to a timestamp.
+  /// Returns the number of elements of `covariances` for each timestamp.
   std::size_t cells() const;
-  /// Returns P of the `size` tangent elements that start at `first`, at timestamp index `row`. It
-  /// is diagonal if not `joint`.
+  /// Returns P of `size` tangent elements, starting at element `first`, at timestamp index `row`. P
+  /// is diagonal unless `joint`.
   Eigen::MatrixXd Covariance(std::size_t row, int first, int size) const;
   void Append(Timestamp timestamp, const State& state);
 };

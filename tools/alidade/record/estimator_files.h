@@ -13,8 +13,8 @@
 
 namespace alidade::internal {
 
-/// Writer of the files of one estimator that grow frame by frame. The files contain the blocks and
-/// sensors of the initial problem:
+/// Writer of those files of one estimator that grow with each frame. They contain the blocks and
+/// the sensors of the initial problem:
 ///
 ///   estimates.csv, innovations.csv, gains.csv
 ///   errors.csv                   if a block has truth
@@ -24,11 +24,11 @@ namespace alidade::internal {
 ///   covariance.bin               on request
 class EstimatorFiles {
  public:
-  /// `truth` has the columns of truth.csv. `covariances`: also writes covariance.bin.
+  /// `truth` contains the columns of truth.csv. If `covariances`, covariance.bin is also written.
   EstimatorFiles(const OutputFolder& folder, const EstimatorSpec& spec, const TruthLayout& truth,
                  bool covariances, RunColumns& run_columns);
 
-  /// Writes the rows of a frame. For a frame older than the state, it writes no row to
+  /// Writes the rows of a frame. If the frame is older than the state, no row is written to
   /// estimates.csv, because the state has a later timestamp. Error: kIo.
   void Add(const SourceFrame& frame, const State& state, const UpdateReport& report);
   /// Closes all files and completes recorded(). Error: kIo.
@@ -38,8 +38,8 @@ class EstimatorFiles {
  private:
   struct RecordedBlock {
     BlockLayout layout;
-    std::size_t element;  ///< index of its first element in recorded_.elements
-    std::size_t sigma;    ///< index of its first element in recorded_.sigmas
+    std::size_t element;  ///< index of the first element in recorded_.elements
+    std::size_t sigma;    ///< index of the first element in recorded_.sigmas
   };
 
   static RecordedEstimator Describe(const EstimatorSpec& spec);
@@ -58,7 +58,7 @@ class EstimatorFiles {
   RecordedEstimator recorded_;
   std::vector<RecordedBlock> blocks_;
   GainLayout gain_layout_;
-  std::vector<Timestamp> last_measured_;  ///< by sensor
+  std::vector<Timestamp> last_measured_;  ///< timestamp of the last measurement of each sensor
   std::optional<CsvFile> estimates_, innovations_, gains_, reprojection_;
   std::optional<ErrorsFile> errors_;
   std::optional<PosePlace> pose_;  ///< indices of the pose among the blocks

@@ -15,12 +15,13 @@ namespace alidade::internal {
 /// Returns the mark that represents the outcome of a measurement in an image.
 Mark MarkOf(Outcome outcome);
 
-/// Tracker of the image features of recent frames: their positions, and whether they were accepted.
+/// Record of the image features of recent frames: positions, and whether a measurement was
+/// accepted.
 class FeatureTrails {
  public:
-  /// Adds a frame. Returns its features and those of the previous frame that are lost. Features are
-  /// the measurements of landmarks whose first two values are a pixel. `report` is null if no
-  /// estimator processed the frame.
+  /// Adds a frame. Returns the features of the frame, and the features of the previous frame that
+  /// are lost. A feature is a landmark measurement whose first two values are a pixel. `report` is
+  /// null if no estimator processed the frame.
   std::vector<ViewFeature> Add(const Frame& frame, const UpdateReport* report);
 
  private:

@@ -11,12 +11,12 @@
 
 namespace alidade {
 
-/// Observer that writes each estimate immediately, as a line of JSON for each frame and estimator:
-/// `t_s`, `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the problem's
-/// blocks that have a value. An offline estimator writes its estimates after the last frame.
+/// Observer that writes each estimate immediately, as a line of JSON for each frame and estimator.
+/// The keys are `t_s`, `estimator`, then `owner.block.element` and `sigma:owner.block.element` of
+/// each block with a value. The estimates of an offline estimator are written after the last frame.
 class Follower : public RunObserver {
  public:
-  /// Calls `write` with each line, including its line end.
+  /// Calls `write` with each line, including the line end.
   explicit Follower(std::function<void(std::string_view line)> write) : write_(std::move(write)) {}
 
   void Begin(const Experiment& experiment) override;

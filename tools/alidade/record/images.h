@@ -22,7 +22,7 @@ class ImageWriter {
   /// two frames determine the frame rate of a video. Errors: kCannotCreate, kIo.
   virtual void Add(std::int64_t number, Timestamp timestamp,
                    const std::vector<std::array<double, 2>>& pixels) = 0;
-  /// Adds an unchanged image. All images have the same size.
+  /// Adds an image without drawing on it. All images must have the same size.
   virtual void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) = 0;
   /// Draws the image of a frame with its marked features, and the estimate next to it.
   virtual void Add(const RunView& view) = 0;
@@ -30,12 +30,13 @@ class ImageWriter {
   virtual void Close() = 0;
 };
 
-/// Arguments of the creation of an image writer.
+/// Arguments for the creation of an image writer.
 struct ImageArguments {
   enum class Form { kVideo, kImages, kWindow } form;
-  /// Path of the video or of the folder of images, in an existing folder; or title of the window.
+  /// Path of the video, path of the folder of images, or title of the window. The parent folder
+  /// must exist.
   std::filesystem::path path;
-  std::string shown;  ///< the path in messages
+  std::string shown;  ///< path as it appears in messages
   int width, height;  ///< px; size of images that are drawn from points
 };
 
@@ -49,9 +50,10 @@ constexpr CppEntry EntryOf(const ImageWriterEntry& writer) {
   return {kImageWriterKind, "images", "", "", "", &writer};
 }
 
-/// Creates an image writer with the C++ plugin in `folder`; "": the plugin that was built with this
-/// library. The plugin is loaded at its first use, because its libraries are slow to load. Windows
-/// have a separate plugin. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
+/// Creates an image writer with the C++ plugin in `folder`. If `folder` is empty, the plugin that
+/// was built with this library is used. The plugin is loaded at the first use, because the
+/// libraries that it needs load slowly. Windows have a separate plugin. Errors: kPlugin,
+/// kNotTrusted, kCannotCreate, kIo.
 std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder = {});
 

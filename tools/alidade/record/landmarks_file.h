@@ -11,11 +11,11 @@
 
 namespace alidade::internal {
 
-/// Counts the landmarks, for a figure of the map.
+/// Counts the landmarks for a figure of the map.
 RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks);
 
-/// Returns all landmarks of an estimator, sorted by id and generation: those in the final state,
-/// and removed ones with their last estimates. Empty if `result` has no map.
+/// Returns all landmarks of an estimator, sorted by id and generation. Removed landmarks have their
+/// last estimates. The result is empty if `result` has no map.
 std::vector<LandmarkEstimate> AllLandmarks(const EstimatorResult& result);
 
 /// Writes `NAME/landmarks.csv`. The cell of a number that is not finite is empty. Error: kIo.

@@ -8,8 +8,9 @@
 
 namespace alidade::internal {
 
-/// Returns the landmarks with finite positions and standard deviations as the text of an ASCII PLY
-/// file: x, y, z (world, m), sigma_x, sigma_y, sigma_z (m), removed (0 or 1) and id of each.
+/// Returns the text of an ASCII PLY file with the landmarks whose positions and standard deviations
+/// are finite. The properties are x, y, z (world frame, m), sigma_x, sigma_y, sigma_z (m), removed
+/// (0 or 1) and id.
 std::string LandmarksPly(const std::vector<LandmarkEstimate>& landmarks);
 
 }  // namespace alidade::internal

@@ -11,9 +11,10 @@
 
 namespace alidade::internal {
 
-/// `log.txt` of a run folder: a line `LEVEL: TEXT` for each message of level info and above. It
-/// records only the thread that created it, so that parallel runs have separate logs. If it cannot
-/// be written, a warning reports this and the run continues.
+/// Writer of `log.txt` in a run folder: a line `LEVEL: TEXT` for each message of level info or
+/// above. It records only messages of the thread that created the LogFile, so parallel runs have
+/// separate logs. If the file cannot be written, a warning reports the failure, and the run
+/// continues.
 class LogFile {
  public:
   explicit LogFile(const OutputFolder& folder);

@@ -9,8 +9,8 @@
 
 namespace alidade::internal {
 
-/// Video file that appears only when it is complete. Until then it is `NAME.partial.avi` in the
-/// same folder.
+/// Video file that gets its final name when it is complete. Until then the name is
+/// `NAME.partial.avi` in the same folder.
 class PartialFile {
  public:
   PartialFile(std::filesystem::path file, bool force)

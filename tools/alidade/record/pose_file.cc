@@ -17,7 +17,8 @@ constexpr const char* kCovariances = " Pr11 Pr12 Pr13 Pr22 Pr23 Pr33 Pt11 Pt12 P
 constexpr std::array<std::string_view, 5> kAngles = {"orientation", "heading", "yaw", "angle",
                                                      "theta"};
 
-/// Extends a planar covariance to three axes with zeros: 2x2 of a position, 1x1 of the angle.
+/// Extends a planar covariance to three axes with zeros. The planar covariance is 2x2 for a
+/// position and 1x1 for an angle.
 Eigen::Matrix3d ExpandToThreeAxes(const Eigen::MatrixXd& covariance) {
   if (covariance.rows() == 3) return covariance;
   Eigen::Matrix3d expanded = Eigen::Matrix3d::Zero();

@@ -12,15 +12,15 @@
 
 namespace alidade::internal {
 
-/// Indices of a position and its orientation: three numbers and a quaternion, or for a planar pose
-/// two numbers and an angle about z.
+/// Indices of the position and of the orientation of a pose. These are three numbers and a
+/// quaternion; for a planar pose, two numbers and an angle about z.
 struct PosePlace {
   std::size_t position, orientation;
   bool planar = false;
 };
-/// Finds the first value X.position with an X.orientation. They have 3 and 4 numbers, or 2 and 1 if
-/// planar; a planar angle may also be named heading, yaw, angle or theta. The prefix X. is
-/// optional. Returns nullopt if there is no such pair.
+/// Finds the first value X.position for which X.orientation exists. The sizes must be 3 and 4, or 2
+/// and 1 for a planar pose. The name of a planar angle may also be heading, yaw, angle or theta.
+/// The prefix X. is optional. Returns nullopt if there is no such pair.
 std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values);
 
 /// Writer of a pose file in TUM format, `t x y z qx qy qz qw`, with or without covariances. A
@@ -31,10 +31,11 @@ class PoseFile {
   PoseFile(const OutputFolder& folder, const std::string& name, const PosePlace& place,
            bool with_covariances = false);
 
-  /// Writes a pose. The orientation is w x y z, or the angle, rad. Error: kIo.
+  /// Writes a pose. The orientation is the quaternion w x y z or the planar angle in rad. Error:
+  /// kIo.
   void Add(Timestamp timestamp, const double* position, const double* orientation);
-  /// Writes a pose with covariances in the tangent, m^2 in the world and rad^2 in the body. A
-  /// covariance that is not finite is written as zeros.
+  /// Writes a pose with covariances. That of the position is in the world frame, m^2, that of the
+  /// orientation in the body frame, rad^2. A covariance that is not finite is written as zeros.
   void Add(Timestamp timestamp, const double* position, const double* orientation,
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);

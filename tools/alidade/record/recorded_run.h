@@ -11,42 +11,43 @@
 /// Contents of the csv files of a run folder, for figures. Columns are identified by name.
 namespace alidade::internal {
 
-/// Element of a block in `NAME/estimates.csv`. Value and truth are ambient elements; sigma belongs
-/// to a tangent element. Only elements of vectors and angles have both.
+/// Element of a block in `NAME/estimates.csv`. Value and truth are ambient elements; sigma
+/// belongs to a tangent element. Only elements of vectors and angles are both.
 struct RecordedElement {
-  std::string name;  ///< also the column of the value
+  std::string name;  ///< name of the element and of the column of the value
   std::string unit;
-  bool has_sigma = false;  ///< in column `sigma:NAME`
-  std::string truth;       ///< column in truth.csv, or ""
-  bool has_value = false;  ///< the element has a value at some timestamp
-  bool varies = false;     ///< it has a value at some timestamp, and its block is not constant
+  bool has_sigma = false;  ///< true: column `sigma:NAME` exists
+  std::string truth;       ///< name of the column in truth.csv, or ""
+  bool has_value = false;  ///< true: the element has a value at some timestamp
+  bool varies = false;     ///< true: has_value, and the block is not constant
   bool has_truth = false;
-  bool is_random = false;  ///< its variance was above zero at some timestamp
+  bool is_random = false;  ///< true: the variance is above zero at some timestamp
 };
 
-/// Tangent element of a block. Column `sigma:NAME` of `NAME/estimates.csv` is its standard
-/// deviation.
+/// Tangent element of a block. Column `sigma:NAME` of `NAME/estimates.csv` contains the
+/// standard deviation.
 struct RecordedSigma {
   std::string name;
   std::string unit;
-  bool is_random = false;  ///< its variance was above zero at some timestamp
+  bool is_random = false;  ///< true: the variance is above zero at some timestamp
 };
 
-/// Tangent element of the error of a block in `NAME/errors.csv`. Column `sigma:NAME` is its
+/// Tangent element of the error of a block in `NAME/errors.csv`. Column `sigma:NAME` contains the
 /// standard deviation.
 struct RecordedError {
   std::string name;
   std::string unit;
-  int truth = 0, part = 0;  ///< index of the source's truth, and of its tangent element
-  bool is_angle = false;    ///< an angle, or an element of a rotation or direction: rad
-  bool is_known = false;    ///< the error is finite at some timestamp
-  bool is_random = false;   ///< its variance was above zero at some timestamp
+  /// `truth` is an index into Source::truths(), `part` the index of the tangent element.
+  int truth = 0, part = 0;
+  bool is_angle = false;   ///< true: element of an angle, rotation or direction, rad
+  bool is_known = false;   ///< true: the error is finite at some timestamp
+  bool is_random = false;  ///< true: the variance is above zero at some timestamp
 };
 
 struct RecordedGain {
-  std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
-  std::string unit;      ///< "" if it has no unit, or if the unit of the measurement is unknown
-  std::size_t cell = 0;  ///< column index after time and sensor
+  std::string name;      ///< column in `NAME/gains.csv`, as in `target.depth<-disparity`
+  std::string unit;      ///< "": no unit, or unknown unit of the measurement
+  std::size_t cell = 0;  ///< index of the column, counted after time and sensor
   bool used = false;
 };
 
@@ -56,14 +57,14 @@ struct RecordedSensor {
   std::string unit;
   int tangent = 1;
   bool has_landmark = false;
-  bool has_several = false;  ///< several measurements at a timestamp, as of landmarks or satellites
+  bool has_several = false;  ///< true: several measurements at one timestamp, as of landmarks
   std::vector<RecordedGain> gains;
   bool has_innovations = false;
-  bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
+  bool has_reprojection = false;  ///< true: the sensor has rows in `NAME/reprojection.csv`
 };
 
-/// Numbers of landmarks in `NAME/landmarks.csv` with a position: all, those with a known true
-/// position, and removed ones.
+/// Counts of the landmarks with a position in `NAME/landmarks.csv`: all landmarks, landmarks with a
+/// known true position, and removed landmarks.
 struct RecordedMap {
   std::int64_t placed = 0, known = 0, removed = 0;
 };
@@ -75,8 +76,8 @@ struct RecordedEstimator {
   std::vector<RecordedSigma> sigmas = {};
   std::vector<RecordedError> errors = {};
   std::vector<RecordedSensor> sensors = {};
-  int width = 0;  ///< size of the largest measurement: columns z0 .. z<width - 1>, then h, s and r
-  int path = -1;  ///< first of the three elements of the position that sees landmarks; -1: none
+  int width = 0;  ///< number of columns of each of z, h, s and r
+  int path = -1;  ///< index of the first element of the camera position; -1: none
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
   RecordedMap map = {};
@@ -86,24 +87,24 @@ struct RecordedStream {
   std::string name;
   int size = 1;
   std::int64_t rows = 0;
-  std::int64_t expected_rows = 0;  ///< in expected.csv
+  std::int64_t expected_rows = 0;  ///< rows in expected.csv
 };
 
-/// Block whose value each measurement of a sensor implies, in `implied_states.csv`: from the
-/// measurement alone, or with the true values of the sensor's other roles.
+/// Block in `implied_states.csv`. Each measurement of the sensor implies a value of this block,
+/// either alone or together with the true values of the other roles.
 struct RecordedImplied {
   std::string sensor;
-  std::string block;  ///< also the column
+  std::string block;  ///< name of the block and of the column
   std::string unit;
-  bool rest_at_truth = false;  ///< the other roles have their true values
-  std::size_t cell = 0;        ///< column index after time and sensor
+  bool rest_at_truth = false;  ///< true: the other roles have their true values
+  std::size_t cell = 0;        ///< index of the column, counted after time and sensor
   std::int64_t rows = 0;
 };
 
 /// Estimator with a column in `timing.csv`.
 struct RecordedTimes {
-  std::string estimator;  ///< also the column
-  bool is_known = false;  ///< the time of some frame is known
+  std::string estimator;  ///< name of the estimator and of the column
+  bool is_known = false;  ///< true: the time of some frame is known
 };
 
 struct RecordedRun {

@@ -39,7 +39,8 @@ struct Recorder::Impl {
   void WriteEvents(const EstimatorResult& result);
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result);
-  /// Writes all files except run.json. Returns the error of writing the report, or null.
+  /// Writes all files except run.json. Returns the error that occurred in writing the report, or
+  /// null.
   std::exception_ptr WriteResults(const RunResult& result);
 
   Options options;
@@ -48,7 +49,7 @@ struct Recorder::Impl {
   const Config config;
   std::string title, config_text;
   internal::RunFacts facts;
-  std::vector<std::string> subjects;  ///< SubjectsOf the experiment
+  std::vector<std::string> subjects;  ///< result of SubjectsOf(experiment)
   internal::RunColumns run_columns;
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
@@ -65,17 +66,17 @@ namespace {
 constexpr const char* kRunFile = "run.json";
 constexpr const char* kColumnsFile = "columns.json";
 
-/// Names in timing.json, by FramePart.
+/// Names in timing.json, indexed by FramePart.
 constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
                                                              "landmarks"};
 
-/// Returns the text of a key if it exists, else `fallback`.
+/// Returns the text of a key. Returns `fallback` if the key does not exist.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
   const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }
 
-/// Returns an SVG file as an element of a page, without its XML prolog.
+/// Returns the svg element of the text of an SVG file, without the XML prolog.
 std::string SvgElement(const std::string& svg) {
   const std::size_t start = svg.find("<svg");
   return start == svg.npos ? "" : svg.substr(start);
@@ -162,7 +163,7 @@ void Recorder::Impl::WriteReport(const RunResult& result) {
   }
   for (const internal::Figure& figure : report.figures.drawn) {
     const std::string svg = "figures/" + figure.name + ".svg";
-    // A figure of wall-clock time is a link, so that the page is reproducible.
+    // A figure with wall-clock times is only linked, to keep the page reproducible.
     report.svgs[figure.name] =
         internal::HasWallClock(svg)
             ? "<img src=\"" + svg + "\" alt=\"" + figure.title + "\">"

@@ -13,26 +13,27 @@
 
 namespace alidade {
 
-/// Writer of a run folder (docs/run_folder.md). Until the end the folder is `FOLDER.partial`, and
-/// `run.json` has the status `running`. At the end it is renamed, also if the run failed;
-/// `run.json` then has the reason. If it cannot be finished (a full disk, a killed process),
-/// `FOLDER.partial` remains with the rows so far, if there was a frame. Every write is checked.
-/// Errors: kCannotCreate, kIo with the path.
+/// Writer of a run folder (docs/run_folder.md). During the run the folder is `FOLDER.partial`, and
+/// `run.json` has the status `running`. After the run the folder is renamed. If the run failed,
+/// `run.json` contains the reason. If the folder cannot be finished (full disk, killed process),
+/// `FOLDER.partial` remains with the rows so far, unless the run had no frame. Every write is
+/// checked. Errors: kCannotCreate, kIo with the path.
 class Recorder : public RunObserver {
  public:
   struct Options {
     std::filesystem::path folder;
-    bool force = false;               ///< replace an existing folder
-    bool figures = true;              ///< draw figures with gnuplot if it is installed
+    bool force = false;               ///< true: replaces an existing folder
+    bool figures = true;              ///< true: draws figures, if gnuplot is installed
     std::string command;              ///< command line of the program, for timing.json
-    std::function<bool()> stop = {};  ///< returns true to skip the remaining figures
-    double drawing_s = 60.0;          ///< time limit of all figures
-    bool covariances = false;         ///< also write `NAME/covariance.bin`
-    std::string inputs = {};          ///< the text of inputs.json; "": no such file
+    std::function<bool()> stop = {};  ///< if it returns true, the remaining figures are skipped
+    double drawing_s = 60.0;          ///< time limit for all figures together, s
+    bool covariances = false;         ///< true: also writes `NAME/covariance.bin`
+    std::string inputs = {};          ///< text of inputs.json; "": the file is not written
     /// Plugins for run.json: file name -> SHA-256.
     std::multimap<std::string, std::string> plugins = {};
   };
-  /// Creates `FOLDER.partial`. Error: kCannotCreate if it or `folder` exists, without `force`.
+  /// Creates `FOLDER.partial`. Error: kCannotCreate if `FOLDER.partial` or `FOLDER` exists and
+  /// `force` is false.
   Recorder(const Options& options, const Config& config);
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
@@ -46,13 +47,12 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Adds a file to the folder. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Completes the folder: closes the files of the frames, writes all other files, run.json last,
-  /// and renames the folder.
-  /// If a figure or the report cannot be written, it completes the folder without them and throws
-  /// the error.
+  /// Completes the folder: closes the files of the frames, writes all other files with run.json
+  /// last, and renames the folder. If a figure or the report cannot be written, the folder is
+  /// completed without figures and report. The error is then thrown.
   void Finish(const RunResult& result);
 
-  /// Returns the most important paths that Finish wrote, relative to the folder: report.html, ...
+  /// Returns the paths of the most important files that Finish() wrote, relative to the folder.
   const std::vector<std::string>& highlights() const;
   /// Returns a note on omitted outputs ("gnuplot is not installed: no figures"), or "".
   const std::string& note() const;

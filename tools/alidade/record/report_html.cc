@@ -70,7 +70,7 @@ std::string Comparison(const RunResult& result, const std::vector<std::string>& 
   }
   return html +
          "<p class=\"soft\">NEES and NIS are divided by their degrees of freedom: "
-         "1 is consistent, more is overconfident. A positive lag is a delay.</p>\n";
+         "1 is consistent, a larger value is overconfident. A positive lag is a delay.</p>\n";
 }
 
 std::string FiguresOf(const Report& report, const std::string& estimator) {

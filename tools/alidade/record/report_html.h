@@ -16,14 +16,15 @@ struct Report {
   std::string config;  ///< config as YAML
   RunFacts facts;
   Figures figures;
-  std::map<std::string, std::string> svgs;  ///< SVG elements by name of the figure
-  std::vector<std::string> subjects = {};   ///< SubjectsOf the experiment
+  std::map<std::string, std::string> svgs;  ///< SVG element of each figure, by name of the figure
+  std::vector<std::string> subjects = {};   ///< result of SubjectsOf(experiment)
 };
 
-/// Returns a self-contained page without scripts and wall-clock times; figure `timing` is linked.
+/// Returns a self-contained page without scripts and wall-clock times. Figure `timing` is only
+/// linked.
 std::string ReportHtml(const RunResult& result, const Report& report);
 
-/// Returns `text` as PrintableUtf8, with the special characters of HTML escaped.
+/// Converts `text` with PrintableUtf8(), and escapes the special characters of HTML.
 std::string HtmlEscaped(std::string_view text);
 
 }  // namespace alidade::internal

@@ -12,7 +12,8 @@
 namespace alidade::internal {
 namespace {
 
-/// `recorded` is null if the run ended before its files were created.
+/// Returns the entry of one estimator. `recorded` is null if the run ended before the files were
+/// created.
 Json JsonOf(const EstimatorResult& result, const RecordedEstimator* recorded) {
   Json json = {{"type", result.type}, {"kind", ToString(result.kind)}};
   if (!result.accepted_by.empty()) json["accepted_by"] = result.accepted_by;

@@ -10,21 +10,22 @@
 
 namespace alidade::internal {
 
-/// Contents of run.json in addition to the result.
+/// Facts in run.json that are not part of RunResult.
 struct RunFacts {
   std::uint64_t seed = 0;
   std::multimap<std::string, std::string> plugins;  ///< file name -> SHA-256
-  RecordedRun recorded;                             ///< the csv files, after they are closed
-  std::string measurements_sha256, truth_sha256;    ///< hashes of DataHash; "": no data
+  RecordedRun recorded;                             ///< contents of the csv files
+  std::string measurements_sha256, truth_sha256;    ///< hashes from DataHash; "": no data
 };
 
-/// Returns the text of `run.json` for an unfinished run: `running` or `failed`, with the reason.
+/// Returns the text of `run.json` for an unfinished run. `status` is `running` or `failed`.
 std::string UnfinishedRunJson(const std::string& status, const std::string& reason);
 
-/// Returns the text of `run.json`, which other programs read. docs/run_folder.md lists its keys.
+/// Returns the text of `run.json`, which other programs read. docs/run_folder.md lists the keys.
 std::string RunJson(const RunResult& result, const RunFacts& facts);
 
-/// Returns the text of `comparison.csv`: every metric and count, with a column for each estimator.
+/// Returns the text of `comparison.csv`, with a row for each metric and count and a column for each
+/// estimator.
 std::string ComparisonCsv(const RunResult& result);
 
 /// Counts the events of each kind.

@@ -13,12 +13,12 @@
 
 namespace alidade {
 
-/// Result of a measurement in the filter; it determines the colour.
+/// Result of a measurement in the filter. The result determines the colour of the measurement.
 enum class Mark {
   kAccepted,
   kRejected,  ///< rejected by the gate or by outlier rejection
-  kNew,       ///< consumed by an initialisation, or waiting for it
-  kLost,      ///< measured in the previous frame, but not in this one
+  kNew,       ///< used for an initialisation, or waiting for one
+  kLost,      ///< measured in the previous frame, but not in this frame
   kUnused,    ///< not used by a sensor
 };
 inline constexpr int kMarks = static_cast<int>(Mark::kUnused) + 1;
@@ -29,11 +29,11 @@ struct PlaneGaussian {
   double xx, xy, yy;
 };
 
-/// Feature in the image, px; the centre of the upper left pixel is (0, 0).
+/// Feature in the image, px. The centre of the upper left pixel is (0, 0).
 struct ViewFeature {
   Mark mark;
-  std::array<double, 2> pixel;                    ///< measured; of a lost feature, the last one
-  std::optional<PlaneGaussian> predicted;         ///< h and S
+  std::array<double, 2> pixel;             ///< measured pixel; for a lost feature, the last one
+  std::optional<PlaneGaussian> predicted;  ///< predicted pixel h with covariance S
   std::vector<std::array<double, 2>> trail = {};  ///< pixels in earlier frames
 };
 
@@ -42,10 +42,10 @@ struct ViewInnovation {
   std::string name;  ///< name of the sensor
   Mark mark;
   double measured;
-  double sigmas;  ///< r / sqrt(S) of its first element; NaN: not computed
+  double sigmas;  ///< r / sqrt(S) of the first element; NaN: not computed
 };
 
-/// Element of the state; its truth is NaN if unknown.
+/// Element of the state. The truth is NaN if it is unknown.
 struct ViewElement {
   std::string name, unit;
   double value, sigma, truth;
@@ -56,9 +56,9 @@ struct ViewMap {
   std::string right, up;  ///< names of the axes
   std::vector<std::array<double, 2>> path, true_path;
   PlaneGaussian position;
-  std::array<double, 2> heading;  ///< the optical axis
+  std::array<double, 2> heading;  ///< direction of the optical axis
   std::vector<PlaneGaussian> landmarks;
-  std::array<double, 4> bounds;  ///< shown range: min and max of right, min and max of up
+  std::array<double, 4> bounds;  ///< visible range: min and max of right, min and max of up
 };
 
 /// Element of the state over time.
@@ -67,7 +67,7 @@ struct ViewSeries {
   std::vector<double> t_s, value, sigma, truth;
 };
 
-/// View of one frame of a run: its image, and the estimate of one estimator.
+/// View of one frame of a run: the image of the frame, and the estimate of one estimator.
 struct RunView {
   std::int64_t number = 0;
   Timestamp timestamp = 0;
@@ -75,7 +75,7 @@ struct RunView {
   MeasuredImage image;
   Mark outline = Mark::kLost;  ///< mark of the target in the image, if there is a target
   std::vector<ViewFeature> features;
-  std::array<int, kMarks> counts{};  ///< number of measurements by mark
+  std::array<int, kMarks> counts{};  ///< number of measurements with each mark
   std::vector<ViewInnovation> innovations;
   std::vector<ViewElement> elements;
   int landmarks = -1;  ///< number of landmarks in the state; -1: the estimator has no landmarks

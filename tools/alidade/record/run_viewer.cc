@@ -43,14 +43,15 @@ struct RunViewer::Impl {
   const EstimatorSpec* spec;
   int estimator;
   Source* source;
-  std::vector<int> truth_of;  ///< index of the truth of each block of the problem, or -1
+  std::vector<int> truth_of;  ///< truth of each block of the problem; -1: none
   std::optional<internal::PosePlace> pose;
-  std::vector<std::unique_ptr<internal::PartialFile>> videos;  ///< outlive their writers
+  std::vector<std::unique_ptr<internal::PartialFile>>
+      videos;  ///< declared first: must outlive the writers
   std::vector<std::unique_ptr<ImageWriter>> writers;
   RunView view;
   internal::FeatureTrails trails;
   internal::MapFromAbove map_from_above;
-  std::optional<SourceFrame> pending;  ///< frame whose estimate may follow
+  std::optional<SourceFrame> pending;  ///< frame without an estimate so far
 
   void Write() {
     for (const auto& writer : writers) writer->Add(view);
@@ -60,7 +61,7 @@ struct RunViewer::Impl {
   void UpdateElements(const State& state, const Truth& truth);
   void UpdateSeries(Timestamp timestamp);
   void UpdateMap(const State& state, const Truth& truth);
-  /// Returns the true value of a block, or null.
+  /// Returns the true value of a block, or null if it is unknown.
   const double* TruthOf(std::size_t block, const Truth& truth) const {
     const int t = block < truth_of.size() ? truth_of[block] : -1;
     if (t < 0 || t >= std::ssize(truth)) return nullptr;
@@ -74,7 +75,7 @@ RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
   if (!experiment.source->measures_images() && experiment.source->views() == 0) {
     throw Error(ExitCode::kBadConfig,
                 ErrorLine({}, "source", "the source has no images to show",
-                          "a source that measures in images, or draws them from `surfaces`"));
+                          "a source that measures in images, or draws images from `surfaces`"));
   }
   if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
     throw Error(ExitCode::kBadConfig,
@@ -111,7 +112,7 @@ void RunViewer::AddWindow() {
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) {
     throw Error(ExitCode::kCannotCreate,
                 ErrorLine({}, "--view", "there is no display: DISPLAY is not set",
-                          "a graphical session; --save-video FILE.avi does not need it"));
+                          "a graphical session; --save-video FILE.avi does not need a display"));
   }
   impl_->writers.push_back(OpenImageWriter(
       {ImageArguments::Form::kWindow, "alidade: " + impl_->view.title, "--view", 0, 0}));
@@ -180,7 +181,7 @@ void RunViewer::Impl::UpdateInnovations(const Frame& frame, const UpdateReport* 
     }
     view.innovations.push_back(
         {sensor.name, internal::MarkOf(measurement.outcome), measured->values[0], sigmas});
-    // The outline of the target shows the best mark of its measurements.
+    // The outline of the target shows the best mark of all measurements of the target.
     view.outline = std::min(view.outline, view.innovations.back().mark);
   }
 }

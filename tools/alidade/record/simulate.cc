@@ -36,7 +36,7 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
 
 /// Returns the column names of a stream without landmarks.
 std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
-  if (stream.name == "odometry" && stream.size == 6) {  // as source `tracks` expects
+  if (stream.name == "odometry" && stream.size == 6) {  // names that source `tracks` expects
     return {"vx_m_s", "vy_m_s", "vz_m_s", "wx_rad_s", "wy_rad_s", "wz_rad_s"};
   }
   return internal::NumberedNames(stream.name, static_cast<std::size_t>(stream.size));
@@ -142,7 +142,8 @@ class DataFiles {
   std::set<std::string> names_;
 };
 
-/// Writer of the images of a simulation: drawn by the source, or else discs at the landmarks.
+/// Writer of the images of a simulation. The source draws the images. If it cannot draw, the images
+/// contain discs at the landmarks.
 class ImageFiles {
  public:
   ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder,
@@ -198,8 +199,8 @@ class ImageFiles {
   }
 
  private:
-  /// Converts `name` to a path. Throws if it leaves the output folder, which is new and therefore
-  /// contains no links.
+  /// Converts `name` to a path. Throws if the path leaves the output folder. The folder is new, so
+  /// it contains no links.
   static std::filesystem::path Inside(const std::string& name, const char* option) {
     const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
     if (path.is_absolute() || *path.begin() == "..") {
@@ -222,7 +223,7 @@ class ImageFiles {
   std::vector<std::array<double, 2>> pixels_;
 };
 
-/// Returns the config's `camera` section as YAML; "" if there is no such section.
+/// Returns section `camera` of the config as YAML. Returns "" if there is no such section.
 std::string CameraYaml(const Config& config) {
   const bool source_reads_it = !config.root().HasUnread("camera");
   const auto camera = config.root().Find("camera");
@@ -235,7 +236,7 @@ std::string CameraYaml(const Config& config) {
   return camera_config.ToYaml();
 }
 
-/// Reports to other programs whether the data are complete.
+/// Returns the text of simulate.json, which reports whether the data are complete.
 std::string SimulateJson(const SimulateResult& result) {
   return internal::JsonText(
       {{"status", result.stopped ? "stopped" : "ok"}, {"frames", result.frames}});

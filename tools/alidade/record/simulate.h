@@ -15,34 +15,35 @@ namespace alidade {
 /// Result of Simulate().
 struct SimulateResult {
   std::int64_t frames = 0;
-  bool stopped = false;            ///< stopped before the end
-  std::vector<std::string> files;  ///< names in the folder
+  bool stopped = false;            ///< true: stopped before the end
+  std::vector<std::string> files;  ///< names of the files in the folder
 };
 
-/// Names of camera images in the folder of the data; "": none.
+/// Names of camera images in the folder of the data. An empty name requests no images.
 struct SimulateImages {
-  std::string video;   ///< a file, NAME.avi
-  std::string folder;  ///< a folder of PNG files, one for each frame
+  std::string video;   ///< name of a video file, NAME.avi
+  std::string folder;  ///< name of a folder of PNG files, one for each frame
 };
 
-/// Writes the data of the source of `config` to `folder`, without an estimator: the files that
-/// source `tracks` reads, and the truth.
+/// Writes the data of the source of `config` to `folder`, without an estimator. The files are those
+/// that source `tracks` reads, and the truth.
 ///
 ///   file              rows
 ///   timestamps.csv    frame,t_s
 ///   STREAM.csv        stream of landmarks: frame,feature,dim,value; other stream: frame,t_s and
-///                     its values
+///                     the values
 ///   truth.csv         t_s and the values of all truths
 ///   truth.tum         t x y z qx qy qz qw of the first truth X.position with an X.orientation
 ///   map.csv           feature,x,y,z, m: true positions of measured landmarks, if known
-///   calibration.yaml  the config's `camera`, for a config to include
+///   calibration.yaml  section `camera` of the config, which another config can include
 ///   simulate.json     {"status": "ok", or "stopped" before the end, "frames": N}
-///   images.video      MJPG video with an image of each frame: drawn by the source, or else equal
-///                     discs at the first two values (u, v), px, of landmark measurements, in the
-///                     size of the config's `camera`. Stereo pair: NAME_left.avi, NAME_right.avi
-///   images.folder     the same images as NUMBER.png; stereo pair: in folders left and right
+///   images.video      MJPG video with an image of each frame. The source draws the images. If it
+///                     cannot draw, equal discs mark the first two values (u, v), px, of landmark
+///                     measurements, and section `camera` of the config determines the size.
+///                     Stereo pair: NAME_left.avi, NAME_right.avi
+///   images.folder     the same images as NUMBER.png; stereo pair: in the folders left and right
 ///
-/// Files without content are omitted. The folder appears when all files are written; `force`
+/// Files without content are omitted. The folder appears after all files have been written. `force`
 /// replaces an existing folder. If `stop` returns true, the simulation ends after the current
 /// frame. Errors: kBadConfig, kPlugin, kBadData, kCannotCreate, kNotTrusted (an image outside the
 /// folder), kIo, ...

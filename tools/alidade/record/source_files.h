@@ -14,9 +14,13 @@
 
 namespace alidade::internal {
 
-/// Writer of the source's data: `measurements.csv`; `truth.csv` if there are truths;
-/// `expected.csv` if the truths determine a sensor's measurement; `implied_states.csv` if a sensor
-/// can be inverted from the measurement alone or with the truth of its other roles.
+/// Writer of the data of the source:
+///
+///   measurements.csv     always
+///   truth.csv            if there are truths
+///   expected.csv         if the truths determine the measurement of a sensor
+///   implied_states.csv   if a sensor can be inverted, from the measurement alone or with the truth
+///                        of the other roles
 class SourceFiles {
  public:
   SourceFiles(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
@@ -25,7 +29,7 @@ class SourceFiles {
   void Add(const SourceFrame& frame);
   void Close();
   const TruthLayout& truth_layout() const { return truth_layout_; }
-  /// Fills the fields of `run` that describe the source's data.
+  /// Sets the fields of `run` that describe the data of the source.
   void Describe(RecordedRun& run) const;
 
  private:
@@ -34,7 +38,7 @@ class SourceFiles {
     ImpliedState state;
     RecordedImplied recorded;
   };
-  /// First sensor of a stream whose roles all have a truth.
+  /// Model of the first sensor of a stream for which all roles have a truth.
   struct Expectation {
     SharedSensor model;
     std::vector<int> truths;
@@ -46,9 +50,9 @@ class SourceFiles {
 
   std::vector<StreamInfo> streams_;
   TruthLayout truth_layout_;
-  std::vector<std::int64_t> stream_rows_;    ///< rows in measurements.csv, by stream
-  std::vector<std::int64_t> expected_rows_;  ///< rows in expected.csv, by stream
-  std::map<int, Expectation> expectations_;  ///< by stream
+  std::vector<std::int64_t> stream_rows_;    ///< rows of each stream in measurements.csv
+  std::vector<std::int64_t> expected_rows_;  ///< rows of each stream in expected.csv
+  std::map<int, Expectation> expectations_;  ///< by index of the stream
   std::vector<Inverse> inverses_;
   MeasurementLayout layout_{1, 0};
   ImpliedLayout implied_layout_;

@@ -37,7 +37,7 @@ void TimingFile::AddTime(int estimator, double wall_s) {
 
 void TimingFile::EndRow() {
   const Timestamp timestamp =
-      std::exchange(timestamp_, kNoTimestamp);  // once, even if writing fails
+      std::exchange(timestamp_, kNoTimestamp);  // write only once, even if the write fails
   if (timestamp == kNoTimestamp) return;
   WriteCells(kTimingColumns, TimingLayout{}, {timestamp, row_}, *file_);
   std::ranges::fill(row_, std::nullopt);

@@ -12,13 +12,13 @@
 
 namespace alidade::internal {
 
-/// Writer of `timing.csv`: wall-clock time of each estimator for each frame, s. Offline estimators
-/// are omitted, because most of their work does not belong to a frame.
+/// Writer of `timing.csv`: the wall-clock time of each estimator for each frame, s. Offline
+/// estimators are omitted, because most of their work does not belong to a single frame.
 class TimingFile {
  public:
   TimingFile(const OutputFolder& folder, const Experiment& experiment, RunColumns& run_columns);
 
-  /// Starts the row of a frame, which subsequent times belong to. Error: kIo.
+  /// Starts the row of a frame. Subsequent times belong to this frame. Error: kIo.
   void Add(const SourceFrame& frame);
   void AddTime(int estimator, double wall_s);
   void Close();
@@ -29,13 +29,13 @@ class TimingFile {
 
   std::vector<RecordedTimes> times_;
   std::vector<int> column_of_;              ///< column of each estimator; -1: none
-  std::vector<std::optional<double>> row_;  ///< times by column
-  Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the row
+  std::vector<std::optional<double>> row_;  ///< time in each column
+  Timestamp timestamp_ = kNoTimestamp;      ///< timestamp of the current row
   std::optional<CsvFile> file_;
 };
 
-/// Returns figure `timing`: wall-clock time of each frame over time, with the frame period. The key
-/// reports the share of real time. The figure is empty if no time is known.
+/// Returns figure `timing`: the wall-clock time of each frame over time, and the frame period. The
+/// key reports wall-clock time / frame period. The figure is empty if no time is known.
 FigureScript TimingFigure(const RecordedRun& run);
 
 }  // namespace alidade::internal

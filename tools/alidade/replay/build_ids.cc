@@ -19,7 +19,8 @@ namespace {
 
 constexpr const char* kProgram = "program";
 
-/// Returns the build id from the notes of a segment as hexadecimal digits; "" if not found.
+/// Returns the build id from the notes of a segment, as hexadecimal digits. Returns "" if the notes
+/// do not contain a build id.
 std::string FindBuildId(std::string_view notes) {
   const auto padded = [](std::size_t size) { return (size + 3) / 4 * 4; };
   ElfW(Nhdr) header;
@@ -54,7 +55,7 @@ std::string BuildIdOf(const dl_phdr_info& object) {
   return Sha256OfFile(is_program ? "/proc/self/exe" : object.dlpi_name);
 }
 
-/// Returns the name under which an object is recorded; "" if it is not recorded.
+/// Returns the name under which an object is recorded. Returns "" if the object is not recorded.
 std::string NameOf(const dl_phdr_info& object) {
   if (*object.dlpi_name == '\0') return kProgram;
   const std::string name = std::filesystem::path(object.dlpi_name).filename().string();

@@ -10,15 +10,16 @@
 namespace alidade::internal {
 namespace {
 
-/// Reads the next row including its line end, if it has one. Returns false at the end.
+/// Reads the next row, including the line end if it exists. Returns false at the end of the stream.
 bool ReadRow(std::istream& stream, std::string& row) {
   if (!std::getline(stream, row)) return false;
   if (!stream.eof()) row += '\n';
   return true;
 }
 
-/// Returns the cell of `row` that contains byte `offset`: at most kMaxBytes of it, of which at most
-/// kMaxBytesBefore precede the byte; "" if it is not printable text.
+/// Returns the cell of `row` that contains byte `offset`, or a part of that cell. The part has at
+/// most kMaxBytes, of which at most kMaxBytesBefore precede the byte. Returns "" if the part is not
+/// printable text.
 std::string CellAt(const std::string& row, std::size_t offset) {
   constexpr std::size_t kMaxBytes = 40, kMaxBytesBefore = 20;
   const std::size_t comma = offset == 0 ? row.npos : row.rfind(',', offset - 1);
@@ -40,8 +41,8 @@ RowDifference DifferenceOf(const std::string& recorded, const std::string& curre
           CellAt(current, offset), only_line_end};
 }
 
-/// Opens a file. The stream is in the failed state if the file does not exist. Error: kIo if it
-/// cannot be read.
+/// Opens a file. If the file does not exist, the stream is in the failed state. Error: kIo if the
+/// file exists but cannot be read.
 std::ifstream OpenIfExists(const std::filesystem::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns `status` from a JSON file; "" if the file cannot be read or has no status.
+/// Returns `status` from a JSON file. Returns "" if the file cannot be read or has no status.
 std::string StatusIn(const fs::path& file) {
   const std::string text = ReadFile(file, [](ExitCode, int) {});
   if (text.empty()) return "";
@@ -28,7 +28,7 @@ std::string StatusIn(const fs::path& file) {
   return status != json.end() && status->is_string() ? status->get<std::string>() : "";
 }
 
-/// Returns the entries of `files.txt` in a folder, without those that are directories.
+/// Returns the entries of `files.txt` in a folder, except directories.
 std::set<std::string> ListedFiles(const fs::path& folder) {
   std::ifstream list(folder / "files.txt");
   std::set<std::string> names;
@@ -57,7 +57,7 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
   }
   if (!inputs.read_once.empty()) {
     throw Error(ExitCode::kInputMissing, ErrorLine(Place{folder.string()}, {},
-                                                   "its data came from '" + inputs.read_once +
+                                                   "the data came from '" + inputs.read_once +
                                                        "', which can be read only once",
                                                    "a run whose data are regular files"));
   }
@@ -97,7 +97,7 @@ ReplayResult CompareReplay(const fs::path& recorded, const fs::path& current) {
       continue;
     }
     if (!is_written) {
-      result.differences.push_back({name, 0, 0, "is not written now"});
+      result.differences.push_back({name, 0, 0, "is not written any more"});
       continue;
     }
     const RowComparison rows = CompareRows(recorded / name, current / name);
@@ -106,7 +106,8 @@ ReplayResult CompareReplay(const fs::path& recorded, const fs::path& current) {
           {name, rows.difference->line, rows.difference->column, rows.difference->Text()});
     } else if (rows.recorded_has_more || rows.current_has_more) {
       result.differences.push_back(
-          {name, rows.rows + 1, 1, rows.current_has_more ? "has more rows now" : "ends here now"});
+          {name, rows.rows + 1, 1,
+           rows.current_has_more ? "has more rows now" : "now ends before this row"});
     }
   }
   for (const std::string& name : new_files) {

@@ -9,36 +9,38 @@
 
 #include "alidade/replay/run_inputs.h"
 
-/// Comparison of a run folder with a second folder that was computed from its recorded inputs.
+/// Comparison of a run folder with a second folder that was computed from the recorded inputs of
+/// the first.
 namespace alidade::internal {
 
 struct FileDifference {
-  std::string file;                   ///< relative to the folder
-  std::int64_t line = 0, column = 0;  ///< of the first difference; 0 if the whole file is meant
-  std::string description;            ///< `now '0.51', was '0.5'`
+  std::string file;  ///< path relative to the folder
+  std::int64_t line = 0,
+               column = 0;  ///< position of the first difference; 0: the whole file differs
+  std::string description;  ///< description, as in `now '0.51', was '0.5'`
 };
 
 struct ReplayResult {
   std::int64_t files = 0;                 ///< number of compared files
   std::vector<std::string> not_compared;  ///< files that contain wall-clock times
-  std::vector<std::string> inputs;        ///< the result of InputDifferences()
+  std::vector<std::string> inputs;        ///< result of InputDifferences()
   std::vector<FileDifference> differences;
 
   bool equal() const { return inputs.empty() && differences.empty(); }
 };
 
-/// Returns `status` from the run.json or sweep.json of a folder; "" if not found. Error:
-/// kBadData.
+/// Returns `status` from the run.json or sweep.json of a folder. Returns "" if there is no status.
+/// Error: kBadData.
 std::string RecordedStatus(const std::filesystem::path& folder);
 
-/// Reads the inputs of `folder`. Errors: kInputMissing if it has no inputs.json, or if its data
-/// came from a pipe; kBadData if it is unfinished.
+/// Reads the inputs of `folder`. Errors: kInputMissing if the folder does not contain inputs.json,
+/// or if the data came from a pipe; kBadData if the run or sweep is unfinished.
 RecordedInputs ReadReplayable(const std::filesystem::path& folder);
 
-/// Reports whether a file of a run folder contains wall-clock times and so differs in every run.
+/// Returns true if a file of a run folder contains wall-clock times, which differ in every run.
 bool HasWallClock(std::string_view file);
 
-/// Compares all files of two folders, except those with wall-clock times (HasWallClock).
+/// Compares all files of two folders, except files with wall-clock times (HasWallClock()).
 ReplayResult CompareReplay(const std::filesystem::path& recorded,
                            const std::filesystem::path& current);
 

@@ -32,7 +32,7 @@ std::string HashOf(const fs::path& file) {
   return hash;
 }
 
-/// Returns `{"file": FILE, "bytes": N, "sha256": HASH}`.
+/// Returns the entry of a file: `{"file": FILE, "bytes": N, "sha256": HASH}`.
 std::string FileEntry(const fs::path& file) {
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file, error);
@@ -41,7 +41,7 @@ std::string FileEntry(const fs::path& file) {
          ", \"sha256\": " + JsonString(HashOf(file)) + '}';
 }
 
-/// Returns the texts between two brackets, one line each.
+/// Returns a list in brackets, with one text in each line.
 std::string BracketedList(char open, const std::vector<std::string>& texts, char close) {
   std::string list(1, open);
   for (const std::string& text : texts) {
@@ -57,9 +57,9 @@ std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
   return strings;
 }
 
-/// Returns `source.path`; "" if the config has none.
+/// Returns the value of `source.path`. Returns "" if the config does not contain this key.
 std::string SourcePath(const Config& config) {
-  const Config copy = config.Copy();  // the keys of the original are not marked as read
+  const Config copy = config.Copy();  // a query marks keys as read; use a copy
   const auto source = copy.root().is_map() ? copy.root().Find("source") : std::nullopt;
   const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
   return path && path->kind() == Node::Kind::kScalar ? path->Text() : "";
@@ -87,7 +87,8 @@ std::vector<std::string> DataEntriesAt(const std::string& path) {
   return data;
 }
 
-/// Returns the JSON entries of the data of all configs, in their order; each path counts once.
+/// Returns the JSON entries for the data of all configs, in the order of the configs. A path that
+/// several configs contain has only one entry.
 std::vector<std::string> DataEntriesOf(const std::vector<Config>& configs) {
   std::vector<std::string> data;
   std::set<std::string> visited_paths = {""};
@@ -119,7 +120,7 @@ void AddNames(const Node& node, PluginNames& names) {
   }
 }
 
-/// Parses `text` as JSON and returns `read(json)`. Error: kBadData if either fails.
+/// Parses `text` as JSON and returns `read(json)`. Error: kBadData if parsing or `read` fails.
 template <class F>
 auto ReadJsonText(const std::string& text, const std::string& file, const F& read) {
   const Json json = ParseJson(text, file);
@@ -131,7 +132,7 @@ auto ReadJsonText(const std::string& text, const std::string& file, const F& rea
   }
 }
 
-/// The comparable values of an inputs.json, by name.
+/// Values of an inputs.json that are compared, by name.
 using InputValues = std::map<std::string, std::string>;
 
 InputValues InputValuesOf(const Json& json) {
@@ -151,7 +152,7 @@ InputValues InputValuesOf(const Json& json) {
   return values;
 }
 
-/// Shortens a hash to its first digits; quotes any other text.
+/// Shortens a hash to the first digits. Puts any other text in quotes.
 std::string Shortened(const std::string& text) {
   constexpr std::size_t kMinHashLength = 40, kShownDigits = 12;
   const bool is_hash =
@@ -164,7 +165,7 @@ std::string Shortened(const std::string& text) {
 std::vector<fs::path> FindUsedPlugins(const std::vector<Config>& configs, const PluginHost& host) {
   PluginNames names;
   for (const Config& config : configs) {
-    const Config copy = config.Copy();  // the keys of the original are not marked as read
+    const Config copy = config.Copy();  // a query marks keys as read; use a copy
     AddNames(copy.root(), names);
   }
   std::vector<fs::path> files;

@@ -14,7 +14,7 @@ FinishedRuns::FinishedRuns(OutputFolder& folder) : folder_(folder) {
   std::ifstream stream(file, std::ios::binary);
   Place place{file.string(), 0, 0};
   SharedNames names;
-  std::uintmax_t complete_bytes = 0;  // of the lines that have a line end
+  std::uintmax_t complete_bytes = 0;  // size of the lines that have a line end
   for (std::string line; std::getline(stream, line) && !stream.eof();) {
     ++place.line;
     complete_bytes += line.size() + 1;
@@ -43,7 +43,7 @@ void FinishedRuns::Add(const std::string& value, const SweepRun& run) {
   const std::lock_guard lock(mutex_);
   folder_.Retain();
   file_->Write(line);
-  file_->Flush();  // the next run may take hours
+  file_->Flush();  // flush now, because the next run may take hours
 }
 
 }  // namespace alidade::internal

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A sweep result with the value of the varied key, "" if no key is varied.
+/// Result of a sweep, and the value of the varied key. The value is "" if no key is varied.
 struct Part {
   const SweepResult* result;
   std::string value;
@@ -95,11 +95,12 @@ std::string SweepJson(const VariedSweep& sweep) {
                              {"values", std::move(values)}});
 }
 
-/// Collects the metric and count keys of all runs in one result, which OrderedMetrics() sorts.
+/// Returns a result that contains the keys of all metrics and counts of all runs. OrderedMetrics()
+/// sorts these keys.
 RunResult AllKeys(const Parts& parts) {
   RunResult result;
   EstimatorResult& keys = result.estimators.emplace_back();
-  std::set<const void*> visited_lists;  // lists of names
+  std::set<const void*> visited_lists;  // addresses of lists of names
   const auto add = [&visited_lists](const auto& row, auto& map) {
     if (!visited_lists.insert(&row.names()).second) return;
     for (const std::string& name : row.names()) map[name];
@@ -115,13 +116,13 @@ RunResult AllKeys(const Parts& parts) {
   return result;
 }
 
-/// Returns `header`, preceded by the varied key if there is one.
+/// Returns `header`. If a key is varied, it is inserted as the first column.
 std::vector<std::string> Header(const std::string& key, std::vector<std::string> header) {
   if (!key.empty()) header.insert(header.begin(), key);
   return header;
 }
 
-/// Columns of a table. Arranges the values of rows, whose names have another order, in columns.
+/// Columns of a table. The names of a row may have another order than the columns.
 template <class Value>
 class Columns {
  public:
@@ -129,7 +130,8 @@ class Columns {
     for (std::size_t i = 0; i < names_.size(); ++i) columns_[names_[i]] = i;
   }
   const std::vector<std::string>& names() const { return names_; }
-  /// Returns the values of a row in the order of the columns; null for columns without a value.
+  /// Returns the values of a row in the order of the columns. A pointer is null if the row has no
+  /// value in that column.
   const std::vector<const Value*>& Arrange(const NamedValues<Value>& row) {
     std::vector<std::size_t>& columns = columns_of_list_[&row.names()];
     if (columns.empty()) {
@@ -142,8 +144,8 @@ class Columns {
 
  private:
   std::vector<std::string> names_;
-  std::map<std::string, std::size_t> columns_;  ///< by name
-  /// The column of each name, by the address of the list of names.
+  std::map<std::string, std::size_t> columns_;  ///< index of each column, by name
+  /// For each list of names, by its address: the column of each name.
   std::unordered_map<const void*, std::vector<std::size_t>> columns_of_list_;
   std::vector<const Value*> cells_;
 };
@@ -196,7 +198,7 @@ void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::st
   csv.Close();
 }
 
-/// Replaces the file of finished runs by one with all runs, sorted by value and seed.
+/// Replaces the file of finished runs by a file with all runs, sorted by value and seed.
 void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
   const std::string sorted = std::string(internal::kFinishedRuns) + ".sorted";
   const auto file = folder.Create(sorted);
@@ -219,7 +221,7 @@ void CheckInputs(const fs::path& partial, const internal::InputTexts& current) {
                   "; to start again, remove it, or use --force without --resume");
 }
 
-/// Removes the result files of a stopped sweep.
+/// Removes the result files that a stopped sweep has written.
 void RemoveResults(const OutputFolder& folder) {
   const std::set<std::string> permanent = {internal::kResolvedConfig, internal::kInputsFile,
                                            internal::kFinishedRuns, "files.txt"};

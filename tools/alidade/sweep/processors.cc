@@ -10,8 +10,8 @@ namespace alidade::internal {
 
 std::int64_t UsableProcessors() {
   cpu_set_t usable;
-  // The set has room for 1024 processors. On a larger machine the call fails, and all of them
-  // count.
+  // A cpu_set_t represents 1024 processors. On a larger machine the call fails, and all processors
+  // are counted.
   if (::sched_getaffinity(0, sizeof usable, &usable) == 0) return CPU_COUNT(&usable);
   return std::max<std::int64_t>(1, std::thread::hardware_concurrency());
 }

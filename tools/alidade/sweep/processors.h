@@ -5,8 +5,8 @@
 
 namespace alidade::internal {
 
-/// Returns the number of processors that this process may use, at least 1. It counts the
-/// processors in the affinity mask, which a batch system, `taskset` or a container may restrict.
+/// Returns the number of processors in the affinity mask of this process, at least 1. A batch
+/// system, `taskset` or a container may restrict the affinity mask.
 std::int64_t UsableProcessors();
 
 }  // namespace alidade::internal

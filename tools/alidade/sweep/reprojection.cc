@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::size_t kMaxFrames = 500;
 
-/// Mean errors over the runs of one value, for one estimator and sensor.
+/// Mean errors of one estimator and sensor over the runs of one value.
 struct MeanErrors {
   FrameErrors mean;
-  std::vector<int> runs = {};  ///< number of runs, by frame
+  std::vector<int> runs = {};  ///< number of runs in each frame
 };
 
 bool HaveSameSensor(const FrameErrors& a, const FrameErrors& b) {
@@ -36,7 +36,7 @@ void AddTo(MeanErrors& sum, const FrameErrors& errors) {
   }
 }
 
-/// Returns the mean errors of one value, by estimator and sensor.
+/// Returns the mean errors of each estimator and sensor for one value.
 std::vector<MeanErrors> MeansOf(const SweepResult& result) {
   std::vector<MeanErrors> means;
   for (const SweepRun& run : result.done) {
@@ -60,7 +60,8 @@ std::vector<MeanErrors> MeansOf(const SweepResult& result) {
   return means;
 }
 
-/// Returns the mean errors by value, estimator and sensor, in the order of `reprojection.csv`.
+/// Returns the mean errors of each estimator and sensor for each value, in the order of
+/// `reprojection.csv`.
 std::vector<std::vector<MeanErrors>> MeansOf(const VariedSweep& sweep) {
   std::vector<std::vector<MeanErrors>> means;
   for (const SweepResult& result : sweep.results) means.push_back(MeansOf(result));

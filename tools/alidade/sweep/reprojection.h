@@ -12,8 +12,8 @@
 /// Reprojection error over the frames of a varied sweep.
 namespace alidade::internal {
 
-/// Observer that records the RMS of the innovations z - h, h at the prediction, as in
-/// `NAME/reprojection.csv`: for each landmark sensor and each of the first 500 frames of a run.
+/// Observer that records the RMS of the innovations z - h, h at the prediction, of each landmark
+/// sensor, as in `NAME/reprojection.csv`. Records only the first 500 frames of a run.
 class ReprojectionRecorder : public RunObserver {
  public:
   void Begin(const Experiment& experiment) override;
@@ -28,17 +28,17 @@ class ReprojectionRecorder : public RunObserver {
   };
 
   std::vector<FrameErrors> errors_;
-  std::vector<SensorIndex> sensors_;  ///< of each entry of errors_
+  std::vector<SensorIndex> sensors_;  ///< sensor of each entry of errors_
 };
 
 /// Writes `reprojection.csv`: one row for each value, estimator, landmark sensor and frame, with
-/// the mean over the used runs (SweepRun::UsesMetricsOf). Writes no file if there are no errors to
-/// write. Errors: kCannotCreate, kIo.
+/// the mean over the used runs (SweepRun::UsesMetricsOf). Without errors, the file is not written.
+/// Errors: kCannotCreate, kIo.
 void WriteReprojection(const OutputFolder& folder, const VariedSweep& sweep);
 
-/// Draws `figures/reprojection.svg` from reprojection.csv, one curve for each value. Returns the
-/// reason if the drawing failed; "" if the figure was drawn or there is nothing to draw. Errors:
-/// kIo.
+/// Draws `figures/reprojection.svg` from reprojection.csv, with one curve for each value. Returns
+/// the reason if the drawing failed. Returns "" if the figure was drawn, or if there is nothing to
+/// draw. Error: kIo.
 std::string DrawReprojection(const OutputFolder& folder, const VariedSweep& sweep,
                              const std::function<bool()>& stop);
 

@@ -11,8 +11,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Formats a number. JSON cannot represent a number that is not finite; it is written as a string.
-/// Negative zero is written as -0.0 to preserve its sign.
+/// Formats a number. A number that is not finite becomes a string, because JSON cannot represent
+/// it. Negative zero becomes -0.0, to preserve the sign.
 std::string TextOfNumber(double value) {
   if (!std::isfinite(value)) return '"' + NumberText(value) + '"';
   return value == 0.0 && std::signbit(value) ? "-0.0" : NumberText(value);
@@ -20,7 +20,7 @@ std::string TextOfNumber(double value) {
 
 const char* TextOfFlag(bool flag) { return flag ? "true" : "false"; }
 
-/// Returns `"KEY":{...}`; `text` formats each value.
+/// Returns `"KEY":{...}`. The function `text` formats each value.
 template <class Value, class F>
 std::string MapText(const char* key, const NamedValues<Value>& map, const F& text) {
   std::string json = JsonString(key) + ":{";

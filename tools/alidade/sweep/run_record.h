@@ -8,16 +8,16 @@
 
 namespace alidade::internal {
 
-/// Formats a finished or failed run as one line of JSON. The line contains all data from which the
-/// files of a sweep are written. `value` is the value of the varied key, "" if no key is varied.
+/// Formats a finished or failed run as one line of JSON. The line contains all data of the run that
+/// the files of a sweep need. `value` is the value of the varied key; it is "" if no key is varied.
 std::string RunLine(const std::string& value, const SweepRun& run);
 
-/// The content of such a line.
+/// Contents of a line that RunLine() has formatted.
 struct ParsedRunLine {
   std::string value;
   SweepRun run;
 };
-/// Parses such a line. Returns nullopt if it has another form.
+/// Parses a line that RunLine() has formatted. Returns nullopt if the line has another form.
 std::optional<ParsedRunLine> ReadRunLine(const std::string& line);
 
 }  // namespace alidade::internal

@@ -22,12 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Description of a shard, read from its folder.
+/// Description of a shard, read from the folder of the shard.
 struct ShardFolder {
   fs::path folder;
   Shard shard;
   std::vector<std::string> arguments;
-  InputTexts input_texts;  ///< without the option --shard
+  InputTexts input_texts;  ///< texts of the inputs, without the option --shard
 };
 
 [[noreturn]] void FailData(const fs::path& file, const std::string& message,
@@ -42,7 +42,7 @@ std::string TextOf(const fs::path& file) {
   });
 }
 
-/// Returns the value of an option; "" if it is missing.
+/// Returns the value of an option. Returns "" if the option is missing.
 std::string ValueOf(const std::vector<std::string>& arguments, const std::string& option) {
   const auto position = std::ranges::find(arguments, option);
   const bool has_value = position != arguments.end() && position + 1 != arguments.end();
@@ -88,7 +88,7 @@ ShardFolder ReadShardFolder(const fs::path& folder) {
   return shard_folder;
 }
 
-/// Refuses a shard of another sweep than the first shard.
+/// Refuses a shard that does not belong to the same sweep as the first shard.
 void CheckSameSweep(const ShardFolder& first, const ShardFolder& candidate) {
   if (candidate.shard.count != first.shard.count) {
     FailData(candidate.folder,
@@ -131,8 +131,8 @@ void SortByIndex(std::vector<ShardFolder>& shards) {
                                   : ""));
 }
 
-/// Adds the runs of a shard to `results`, which has one entry for each value. Shares their names
-/// through the pool.
+/// Adds the runs of a shard to `results`, which has one entry for each value. The runs share lists
+/// of names through the pool.
 void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
              const std::vector<std::string>& values, SharedNames& pool,
              std::vector<SweepResult>& results) {
@@ -157,10 +157,11 @@ void AddRuns(const ShardFolder& folder, const SeedRange& seeds,
       results[v].done.push_back(std::move(parsed->run));
     }
   }
-  if (std::getline(stream, line)) fail("is a surplus line");
+  if (std::getline(stream, line)) fail("is a line after the last run");
 }
 
-/// Returns a result without runs for each value. `summary` is the sweep.json of any shard.
+/// Returns a SweepResult for each value, which does not contain runs yet. `summary` is the
+/// sweep.json of any shard.
 std::vector<SweepResult> EmptyResults(const Json& summary, std::int64_t runs,
                                       std::uint64_t first_seed) {
   std::vector<SweepResult> results;

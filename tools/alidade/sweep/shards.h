@@ -12,18 +12,21 @@
 /// Merging of the shards of one sweep.
 namespace alidade::internal {
 
-/// A merged sweep, equal to the result of one process that executes all runs.
+/// Merged sweep. It equals the result of one process that executes all runs.
 struct MergedSweep {
   Config config;
-  std::string inputs;                  ///< the text of inputs.json
+  std::string inputs;                  ///< text of inputs.json
   std::optional<Variation> variation;  ///< nullopt: no key is varied
-  std::vector<SweepResult> results;    ///< by value; one entry if no key is varied
+  std::vector<SweepResult> results;    ///< one for each value; one entry if no key is varied
 };
 
 /// Reads the folders of all shards of one sweep, in any order. Errors: kInputMissing if a folder or
-/// a file in it is missing. kBadData if a folder is not that of a finished shard; if its config,
-/// options, build or data differ from those of the first; if a shard is given twice or is missing;
-/// or if a shard lacks a run.
+/// a file in a folder is missing; kBadData in these cases:
+///
+///   - a folder is not the folder of a finished shard
+///   - the config, options, build or data of a shard differ from those of the first shard
+///   - a shard is given twice or is missing
+///   - a run is missing in a shard
 MergedSweep MergeShards(const std::vector<std::filesystem::path>& folders);
 
 }  // namespace alidade::internal

@@ -26,7 +26,8 @@ class RunQueue {
            std::uint64_t first_seed, std::int64_t runs)
       : config_(config), host_(host), options_(options), first_seed_(first_seed), runs_(runs) {}
 
-  /// Executes runs until the queue is empty. Release() rethrows an exception that ends it early.
+  /// Executes runs until the queue is empty or an exception occurs. Release() rethrows the
+  /// exception.
   void ExecuteRuns() noexcept {
     try {
       const Config config = CopyOfConfig();
@@ -38,7 +39,7 @@ class RunQueue {
     }
   }
 
-  /// Returns the finished runs, sorted by seed, and releases them.
+  /// Returns the finished runs, sorted by seed, and removes them from the queue.
   std::vector<SweepRun> Release() {
     if (exception_) std::rethrow_exception(exception_);
     std::sort(done_.begin(), done_.end(),
@@ -49,8 +50,8 @@ class RunQueue {
  private:
   bool Stopped() const { return options_.stop && options_.stop(); }
 
-  /// Executes the next run, or returns false if there are no more. After a stop it only adds runs
-  /// that were finished earlier.
+  /// Executes the next run. Returns false if there are no more runs. After a stop, only runs of the
+  /// earlier sweep are added.
   bool ExecuteNextRun(const Config& config) {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
@@ -70,7 +71,8 @@ class RunQueue {
     return true;
   }
 
-  /// Returns a copy for one thread, because a query marks keys of a config as read.
+  /// Returns a copy of the config for one thread. Each thread needs a copy, because a query marks
+  /// keys of a config as read.
   Config CopyOfConfig() {
     const std::lock_guard lock(mutex_);
     return config_.Copy();
@@ -122,8 +124,8 @@ class RunQueue {
   std::exception_ptr exception_;
 };
 
-/// Reports whether every loaded model allows several instances at once. It checks all models of the
-/// host, because the models that a config uses are known only when it is built.
+/// Returns true if every loaded model allows several instances at once. All models of the host are
+/// checked, because the models that a config uses are known only after the experiment is built.
 bool MayRunInParallel(const PluginHost& host) {
   return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
     return !entry.is_model() || (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
@@ -168,7 +170,7 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
       try {
         threads.emplace_back([&queue] { queue.ExecuteRuns(); });
       } catch (const std::system_error&) {
-        break;  // the system refuses more threads; continue with the existing ones
+        break;  // the system refuses more threads; continue with the existing threads
       }
     }
     queue.ExecuteRuns();
@@ -180,7 +182,7 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
 
 namespace {
 
-/// Values of one estimator over all runs, by name.
+/// Collector of the values of one estimator over all runs, by name.
 class ValuesByName {
  public:
   /// Adds the values of one run, except NaN.
@@ -206,8 +208,8 @@ class ValuesByName {
 
  private:
   std::map<std::string, std::vector<double>> values_;
-  const std::vector<std::string>* names_ = nullptr;  ///< of the previous row
-  std::vector<std::vector<double>*> lists_;          ///< its entries of values_
+  const std::vector<std::string>* names_ = nullptr;  ///< names of the previous row
+  std::vector<std::vector<double>*> lists_;          ///< entries of values_ for these names
 };
 
 void AddUnits(const NamedValues<std::string>& row, std::map<std::string, std::string>& units) {
@@ -220,7 +222,7 @@ SweepSummary SummaryOf(const SweepResult& result, const std::string& name) {
   SweepSummary summary;
   summary.name = name;
   ValuesByName values;
-  const std::vector<std::string>* units = nullptr;  // of the previous run
+  const std::vector<std::string>* units = nullptr;  // names of the units of the previous run
   for (const SweepRun& run : result.done) {
     for (const SweepRow& row : run.estimators) {
       if (row.name != name) continue;

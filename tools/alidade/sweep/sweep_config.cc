@@ -54,7 +54,7 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) 
       if (!AreEqual(a, b)) return true;
     }
   } catch (const Error&) {
-    return true;  // the runs report it
+    return true;  // the runs will report the error
   }
 }
 

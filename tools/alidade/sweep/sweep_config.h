@@ -8,30 +8,31 @@
 /// Configs and seeds of the runs of a sweep.
 namespace alidade::internal {
 
-/// Refuses a source that can be read only once: standard input, or a pipe. `reader` explains in the
-/// message why it is read again. Error: kBadConfig.
+/// Refuses a source that can be read only once: standard input or a pipe. In the message, `reader`
+/// explains why the source is read again. Error: kBadConfig.
 void CheckReadableAgain(const Config& config,
                         const char* reader = "a sweep reads it for every run");
 
-/// Reports whether the data of the source depend on the seed. Reads the data of `seed` and of the
-/// next seed up to their first difference. Returns true if the data contain an error.
+/// Returns true if the data of the source depend on the seed. Reads the data of `seed` and of the
+/// next seed up to the first difference. Also returns true if the data cannot be read without an
+/// error.
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 
-/// Throws the error for a source whose data do not depend on the seed: kBadConfig.
+/// Throws kBadConfig for a source whose data do not depend on the seed.
 [[noreturn]] void FailUnseeded(const Config& config);
 
-/// Consecutive seeds.
+/// Range of consecutive seeds.
 struct SeedRange {
   std::uint64_t first = 1;
   std::int64_t count = 1;
 };
 
-/// Returns the seeds of a shard, out of `runs` seeds that start at `first_seed`. Shard i of n has
-/// the offsets from floor(runs (i - 1) / n) up to, but not including, floor(runs i / n). The sizes
-/// of two shards differ by at most one.
+/// Returns the seeds of a shard. All shards together have `runs` seeds that start at `first_seed`.
+/// Shard i of n has the offsets from floor(runs (i - 1) / n) up to, but not including,
+/// floor(runs i / n). The sizes of two shards differ by at most one.
 SeedRange SeedsOf(const Shard& shard, std::uint64_t first_seed, std::int64_t runs);
 
-/// Equals Sweep(), but does not require that the data depend on the seed.
+/// Executes a sweep like Sweep(), but does not require that the data depend on the seed.
 SweepResult SweepSeeds(const Config& config, const PluginHost& host, const SweepOptions& options);
 
 }  // namespace alidade::internal

@@ -12,7 +12,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Returns a sentence about the reference of the errors; "" if it is truth.
+/// Returns a sentence about the reference of the errors. Returns "" if the reference is truth.
 std::string ReferenceText(const SweepResult& result) {
   RunResult run;
   run.reference = result.reference;
@@ -21,11 +21,11 @@ std::string ReferenceText(const SweepResult& result) {
   if (withheld == 0) return text;
   return text + "; withheld in " + std::to_string(withheld) + " of " +
          std::to_string(CountFinished(result)) +
-         " runs, in which it failed, diverged or had no estimates";
+         " runs, in which the reference failed, diverged or had no estimates";
 }
 
-/// Returns rows with a cell for each estimator. Formats mean and quantiles as four columns of one
-/// table, so that all numbers of a row have the same unit.
+/// Returns rows with a cell for each estimator. The mean and the quantiles are formatted as four
+/// columns of one table, so all numbers of a row have the same unit.
 std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
@@ -117,7 +117,7 @@ std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSumm
   std::string text = std::to_string(CountFinished(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
-                     "including inconsistent ones.\n\n";
+                     "including inconsistent runs.\n\n";
   text += FormatTable(MakeTable(NamesOf(summaries), TableRows(summaries)), TableFormat::kMarkdown);
   return text + NeesLines(summaries) + ReferenceLines(result);
 }

@@ -8,25 +8,27 @@
 #include "alidade/base/statistics.h"
 #include "alidade/sweep/sweep.h"
 
-/// Texts and statistics that all tables and files of a sweep share.
+/// Texts and statistics that the tables and files of a sweep have in common.
 namespace alidade::internal {
 
-/// Returns the number of runs that finished.
+/// Returns the number of finished runs.
 std::int64_t CountFinished(const SweepResult& result);
 
 /// Returns the number of finished runs without a reference for the errors.
 std::int64_t CountWithheld(const SweepResult& result);
 
 /// Returns the 95 % bounds of the mean NEES over all runs for each owner, by the key of the metric.
-/// Each run counts as one sample, so the bounds hold for any correlation of the errors over time.
+/// Each run counts as one sample, so the bounds are valid for any correlation of the errors over
+/// time.
 std::map<std::string, Interval> NeesBounds(const SweepSummary& summary);
 
-/// Returns an empty line and a line for each mean NEES outside its bounds; "" if all are inside.
+/// Returns an empty line and a line for each mean NEES outside its bounds. Returns "" if each mean
+/// NEES is inside its bounds.
 std::string NeesLines(const std::vector<SweepSummary>& summaries);
 
-/// Returns an empty line and the reference of the errors, with the number of runs in which it was
-/// withheld; "" if the reference is truth. For a varied sweep, returns such lines for each value if
-/// they differ.
+/// Returns an empty line and a line with the reference of the errors and the number of runs in
+/// which the reference was withheld. Returns "" if the reference is truth. For a varied sweep,
+/// returns such lines for each value if they differ between values.
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 

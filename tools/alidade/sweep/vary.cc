@@ -27,7 +27,7 @@ std::string Trimmed(const std::string& text) {
   return text.substr(first, text.find_last_not_of(" \t") + 1 - first);
 }
 
-/// Splits at the commas outside brackets, braces and quotes.
+/// Splits a list of values at the commas outside brackets, braces and quotes.
 std::vector<std::string> SplitValues(const std::string& text) {
   std::vector<std::string> values(1);
   int depth = 0;
@@ -63,7 +63,7 @@ void CheckKey(const Config& config, const std::string& key) {
   std::size_t start = 0;
   for (std::size_t dot = key.find('.'); dot != key.npos; dot = key.find('.', start)) {
     const std::string name = key.substr(start, dot - start);
-    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set reports the error
+    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set() reports the error
     std::vector<std::string> names;
     std::optional<Node> next;
     for (const auto& [entry, node] : map.Entries()) {
@@ -79,15 +79,15 @@ void CheckKey(const Config& config, const std::string& key) {
   }
 }
 
-/// Returns a copy of the config with the value.
+/// Returns a copy of the config in which the varied keys have the given value.
 Config ConfigWith(const Config& config, const Variation& variation, const std::string& value) {
   Config copy = config.Copy();
   variation.Set(copy, value);
   return copy;
 }
 
-/// Refuses a value with which the config is invalid or its estimators differ from those of the
-/// first value.
+/// Refuses a value for which the config is invalid, or for which the estimators differ from those
+/// of the first value.
 void CheckValues(const Config& config, const PluginHost& host, const Variation& variation) {
   std::vector<std::string> first_names;
   for (const std::string& value : variation.values) {
@@ -108,7 +108,7 @@ void CheckValues(const Config& config, const PluginHost& host, const Variation& 
 
 Variation Variation::FromText(const std::string& text) {
   const std::size_t equals = text.find('=');
-  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " names no key to vary");
+  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " does not name a key to vary");
   Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
   std::vector<std::string> keys = variation.Keys();
   std::ranges::sort(keys);

@@ -7,13 +7,13 @@ namespace alidade {
 
 /// Constant value, or a random walk.
 ///
-///   model      x' = x + w,   w ~ N(0, q^2 dt I)        q = 0: constant, without noise input
+///   model      x' = x + w,   w ~ N(0, q^2 dt I)        q = 0: constant, w has size 0
 ///   Jacobian   F = I, G = I                            n x n
 ///
 ///   symbol     shape  unit        meaning
 ///   x          n      any         the value
-///   q          1      unit/s^0.5  random walk: standard deviation after one second; >= 0
-///   n          -      -           size; >= 1
+///   q          1      unit/s^0.5  standard deviation of the change in one second; >= 0
+///   n          -      -           number of elements; >= 1
 ///
 /// Defined everywhere.
 /// Source       [Ekf2017] sec. 1.2 (lambda); random walk [BarShalom2001] sec. 6.2.
@@ -21,14 +21,15 @@ template <int N = kDynamic>
 struct Constant : Motion<N, Vec<N>> {
   static constexpr std::array kBlocks{Quantity{"value", "", "the value"}};
 
-  int size;  ///< used if N is kDynamic
+  int size;  ///< number of elements, if N is kDynamic
   double walk;
 
   explicit Constant(int n, double random_walk = 0.0) : size(n), walk(random_walk) {}
   explicit Constant(Params& p)
-      : Constant(p.Integer("size", "number of elements", 1, 1 << 20, 1),
-                 p.NonNegative("noise.random_walk", "unit/s^0.5",
-                               "standard deviation after one second; 0: constant", 0.0)) {}
+      : Constant(
+            p.Integer("size", "number of elements", 1, 1 << 20, 1),
+            p.NonNegative("noise.random_walk", "unit/s^0.5",
+                          "standard deviation of the change in one second; 0: constant", 0.0)) {}
 
   int Size(int) const { return N == kDynamic ? size : N; }
   bool Stationary() const { return !(walk > 0.0); }

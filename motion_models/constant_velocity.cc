@@ -15,8 +15,9 @@ void Make(int dimensions, alidade::Params& p, AlidadeInstance* instance) {
 
 void MakeConstantVelocity(alidade::Params& p, AlidadeInstance* instance) {
   const int dimensions = p.Integer("dimensions", "number of axes", 1, 3, 1);
-  const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
-                            "white acceleration, or an acceleration constant between updates", 0);
+  const int kind =
+      p.Choice("noise.kind", {"continuous", "discrete"},
+               "white acceleration, or an acceleration that is constant between updates", 0);
   if (kind == 0) {
     Make<true>(dimensions, p, instance);
   } else {

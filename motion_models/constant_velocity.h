@@ -8,21 +8,21 @@ namespace alidade {
 /// Point with constant velocity and a random acceleration, in D dimensions.
 ///
 ///   model      p' = p + v dt + g_p(w),  v' = v + g_v(w)
-///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2. Per axis
-///              Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt], with its Cholesky factor times
-///              w ~ N(0, I). Q does not depend on how dt is split into steps
+///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2. For each axis,
+///              Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt]. (g_p, g_v) is its Cholesky
+///              factor times w ~ N(0, I). The division of dt into steps does not change Q
 ///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), constant between two updates:
-///              g_p = a dt^2/2, g_v = a dt; rank 1 per axis. n intervals in a second add
-///              sigma^2 / n to Var(v), which depends on the rate of the measurements
+///              g_p = a dt^2/2, g_v = a dt: rank 1 for each axis. n intervals in a second add
+///              sigma^2 / n to Var(v), so Var(v) depends on the rate of the measurements
 ///   Jacobian   F = [I  dt I; 0  I]                     2D x 2D
 ///
 ///   symbol     shape  unit                     frame  meaning
 ///   p, v       D      m, m/s                   any    position, velocity
-///   sigma      1      m/s^1.5 (continuous)     any    root of the acceleration's density: m/s^2
-///                     m/s^2 (discrete)                for each Hz^0.5; or its standard deviation
+///   sigma      1      m/s^1.5 (continuous)     any    root of the spectral density of the
+///                     m/s^2 (discrete)                acceleration; or standard deviation
 ///   D          -      -                        -      1 to 3
 ///
-/// Defined everywhere. docs/noise_models.md compares the kinds and converts sigma.
+/// Defined everywhere. docs/noise_models.md compares both kinds of noise and converts sigma.
 /// Source       CWNA [BarShalom2001] sec. 6.2; DWNA sec. 6.3, [Ekf2017] sec. 4.1 (code).
 template <int D, bool kContinuous>
 struct ConstantVelocity : Motion<kContinuous ? 2 * D : D, Vec<D>, Vec<D>> {
@@ -35,8 +35,8 @@ struct ConstantVelocity : Motion<kContinuous ? 2 * D : D, Vec<D>, Vec<D>> {
   explicit ConstantVelocity(double acceleration) : sigma(acceleration) {}
   explicit ConstantVelocity(Params& p)
       : sigma(p.NonNegative("noise.acceleration", kContinuous ? "m/s^1.5" : "m/s^2",
-                            kContinuous ? "random acceleration, root of its spectral density"
-                                        : "random acceleration, 1 sigma")) {}
+                            kContinuous ? "root of the spectral density of the acceleration"
+                                        : "standard deviation of the acceleration")) {}
 
   NoiseKind noise_kind() const {
     return kContinuous ? NoiseKind::kContinuous : NoiseKind::kDiscrete;

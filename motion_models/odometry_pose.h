@@ -7,53 +7,57 @@
 
 namespace alidade {
 
-/// Pose of a camera on a vehicle whose linear and angular velocity are measured.
+/// Pose of a camera on a vehicle with measured linear and angular velocity.
 ///
 ///   model      world_from_vehicle' = world_from_vehicle exp((v, omega) dt)
-///              with world_from_vehicle = world_from_cam cam_from_vehicle; for the camera
+///              with world_from_vehicle = world_from_cam cam_from_vehicle. For the camera:
 ///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) nu dt + Exp(phi) t - t)
 ///              nu = (1 + e) v + w_v,  phi = (omega + w_omega) dt
 ///              V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
 ///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are model parameter states,
-///              known to be 0, I and 0 unless the config defines an initial value
+///              known to be 0, I and 0 unless the config defines initial values
 ///   noise      continuous: w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2) / dt), white
 ///              velocities; position and orientation are random walks
 ///              discrete: w ~ N(0, diag(sigma_v^2, sigma_omega^2)), constant between two updates,
-///              so that the walk depends on the rate of the measurements
+///              so the random walk depends on the rate of the measurements
 ///   Jacobian   automatic differentiation               13 x 13; exact at omega = 0
 ///
 ///   symbol       shape  unit      frame    meaning
 ///   r, q         3, 4   m, -      world    position and orientation (world_from_cam) of the camera
-///   v, omega     3      m/s       vehicle  control input: measured velocities, constant over dt;
-///                       rad/s              v of the vehicle's origin
-///   sigma_v      3      m/s^0.5   vehicle  noise of v, per axis, >= 0: root of its spectral
-///                                          density; discrete: standard deviation, m/s
+///   v, omega     3      m/s       vehicle  control input: measured velocities, constant over dt.
+///                       rad/s              v is the velocity of the vehicle's origin
+///   sigma_v      3      m/s^0.5   vehicle  noise of v, for each axis; >= 0. Continuous: root of
+///                                          the spectral density; discrete: standard deviation, m/s
 ///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega, like sigma_v; discrete: rad/s
 ///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: position and orientation of the
 ///                                          camera
 ///   dt_m, R_m    3, 4   m, -      vehicle  extrinsics, relative to t_0 and R_0
 ///   e            1      -         -        relative error of v: true speed / measured - 1
 ///
-/// Defined everywhere. Additive in dt without noise. Continuous noise is additive up to an error of
-/// order dt^3 in the lateral displacement of a turn. docs/noise_models.md compares the kinds and
-/// converts sigma.
-/// Source       [Sola2017] sec. 4.6 (integration); V is that of exp on SE(3).
+/// Defined everywhere. Steps without noise are additive in dt. Continuous noise is additive up to
+/// an error of order dt^3 in the lateral displacement of a turn. docs/noise_models.md compares both
+/// kinds of noise and converts sigma.
+/// Source       [Sola2017] sec. 4.6 (integration). V is the matrix V of exp on SE(3).
 struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, Vec<1>> {
   static constexpr std::array kBlocks{
-      Quantity{"position", "m", "of the camera in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"},
-      Quantity{"extrinsics_position", "m", "added to vehicle_from_cam.position", "x,y,z",
+      Quantity{"position", "m", "position of the camera in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the camera, world_from_cam", "w,x,y,z"},
+      Quantity{"extrinsics_position", "m", "offset that is added to vehicle_from_cam.position",
+               "x,y,z", ALIDADE_ROLE_OWNED},
+      Quantity{"extrinsics_orientation", "",
+               "rotation that multiplies vehicle_from_cam.orientation", "w,x,y,z",
                ALIDADE_ROLE_OWNED},
-      Quantity{"extrinsics_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
-               ALIDADE_ROLE_OWNED},
-      Quantity{"speed_scale_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
+      Quantity{"speed_scale_error", "",
+               "relative error of the measured speed: true speed / measured speed - 1", "",
+               ALIDADE_ROLE_OWNED}};
   using Input = Vec<6>;
-  static constexpr Quantity kInput{"velocities", "",
-                                   "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
-                                   "vx,vy,vz,wx,wy,wz"};
+  static constexpr Quantity kInput{
+      "velocities", "",
+      "linear velocity, m/s, and angular velocity, rad/s, in the frame of the vehicle",
+      "vx,vy,vz,wx,wy,wz"};
 
   NoiseKind kind;
-  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t_0 above
+  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t_0
   std::array<double, 4> vehicle_from_cam;             ///< R_0
 
   OdometryPose(NoiseKind noise, const std::array<double, 3>& linear,
@@ -67,20 +71,23 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     UnitQuaternion::Normalise(vehicle_from_cam.data());
   }
   explicit OdometryPose(Params& p)
-      : OdometryPose(p, p.Choice("noise.kind", {"continuous", "discrete"},
-                                 "white noise of the velocities, or an error constant between "
-                                 "updates",
-                                 0) == 1) {}
+      : OdometryPose(p,
+                     p.Choice("noise.kind", {"continuous", "discrete"},
+                              "white noise of the velocities, or errors that are constant between "
+                              "updates",
+                              0) == 1) {}
   OdometryPose(Params& p, bool is_discrete)
       : OdometryPose(
             is_discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
             p.PerAxis<3>("noise.linear_velocity", is_discrete ? "m/s" : "m/s^0.5",
-                         is_discrete ? "noise of the linear velocity, 1 sigma"
-                                     : "noise of the linear velocity, root of its density",
+                         is_discrete
+                             ? "standard deviation of the linear velocity"
+                             : "root of the spectral density of the linear velocity's noise",
                          kNonNegative),
             p.PerAxis<3>("noise.angular_velocity", is_discrete ? "rad/s" : "rad/s^0.5",
-                         is_discrete ? "noise of the angular velocity, 1 sigma"
-                                     : "noise of the angular velocity, root of its density",
+                         is_discrete
+                             ? "standard deviation of the angular velocity"
+                             : "root of the spectral density of the angular velocity's noise",
                          kNonNegative),
             p.Vector<3>("vehicle_from_cam.position", "m", "position of the camera on the vehicle",
                         {}, std::array<double, 3>{}),
@@ -111,7 +118,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     speed_scale_error1[0] = speed_scale_error[0];
   }
   void SqrtQ(double dt_s, MatrixRef Lq) const {
-    double scale = 1.0;  // for the mean velocities of the step
+    double scale = 1.0;  // factor for the mean velocities of the step
     if (kind == NoiseKind::kContinuous) scale = dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       const int k = static_cast<int>(i);
@@ -130,7 +137,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     const T angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
     T a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);         // (1 - cos) / angle^2
     T b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);  // (angle - sin) / angle^3
-    constexpr double kSeries = 1e-4;                           // the next term: 1e-16
+    constexpr double kSeries = 1e-4;  // the next term of the series is below 1e-16
     if (angle2 > T(kSeries)) {
       const T angle = sqrt(angle2);
       a = (1.0 - cos(angle)) / angle2;
@@ -148,7 +155,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     z[2] = x[0] * y[1] - x[1] * y[0];
   }
   static std::array<double, 4> ReadVehicleFromCam(Params& p) {
-    const char* const doc = "orientation of the camera on the vehicle, a unit quaternion";
+    const char* const doc = "orientation of the camera on the vehicle: a unit quaternion";
     const std::array<double, 4> q{p.Number("vehicle_from_cam.orientation.w", "", doc, {}, 1.0),
                                   p.Number("vehicle_from_cam.orientation.x", "", doc, {}, 0.0),
                                   p.Number("vehicle_from_cam.orientation.y", "", doc, {}, 0.0),
@@ -156,7 +163,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     constexpr double kTolerance = 1e-3;
     if (std::abs(norm - 1.0) <= kTolerance) return q;
-    p.Fail("vehicle_from_cam.orientation", "is not of unit length to 1e-3");
+    p.Fail("vehicle_from_cam.orientation", "does not have unit length (tolerance 1e-3)");
     return {1.0, 0.0, 0.0, 0.0};
   }
 };

@@ -6,8 +6,9 @@
 namespace {
 
 void MakeQuaternionPose(alidade::Params& p, AlidadeInstance* instance) {
-  const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
-                            "white accelerations, or accelerations constant between updates", 0);
+  const int kind =
+      p.Choice("noise.kind", {"continuous", "discrete"},
+               "white accelerations, or accelerations that are constant between updates", 0);
   if (kind == 0) {
     alidade::EmplaceMotion<alidade::ContinuousQuaternionPose>(p, instance);
   } else {

@@ -5,14 +5,14 @@
 
 namespace alidade {
 
-/// Rigid body with constant linear and angular velocity and random accelerations, which are
-/// constant between two updates (discrete noise, DWNA).
+/// Rigid body with constant velocities and random accelerations. The linear and angular
+/// acceleration are constant between two updates (discrete noise, DWNA).
 ///
 ///   model      v' = v + a dt,           r' = r + v' dt
 ///              omega' = omega + alpha dt,   q' = q Exp(omega' dt)
-///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)); G is 12 x 6: rank 6.
-///              n intervals in a second add sigma_a^2 / n to Var(v), which depends on the rate of
-///              the measurements
+///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)). G is 12 x 6, of rank 6.
+///              n intervals in a second add sigma_a^2 / n to Var(v), so Var(v) depends on the rate
+///              of the measurements
 ///   Jacobian   automatic differentiation               12 x 12; exact at omega = 0
 ///
 ///   symbol          shape  unit           frame  meaning
@@ -20,18 +20,19 @@ namespace alidade {
 ///   q               4      -              -      orientation, world_from_body
 ///   v               3      m/s            world  velocity
 ///   omega           3      rad/s          body   angular velocity
-///   sigma_a         3      m/s^2          world  acceleration, per axis; >= 0
-///   sigma_alpha     3      rad/s^2        body   angular acceleration, per axis; >= 0
+///   sigma_a         3      m/s^2          world  standard deviation of a, for each axis; >= 0
+///   sigma_alpha     3      rad/s^2        body   standard deviation of alpha, for each axis; >= 0
 ///
-/// Defined everywhere. Additive in dt without noise. For a camera, body is cam. r' depends on v'.
-/// The noise of r over a split interval therefore equals that of the whole to first order in dt.
+/// Defined everywhere. Steps without noise are additive in dt. For a camera, the frame `body` is
+/// `cam`. Because r' depends on v', the noise of r over an interval depends on its division into
+/// steps, but not to first order in dt.
 /// Source       [MonoSlam2015] sec. 4.3, [Davison2007] sec. 3.4.
 struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
-      Quantity{"position", "m", "in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_body", "w,x,y,z"},
-      Quantity{"velocity", "m/s", "in the world", "x,y,z"},
-      Quantity{"angular_velocity", "rad/s", "in the body", "x,y,z"}};
+      Quantity{"position", "m", "position of the body in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the body, world_from_body", "w,x,y,z"},
+      Quantity{"velocity", "m/s", "velocity of the body in the world", "x,y,z"},
+      Quantity{"angular_velocity", "rad/s", "angular velocity in the frame of the body", "x,y,z"}};
 
   std::array<double, 3> sigma_a, sigma_alpha;
 
@@ -39,10 +40,11 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
                  const std::array<double, 3>& angular_acceleration)
       : sigma_a(acceleration), sigma_alpha(angular_acceleration) {}
   explicit QuaternionPose(Params& p)
-      : QuaternionPose(p.PerAxis<3>("noise.linear_acceleration", "m/s^2",
-                                    "random acceleration, 1 sigma", kNonNegative),
-                       p.PerAxis<3>("noise.angular_acceleration", "rad/s^2",
-                                    "random angular acceleration, 1 sigma", kNonNegative)) {}
+      : QuaternionPose(
+            p.PerAxis<3>("noise.linear_acceleration", "m/s^2",
+                         "standard deviation of the acceleration", kNonNegative),
+            p.PerAxis<3>("noise.angular_acceleration", "rad/s^2",
+                         "standard deviation of the angular acceleration", kNonNegative)) {}
 
   NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
   template <class T>
@@ -66,26 +68,26 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   }
 };
 
-/// Rigid body like QuaternionPose, with white accelerations (continuous noise, CWNA). Q does not
-/// depend on how dt is split into steps.
+/// Rigid body as in QuaternionPose, but with white accelerations (continuous noise, CWNA). The
+/// steps into which dt is divided do not change Q.
 ///
 ///   model      r' = r + v dt + w_r,     q' = q Exp(omega dt + w_q)
 ///              v' = v + w_v,            omega' = omega + w_omega
-///   noise      w ~ N(0, Lq Lq'): per axis Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt],
-///              and likewise (w_q, w_omega) with sigma_alpha; exact for omega = 0, else to first
-///              order
+///   noise      w ~ N(0, Lq Lq'). For each axis,
+///              Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt], and the same for
+///              (w_q, w_omega) with sigma_alpha: exact for omega = 0, else to first order
 ///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],
 ///              phi = omega dt + w_q
 ///              G = diag(I, J(phi), I, I),  J(phi) = d Log(Exp(-phi) Exp(phi + d))/dd
 ///                = I - (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2      12 x 12
 ///
 ///   symbol          shape  unit           frame  meaning
-///   sigma_a         3      m/s^1.5        world  root of the density of the acceleration, per
-///                                                axis: m/s^2 for each Hz^0.5; >= 0
-///   sigma_alpha     3      rad/s^1.5      body   root of the density of the angular acceleration,
-///                                                per axis; >= 0
+///   sigma_a         3      m/s^1.5        world  root of the spectral density of the acceleration,
+///                                                for each axis; >= 0
+///   sigma_alpha     3      rad/s^1.5      body   root of the spectral density of the angular
+///                                                acceleration, for each axis; >= 0
 ///
-/// Defined everywhere. docs/noise_models.md compares the kinds and converts sigma.
+/// Defined everywhere. docs/noise_models.md compares both kinds of noise and converts sigma.
 /// Source       [BarShalom2001] sec. 6.2; J: [Sola2017] sec. 4.3.
 struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks = QuaternionPose::kBlocks;
@@ -98,9 +100,9 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
   explicit ContinuousQuaternionPose(Params& p)
       : ContinuousQuaternionPose(
             p.PerAxis<3>("noise.linear_acceleration", "m/s^1.5",
-                         "random acceleration, root of its spectral density", kNonNegative),
+                         "root of the spectral density of the acceleration", kNonNegative),
             p.PerAxis<3>("noise.angular_acceleration", "rad/s^1.5",
-                         "random angular acceleration, root of its spectral density",
+                         "root of the spectral density of the angular acceleration",
                          kNonNegative)) {}
 
   template <class T>
@@ -150,7 +152,8 @@ struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec
  private:
   /// Computes product = J(phi) x.
   static void MultiplyByRightJacobian(const double* phi, const double* x, double* product) {
-    constexpr double kSeries = 1e-4;  // of the angle squared: the next term is 1e-16
+    constexpr double kSeries =
+        1e-4;  // squared angle below which the next term of the series is below 1e-16
     const double angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
     double a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);
     double b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);

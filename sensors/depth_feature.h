@@ -11,25 +11,25 @@ namespace alidade {
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma_u^2, sigma_v^2, (s0 + s2 d^2)^2)  3x3, px^2 and m^2, d predicted
-///   inverse    the point on the pixel's ray at the depth d
+///   inverse    the point at the depth d on the ray of the pixel
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
 ///   d          1      m       cam    depth along the optical axis
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
+///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
 ///   s0, s2     1      m, 1/m  -      standard deviation of d: constant part, > 0, and coefficient
 ///                                    of d^2, >= 0 (for a depth from disparity)
 ///
-/// Defined for  h within the lens, and hz > 0, rho > 0; else out_of_domain, outputs untouched.
-/// Valid for    pixels on the image, and d > 0; else the measurement is invalid.
+/// Defined for  h within the lens, hz > 0 and rho > 0. Otherwise out_of_domain; outputs unchanged.
+/// Valid for    pixels inside the image and d > 0. Other measurements are invalid.
 /// Source       [MonoSlam2015] sec. 2.1; noise [Khoshelham2012].
 template <class Representation>
 struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Representation> {
-  static constexpr Quantity kMeasurement{
-      "pixel_and_depth", "", "pixel of the landmark, px, and its depth, m", "u,v,depth"};
+  static constexpr Quantity kMeasurement{"pixel_and_depth", "",
+                                         "pixel and depth of the landmark, px and m", "u,v,depth"};
 
   Camera camera;
   std::array<double, 2> sigma_px;
@@ -47,11 +47,11 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Repre
   explicit DepthFeature(Params& p)
       : DepthFeature(
             Camera(p),
-            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+            p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
                          kPositive),
-            p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
+            p.Positive("sigma_depth_m", "m", "standard deviation of the depth, constant part"),
             p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
-                          "additional noise of the depth per squared depth, 1 sigma", 0.0)) {}
+                          "standard deviation of the depth, coefficient of depth^2", 0.0)) {}
 
   template <class T>
   bool PredictInCamera(const T* h, const T& rho, T* z) const {

@@ -11,19 +11,19 @@ namespace alidade {
 ///   model      (u, v) = K(h) + n,   n ~ N(0, R),   h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               2 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = diag(sigma_u^2, sigma_v^2)          2x2, px^2
-///   inverse    the point along the pixel's ray, at the inverse distance rho0 of the prior
+///   inverse    the point on the ray of the pixel, at the inverse distance rho0 of the prior
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
+///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      2      px      -      standard deviations of u and v; > 0
-///   rho0       1      1/m     -      prior of the inverse distance from the camera (xyz: > 0)
+///   rho0       1      1/m     -      prior inverse distance from the camera; > 0 for xyz landmarks
 ///
-/// Defined for  h in front of the camera and within its lens; else out_of_domain, outputs
-///              untouched. rho <= 0 is allowed, because only the direction of the ray matters.
-/// Valid for    pixels on the image; else the measurement is invalid.
+/// Defined for  h in front of the camera and within the lens. Otherwise out_of_domain; outputs
+///              unchanged. rho <= 0 is allowed, because only the direction of the ray matters.
+/// Valid for    pixels inside the image. Other measurements are invalid.
 /// Source       [MonoSlam2015] sec. 4.3, [Civera2008] sec. II.
 template <class Representation>
 struct InverseDepthFeature
@@ -41,7 +41,7 @@ struct InverseDepthFeature
   explicit InverseDepthFeature(Params& p)
       : InverseDepthFeature(
             Camera(p),
-            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+            p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
                          kPositive)) {}
 
   template <class T>

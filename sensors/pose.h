@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// Pose of a body, measured by motion capture, scan matching, a beacon or another estimator.
+/// Measured pose of a body, for example by motion capture, scan matching or another estimator.
 ///
 ///   model      z = (r + n_r, q (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   dz/d(r, q) = I                          6x6
-///   noise      R = diag(sigma_r^2, sigma_q^2), or a full covariance with each measurement
+///   noise      R = diag(sigma_r^2, sigma_q^2), or the covariance of the measurement
 ///                                                      6x6, m^2, m rad, rad^2
 ///   inverse    r = z_r
 ///
@@ -18,16 +18,18 @@ namespace alidade {
 ///   q          4      -       world  orientation, world_from_body
 ///   n_r        3      m       world  noise of the position
 ///   n_q        3      rad     body   noise of the orientation, q (+) n = q Exp(n)
-///   sigma_r, sigma_q  3  m, rad  as n_r, n_q          standard deviations by axis; > 0
+///   sigma_r, sigma_q  3  m, rad  as n_r, n_q          standard deviation for each axis; > 0
 ///
 /// Defined everywhere.
 /// Source       q (+) n and its Jacobian [Sola2017] ch. 4.
 struct Pose : Sensor<Product<Vec<3>, UnitQuaternion>, Vec<3>, UnitQuaternion> {
-  static constexpr std::array kRoles{Quantity{"position", "m", "of the body in the world", "x,y,z"},
-                                     Quantity{"orientation", "", "world_from_body", "w,x,y,z"}};
+  static constexpr std::array kRoles{
+      Quantity{"position", "m", "position of the body in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the body, world_from_body", "w,x,y,z"}};
   static constexpr Quantity kMeasurement{"pose", "", "position and orientation of the body"};
-  static constexpr std::array kParts{Quantity{"position", "m", "of the body in the world", "x,y,z"},
-                                     Quantity{"orientation", "", "world_from_body", "w,x,y,z"}};
+  static constexpr std::array kParts{
+      Quantity{"position", "m", "position of the body in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the body, world_from_body", "w,x,y,z"}};
   static constexpr int kInitialises = 0;
 
   std::array<double, 3> sigma_position_m, sigma_orientation_rad;
@@ -35,9 +37,9 @@ struct Pose : Sensor<Product<Vec<3>, UnitQuaternion>, Vec<3>, UnitQuaternion> {
   Pose(const std::array<double, 3>& position_m, const std::array<double, 3>& orientation_rad)
       : sigma_position_m(position_m), sigma_orientation_rad(orientation_rad) {}
   explicit Pose(Params& p)
-      : Pose(p.PerAxis<3>("sigma_position_m", "m", "noise of the position, 1 sigma", kPositive),
+      : Pose(p.PerAxis<3>("sigma_position_m", "m", "standard deviation of the position", kPositive),
              p.PerAxis<3>("sigma_orientation_rad", "rad",
-                          "noise of the orientation about the axes of the body, 1 sigma",
+                          "standard deviation of the orientation about each axis of the body",
                           kPositive)) {}
 
   template <class T>

@@ -3,6 +3,7 @@
 
 #include "alidade/model/plugin.h"
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::Pseudorange, "pseudorange",
-                              "distance to a transmitter at a known position, and clock bias",
-                              "[Groves2013] sec. 9.4"))
+ALIDADE_PLUGIN(
+    ALIDADE_SENSOR(alidade::Pseudorange, "pseudorange",
+                   "distance to a transmitter at a known position plus clock bias of the receiver",
+                   "[Groves2013] sec. 9.4"))

@@ -13,6 +13,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 
 }  // namespace
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "range_bearing",
-                                 "range and bearing at which a landmark is seen",
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "range_bearing", "range and bearing of a landmark",
                                  "[Thrun2005] sec. 6.6"))

@@ -5,33 +5,33 @@
 
 namespace alidade {
 
-/// Range and bearing at which a laser, radar or sonar sees a landmark.
+/// Range and bearing of a landmark, measured by a laser, radar or sonar.
 ///
 ///   model      d = |h| / rho + n_d,   b = h / |h| (+) n_b,      h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma_d^2, sigma_b^2, sigma_b^2)        3x3, m^2 and rad^2
-///   inverse    the point at the distance d along the bearing
+///   inverse    the point at the distance d in the direction of the bearing
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   d          1      m       -      range, the distance from the sensor
 ///   b          3      -       sensor bearing, a unit vector
 ///   n_b        2      rad     -      noise in the tangent plane of b
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_sensor) of the sensor
-///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
+///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
 ///   sigma_d, sigma_b  1  m, rad  -   standard deviations; > 0
-///   d_max      1      m       -      max_range_m: the largest range that is measured; > 0
+///   d_max      1      m       -      max_range_m: the largest valid range; > 0
 ///
-/// Defined for  rho > 0, |h| > 0; else out_of_domain, outputs untouched.
-/// Valid for    0 < d <= d_max; else the measurement is invalid.
-/// Source       [Thrun2005] sec. 6.6, with the bearing as a direction.
+/// Defined for  rho > 0 and |h| > 0. Otherwise out_of_domain; outputs unchanged.
+/// Valid for    0 < d <= d_max. Other measurements are invalid.
+/// Source       [Thrun2005] sec. 6.6; here the bearing is a unit vector instead of an angle.
 template <class Representation>
 struct RangeBearing
     : LandmarkSensor<RangeBearing<Representation>, Product<Vec<1>, UnitVector>, Representation> {
   static constexpr Quantity kMeasurement{"range_and_bearing", "",
-                                         "distance and direction of the landmark"};
+                                         "range and bearing of the landmark"};
   static constexpr std::array kParts{
-      Quantity{"range", "m", "distance from the sensor"},
-      Quantity{"bearing", "", "direction in the frame of the sensor", "x,y,z"}};
+      Quantity{"range", "m", "distance of the landmark from the sensor"},
+      Quantity{"bearing", "", "direction of the landmark in the frame of the sensor", "x,y,z"}};
 
   double sigma_range_m, sigma_bearing_rad, max_range_m;
 
@@ -39,10 +39,10 @@ struct RangeBearing
                double largest_range_m = std::numeric_limits<double>::infinity())
       : sigma_range_m(range_m), sigma_bearing_rad(bearing_rad), max_range_m(largest_range_m) {}
   explicit RangeBearing(Params& p)
-      : RangeBearing(p.Positive("sigma_range_m", "m", "noise of the range, 1 sigma"),
+      : RangeBearing(p.Positive("sigma_range_m", "m", "standard deviation of the range"),
                      p.Positive("sigma_bearing_rad", "rad",
-                                "noise of the bearing across its direction, 1 sigma"),
-                     p.NumberOrNone("max_range_m", "m", "largest range that is measured", kPositive)
+                                "standard deviation of the bearing, for each of its two axes"),
+                     p.NumberOrNone("max_range_m", "m", "largest valid range", kPositive)
                          .value_or(std::numeric_limits<double>::infinity())) {}
 
   template <class T>

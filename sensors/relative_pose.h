@@ -6,13 +6,14 @@
 namespace alidade {
 
 /// Pose of a landmark relative to the body. The landmark is a fiducial tag, an object, a station or
-/// a keyframe. A keyframe is the body itself at an earlier time, and the target of odometry and
-/// loop closures. A landmark that is first seen at the neutral pose, without noise, is a keyframe:
-/// its pose is then a clone of the body's pose, with all correlations.
+/// a keyframe. A keyframe is the pose of the body at an earlier time; odometry and loop closures
+/// are measured relative to it. To create a keyframe, measure a new landmark at the neutral pose
+/// without noise. The pose of the landmark is then a clone of the body's pose, with all
+/// correlations.
 ///
 ///   model      z = (R_BW (p - r) + n_r, (q^-1 s) (+) n_q),   (n_r, n_q) ~ N(0, R)
 ///   Jacobian   automatic differentiation               6 x 12
-///   noise      R = diag(sigma_r^2, sigma_q^2), or a full covariance with each measurement
+///   noise      R = diag(sigma_r^2, sigma_q^2), or the covariance of the measurement
 ///                                                      6x6, m^2, m rad, rad^2
 ///   inverse    p = r + R_WB z_r,   s = q z_q
 ///
@@ -24,23 +25,24 @@ namespace alidade {
 ///   z_q        4      -       body      orientation of the landmark, body_from_landmark
 ///   n_r        3      m       body      noise of z_r
 ///   n_q        3      rad     landmark  noise of z_q, q (+) n = q Exp(n)
-///   sigma_r, sigma_q  3  m, rad  as n_r, n_q             standard deviations by axis; > 0
+///   sigma_r, sigma_q  3  m, rad  as n_r, n_q             standard deviation for each axis; > 0
 ///
 /// Defined everywhere.
 /// Source       clones [Roumeliotis2002]; q (+) n [Sola2017] ch. 4.
 struct RelativePose
     : Sensor<Product<Vec<3>, UnitQuaternion>, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion> {
   static constexpr std::array kRoles{
-      Quantity{"position", "m", "of the body in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_body", "w,x,y,z"},
-      Quantity{"landmark_position", "m", "of the landmark in the world", "x,y,z",
+      Quantity{"position", "m", "position of the body in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the body, world_from_body", "w,x,y,z"},
+      Quantity{"landmark_position", "m", "position of the landmark in the world", "x,y,z",
                ALIDADE_ROLE_LANDMARK},
-      Quantity{"landmark_orientation", "", "world_from_landmark", "w,x,y,z",
-               ALIDADE_ROLE_LANDMARK}};
+      Quantity{"landmark_orientation", "", "orientation of the landmark, world_from_landmark",
+               "w,x,y,z", ALIDADE_ROLE_LANDMARK}};
   static constexpr Quantity kMeasurement{"relative_pose", "",
-                                         "position and orientation of the landmark in the body"};
-  static constexpr std::array kParts{Quantity{"position", "m", "in the body", "x,y,z"},
-                                     Quantity{"orientation", "", "body_from_landmark", "w,x,y,z"}};
+                                         "pose of the landmark in the frame of the body"};
+  static constexpr std::array kParts{
+      Quantity{"position", "m", "position of the landmark in the frame of the body", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the landmark, body_from_landmark", "w,x,y,z"}};
   static constexpr int kInitialises = 2;
 
   std::array<double, 3> sigma_position_m, sigma_orientation_rad;
@@ -49,10 +51,11 @@ struct RelativePose
                const std::array<double, 3>& orientation_rad)
       : sigma_position_m(position_m), sigma_orientation_rad(orientation_rad) {}
   explicit RelativePose(Params& p)
-      : RelativePose(p.PerAxis<3>("sigma_position_m", "m",
-                                  "noise along the axes of the body, 1 sigma", kPositive),
-                     p.PerAxis<3>("sigma_orientation_rad", "rad",
-                                  "noise about the axes of the landmark, 1 sigma", kPositive)) {}
+      : RelativePose(
+            p.PerAxis<3>("sigma_position_m", "m", "standard deviation along each axis of the body",
+                         kPositive),
+            p.PerAxis<3>("sigma_orientation_rad", "rad",
+                         "standard deviation about each axis of the landmark", kPositive)) {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* landmark_position,

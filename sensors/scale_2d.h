@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// Inverse apparent size of a target relative to a template that was recorded at depth Z0.
+/// Inverse of the apparent size of a target, relative to a template that was recorded at depth Z0.
 ///
 ///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
 ///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
-///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from pixels, see below
+///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from edge noise, see below
 ///              constant:   sigma_s = sigma_inverse_scale
 ///   inverse    lambda = s / Z
 ///
@@ -17,14 +17,14 @@ namespace alidade {
 ///   s          1      -       cam    template size / apparent size
 ///   Z          1      m       cam    depth along the optical axis
 ///   lambda     1      1/m     -      inverse depth at which the template was recorded
-///   w, sigma   1      px      -      template width, noise of an edge, 1 sigma; > 0
+///   w, sigma   1      px      -      template width, standard deviation of an edge; > 0
 ///
-/// The scale w'/w of a target of width w' = w / s has the standard deviation 2 sigma / w'. The
-/// source adds the errors of the two edges linearly, not in quadrature. The standard deviation of
-/// s = 1 / scale is then s^2 2 sigma / w'.
+/// A target of width w' = w / s has the scale w'/w. In the source, the scale has the standard
+/// deviation 2 sigma / w', because the errors of the two edges are added linearly, not in
+/// quadrature. The standard deviation of s = 1 / scale is then s^2 2 sigma / w'.
 ///
-/// Defined for  Z > 0 and lambda > 0; else out_of_domain, outputs untouched.
-/// Valid for    s > 0; else the measurement is invalid.
+/// Defined for  Z > 0 and lambda > 0. Otherwise out_of_domain; outputs unchanged.
+/// Valid for    s > 0. Other measurements are invalid.
 /// Source       [Ekf2017] sec. 1.2, h2; noise sec. 4.
 struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{
@@ -33,18 +33,20 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr Quantity kMeasurement{"inverse_scale", "", "template size / apparent size"};
   static constexpr int kInitialises = 1;
 
-  double constant_sigma = 0.0;  ///< > 0: the noise is constant
-  double relative_sigma = 0.0;  ///< 2 sigma / w
+  double constant_sigma = 0.0;  ///< sigma_inverse_scale of constant noise; 0: propagated noise
+  double relative_sigma = 0.0;  ///< 2 sigma / w of propagated noise
 
   static Scale2d FromPixels(double template_px, double sigma_px) {
     return Scale2d(0.0, 2.0 * sigma_px / template_px);
   }
   static Scale2d FromSigma(double sigma) { return Scale2d(sigma, 0.0); }
   explicit Scale2d(Params& p)
-      : Scale2d(p.Choice("noise_model", {"propagated", "constant"}, "noise of 1/scale", 0) == 1
-                    ? FromSigma(p.Positive("sigma_inverse_scale", "", "noise of 1/scale, 1 sigma"))
-                    : FromPixels(p.Positive("template_px", "px", "width of the template"),
-                                 p.Positive("sigma_px", "px", "noise of an edge, 1 sigma"))) {}
+      : Scale2d(
+            p.Choice("noise_model", {"propagated", "constant"}, "kind of the noise of 1/scale",
+                     0) == 1
+                ? FromSigma(p.Positive("sigma_inverse_scale", "", "standard deviation of 1/scale"))
+                : FromPixels(p.Positive("template_px", "px", "width of the template"),
+                             p.Positive("sigma_px", "px", "standard deviation of an edge"))) {}
 
   template <class T>
   bool Predict(const T* depth, const T* inverse_distance, T* inverse_scale) const {

@@ -7,7 +7,8 @@ namespace {
 
 void Make(alidade::Params& p, AlidadeInstance* instance) {
   using alidade::SelfCalibratingFeature;
-  if (p.Choice("lens", {"radial", "radtan"}, "lens model, which defines the intrinsics", 0) == 1) {
+  if (p.Choice("lens", {"radial", "radtan"}, "lens model, which determines the intrinsics", 0) ==
+      1) {
     alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadtanLens>>(p, instance);
   } else {
     alidade::EmplaceSensor<SelfCalibratingFeature<alidade::RadialLens>>(p, instance);
@@ -17,5 +18,5 @@ void Make(alidade::Params& p, AlidadeInstance* instance) {
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "self_calibrating_feature",
-                                 "pixel at which a camera of unknown intrinsics sees a point",
+                                 "pixel at which a camera with unknown intrinsics sees a point",
                                  "[Agarwal2010]"))

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Lens with focal length and radial distortion: the camera of Bundler and of the BAL problems.
+/// Lens with focal length and radial distortion, as in Bundler and in the BAL problems.
 ///
 ///   z = f s(q) (x, y),   s(q) = 1 + k1 q + k2 q^2,   q = x^2 + y^2
 struct RadialLens {
@@ -13,7 +13,7 @@ struct RadialLens {
                                         "focal_px,k1,k2"};
   static constexpr int kSize = 3;
 
-  /// Computes z of the ray (x, y, 1), with k = (f, k1, k2).
+  /// Computes z of the ray (x, y, 1) for the intrinsics k = (f, k1, k2).
   template <class T>
   static void Project(const T* k, const T& x, const T& y, T* z) {
     const T q = x * x + y * y;
@@ -21,7 +21,7 @@ struct RadialLens {
     z[0] = scale * x;
     z[1] = scale * y;
   }
-  /// J_z_x (2x2, row-major) and J_z_k of it.
+  /// Computes the Jacobians of Project: J_z_x = dz/d(x, y), 2x2 row-major, and J_z_k = dz/dk.
   static void Jacobian(const double* k, double x, double y, double* J_z_x, MatrixRef J_z_k) {
     const double q = x * x + y * y, s = 1.0 + q * (k[1] + q * k[2]);
     const double slope = 2.0 * k[0] * (k[1] + 2.0 * q * k[2]);
@@ -37,7 +37,7 @@ struct RadialLens {
   }
 };
 
-/// Lens with focal length, principal point, radial and tangential distortion: `radtan` of
+/// Lens with focal length, principal point, radial and tangential distortion. It equals `radtan` of
 /// alidade/model/camera.h with square pixels.
 ///
 ///   z = c + f (x s(q) + 2 p1 x y + p2 (q + 2 x^2),  y s(q) + p1 (q + 2 y^2) + 2 p2 x y)
@@ -48,7 +48,7 @@ struct RadtanLens {
                                         "focal_px,cx,cy,k1,k2,k3,p1,p2"};
   static constexpr int kSize = 8;
 
-  /// Computes z of the ray (x, y, 1), with k = (f, cx, cy, k1, k2, k3, p1, p2).
+  /// Computes z of the ray (x, y, 1) for the intrinsics k = (f, cx, cy, k1, k2, k3, p1, p2).
   template <class T>
   static void Project(const T* k, const T& x, const T& y, T* z) {
     T distorted[2];
@@ -56,7 +56,7 @@ struct RadtanLens {
     z[0] = k[1] + k[0] * distorted[0];
     z[1] = k[2] + k[0] * distorted[1];
   }
-  /// J_z_x (2x2, row-major) and J_z_k of it.
+  /// Computes the Jacobians of Project: J_z_x = dz/d(x, y), 2x2 row-major, and J_z_k = dz/dk.
   static void Jacobian(const double* k, double x, double y, double* J_z_x, MatrixRef J_z_k) {
     const double f = k[0], q = x * x + y * y, p1 = k[6], p2 = k[7];
     const double s = 1.0 + q * (k[3] + q * (k[4] + q * k[5]));
@@ -88,7 +88,7 @@ struct RadtanLens {
   }
 };
 
-/// Pixel at which a camera sees a point. The intrinsics of the camera are estimated too.
+/// Pixel at which a camera sees a point. The intrinsics of the camera are also estimated.
 ///
 ///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, R),   h = R_CW (p - r)
 ///   Jacobian   A = dz/dh:  dz/dr = -A R_CW,  dz/dq = A [h]x,  dz/dp = A R_CW,  dz/dk    2 x n
@@ -101,19 +101,19 @@ struct RadtanLens {
 ///   p          3      m       world  the point
 ///   sigma      2      px      -      standard deviations of u and v; > 0
 ///
-/// Defined for  hz > 0, or hz != 0 if the domain is projective; else out_of_domain, outputs
-///              untouched. BAL and Bundler define their camera by p = -P / P_z for both signs.
+/// Defined for  hz > 0, or hz != 0 if the domain is projective. Otherwise out_of_domain; outputs
+///              unchanged. In BAL and Bundler, P_z may have either sign (p = -P / P_z).
 /// Source       [Agarwal2010], [Brown1971].
 template <class Lens>
 struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens::kSize>, Vec<3>> {
   static constexpr std::array kRoles{
-      Quantity{"position", "m", "of the camera in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}, Lens::kIntrinsics,
-      Quantity{"point", "m", "in the world", "x,y,z"}};
+      Quantity{"position", "m", "position of the camera in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the camera, world_from_cam", "w,x,y,z"},
+      Lens::kIntrinsics, Quantity{"point", "m", "position of the point in the world", "x,y,z"}};
   static constexpr Quantity kMeasurement{"pixel", "px", "pixel of the point", "u,v"};
 
   std::array<double, 2> sigma_px;
-  bool is_projective;  ///< points behind the camera are seen too
+  bool is_projective;  ///< whether points behind the camera are also visible
 
   explicit SelfCalibratingFeature(const std::array<double, 2>& sigma, bool projective = false)
       : sigma_px(sigma), is_projective(projective) {}
@@ -121,10 +121,10 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
       : SelfCalibratingFeature(std::array{sigma, sigma}, projective) {}
   explicit SelfCalibratingFeature(Params& p)
       : SelfCalibratingFeature{
-            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+            p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
                          kPositive),
             p.Choice("domain", {"in_front", "projective"},
-                     "visible points: only those in front of the camera, or all", 0) == 1} {}
+                     "points that are visible: those in front of the camera, or all", 0) == 1} {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* intrinsics, const T* point,
@@ -144,7 +144,7 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
     Lens::Jacobian(intrinsics, x, y, J_z_x, J_z_k);
     for (int i = 0; i < 2; ++i) {
       const double ax = J_z_x[2 * i] * inverse_depth, ay = J_z_x[2 * i + 1] * inverse_depth;
-      const double a[3] = {ax, ay, -(ax * x + ay * y)};  // a row of dz/dh
+      const double a[3] = {ax, ay, -(ax * x + ay * y)};  // one row of dz/dh
       double in_world[3];
       UnitQuaternion::Rotate(orientation, a, in_world);
       for (int c = 0; c < 3; ++c) {

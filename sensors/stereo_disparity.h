@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Disparity of one point seen by a rectified stereo pair.
+/// Disparity of one point that a rectified stereo pair sees.
 ///
 ///   model      d = f B / Z + n,   n ~ N(0, sigma^2)
 ///   Jacobian   dd/dZ = -f B / Z^2                      1x1, px/m
@@ -17,10 +17,10 @@ namespace alidade {
 ///   Z          1      m       left   depth along the optical axis
 ///   f, B       1      px, m   -      rectified focal length, baseline; > 0
 ///   sigma      1      px      -      standard deviation of d; > 0
-///   r          1      m       left   min_range_m: the smallest depth that is measured; 0: no limit
+///   r          1      m       left   min_range_m: the smallest valid depth; 0: no limit
 ///
-/// Defined for  Z > 0; else out_of_domain, outputs untouched.
-/// Valid for    0 < d <= f B / r; else the measurement is invalid.
+/// Defined for  Z > 0. Otherwise out_of_domain; outputs unchanged.
+/// Valid for    0 < d <= f B / r. Other measurements are invalid.
 /// Source       [Ekf2017] sec. 1.2, h1; r: sec. 4.
 struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"depth", "m", "depth along the optical axis"}};
@@ -35,11 +35,11 @@ struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
         max_px(min_range_m > 0.0 ? bf_px_m / min_range_m
                                  : std::numeric_limits<double>::infinity()) {}
   explicit StereoDisparity(Params& p)
-      : StereoDisparity(p.Positive("focal_px", "px", "rectified focal length"),
-                        p.Positive("baseline_m", "m", "stereo baseline"),
-                        p.Positive("sigma_px", "px", "disparity noise, 1 sigma"),
-                        p.NonNegative("min_range_m", "m",
-                                      "smallest depth that is measured; 0: no limit", 0.0)) {}
+      : StereoDisparity(
+            p.Positive("focal_px", "px", "rectified focal length"),
+            p.Positive("baseline_m", "m", "stereo baseline"),
+            p.Positive("sigma_px", "px", "standard deviation of the disparity"),
+            p.NonNegative("min_range_m", "m", "smallest valid depth; 0: no limit", 0.0)) {}
 
   template <class T>
   bool Predict(const T* depth, T* disparity) const {

@@ -9,21 +9,21 @@ namespace alidade {
 /// Pixels at which a rectified stereo pair sees a landmark.
 ///
 ///   model      u = cx + fx hx/hz,  v = cy + fy hy/hz            h = R_CW (rho (a - r) + m)
-///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, R)
+///              u_right = u - fx B rho/hz,  v_right = v,    plus noise n ~ N(0, R)
 ///   Jacobian   automatic differentiation               4 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = diag(sigma_u^2, sigma_v^2, sigma_u^2, sigma_v^2)   4x4, px^2
 ///   inverse    the point at depth fx B / d on the ray of (u, (v + v_right)/2),  d = u - u_right
 ///
 ///   symbol     shape  unit    frame  meaning
-///   u, v       2      px      left   pixel of the left camera; u_right, v_right of the right one
-///   r, q       3, 4   m, -    world  position and orientation (world_from_left)
-///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
-///   fx..cy     1      px      -      of both cameras, which have no distortion
-///   B          1      m       -      baseline: the right camera is at x = B of the left one; > 0
+///   u, v       2      px      left   pixel in the left image; u_right, v_right: in the right image
+///   r, q       3, 4   m, -    world  position and orientation (world_from_left) of the left camera
+///   a, m, rho  -      -       world  the landmark p = a + m / rho; its representation defines them
+///   fx..cy     1      px      -      intrinsics of both cameras, which have no distortion
+///   B          1      m       -      baseline: x of the right camera in the left camera; > 0
 ///   sigma      2      px      -      standard deviations of u and v, in both images; > 0
 ///
-/// Defined for  hz > 0; else out_of_domain, outputs untouched.
-/// Valid for    pixels on the images, and d > 0; else the measurement is invalid.
+/// Defined for  hz > 0. Otherwise out_of_domain; outputs unchanged.
+/// Valid for    pixels inside the images and d > 0. Other measurements are invalid.
 /// Source       [MonoSlam2015] sec. 2.2; stereo [Ekf2017] sec. 1.2.
 template <class Representation>
 struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Representation> {
@@ -39,12 +39,13 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
   StereoFeature(const Camera& left_camera, double baseline, double sigma)
       : StereoFeature(left_camera, baseline, std::array{sigma, sigma}) {}
   explicit StereoFeature(Params& p)
-      : StereoFeature(Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
-                      p.PerAxis<2>("sigma_px", "px",
-                                   "noise of a pixel, 1 sigma; one number, or [u, v]", kPositive)) {
+      : StereoFeature(
+            Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
+            p.PerAxis<2>("sigma_px", "px", "standard deviation of u and v: one number, or [u, v]",
+                         kPositive)) {
     if (camera.model != CameraModel::kPinhole) {
       p.Fail("camera.model",
-             "is not 'pinhole'; expected pinhole, because a rectified pair has no "
+             "is not 'pinhole'; expected pinhole, because a rectified stereo pair has no "
              "distortion");
     }
   }
@@ -71,7 +72,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
     const T mean[2] = {pixels[0], 0.5 * (pixels[1] + pixels[3])};
     T h[3];
     if (!(disparity > T(0.0)) || !camera.Unproject(mean, h)) return false;
-    const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // of h, whose depth is 1
+    const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // length of h; the depth of h is 1
     const T rho = disparity / (camera.fx * baseline_m * length);
     return PlaceLandmark<Representation>(position, orientation, h, rho, landmark);
   }

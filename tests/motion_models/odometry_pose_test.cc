@@ -145,7 +145,8 @@ TEST(OdometryPose, IsMountedByAUnitQuaternion) {
   const MapHost host(values);
   static_cast<void>(testing::MakeInstance(&EmplaceMotion<OdometryPose>, host));
   ASSERT_EQ(host.failures().size(), 1u);
-  EXPECT_EQ(host.failures()[0], "vehicle_from_cam.orientation: is not of unit length to 1e-3");
+  EXPECT_EQ(host.failures()[0],
+            "vehicle_from_cam.orientation: does not have unit length (tolerance 1e-3)");
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "alidade/base/number_text.h"
 #include "alidade/io/sha256.h"
@@ -52,21 +51,23 @@ TEST(Recorder, WritesEveryFile) {
 TEST(Recorder, ColumnsJsonHasTheHeaderOfEveryCsvFile) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"));
-  const auto columns = nlohmann::json::parse(Read(folder / "out/columns.json"));
-  int files = 0;
+  const Config columns = Config::FromText(Read(folder / "out/columns.json"), "columns.json");
+  std::size_t files = 0;
   for (const std::string& file : FilesIn(folder / "out")) {
     if (!file.ends_with(".csv") || file == "comparison.csv") continue;
     ++files;
     std::vector<std::string> names;
-    for (const auto& column : columns.at(file)) names.push_back(column.at("name"));
+    for (const Node& column : columns.root().At(file).Items()) {
+      names.push_back(column.At("name").Text());
+    }
     EXPECT_EQ(names, Cells(Lines(folder / "out" / file).at(0))) << file;
   }
-  EXPECT_EQ(files, static_cast<int>(columns.size()));
-  const auto& sigma = columns.at("ekf/estimates.csv").at(2);
-  EXPECT_EQ(sigma.at("name"), "sigma:target.depth");
-  EXPECT_EQ(sigma.at("unit"), "m");
-  EXPECT_EQ(sigma.at("quantity"), "sigma");
-  EXPECT_EQ(sigma.at("subject"), "target.depth");
+  EXPECT_EQ(files, columns.root().Entries().size());
+  const Node sigma = columns.root().At("ekf/estimates.csv").Items().at(2);
+  EXPECT_EQ(sigma.At("name").Text(), "sigma:target.depth");
+  EXPECT_EQ(sigma.At("unit").Text(), "m");
+  EXPECT_EQ(sigma.At("quantity").Text(), "sigma");
+  EXPECT_EQ(sigma.At("subject").Text(), "target.depth");
 }
 
 TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {

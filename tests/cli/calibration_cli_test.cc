@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Data with their own calibration: a model reads it if the config omits it. A config with a
-// different calibration is refused.
+// Tests data that come with a calibration. A model reads this calibration if the config has none. A
+// config with a different calibration is refused.
 #include "support/program.h"
 
 namespace alidade {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Messages of the program while it runs.
+// Tests the messages that the program prints and writes while it runs.
 #include "support/program.h"
 
 namespace alidade {

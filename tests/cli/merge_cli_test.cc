@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade merge`: merged shards of a sweep have the same bytes as a sweep in one process.
+// Tests `alidade merge`: the merged shards of a sweep give the same bytes as a sweep in one
+// process.
 #include "support/run_files.h"
 
 namespace alidade::testing {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The output folders of the program, and its error messages.
+// Tests the output folders of the program and the error messages about them.
 #include <cmath>
 
 #include "alidade/config/config.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A model throws or returns an error in the middle of a run.
+// Tests models that throw or return an error in the middle of a run.
 #include "support/program.h"
 
 namespace alidade::testing {

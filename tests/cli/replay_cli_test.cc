@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade replay` repeats the run of a run folder, or reports each difference.
+// Tests `alidade replay`, which repeats the run of a run folder and reports each difference.
 #include "support/run_files.h"
 
 namespace alidade::testing {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The config that a run or sweep leaves in its folder repeats it from any working folder.
+// A run or sweep writes its config into its folder. Tests that this config repeats the run from any
+// working folder.
 #include "support/program.h"
 
 namespace alidade {

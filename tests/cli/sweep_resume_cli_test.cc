@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// `alidade sweep --resume`. Sweeps that are killed are in tests/faults/killed_run_test.cc.
+// Tests `alidade sweep --resume`. tests/faults/killed_run_test.cc tests sweeps that are killed.
 #include <algorithm>
 
 #include "support/run_files.h"

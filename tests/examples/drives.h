@@ -26,7 +26,7 @@ class DrivesTest : public ::testing::Test {
       GTEST_SKIP() << "ALIDADE_DATA has no kitti-stereo-tracks";
     }
   }
-  /// Returns the example's config for the first `frames` frames of a drive.
+  /// Returns the config of `example` for the first `frames` frames of `drive`.
   Config ConfigOf(const std::string& example, const std::string& drive, int frames,
                   const Settings& settings) const {
     Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples" /

@@ -119,7 +119,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
   EXPECT_LT(diverged, 140);
 }
 
-// Experiment 4.2: only the product lambda Z is observable.
+// Experiment 4.2: a scale sensor alone observes only the product lambda Z.
 TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   const RunResult run = RunExample("02_depth_scale_only", {});
   EXPECT_EQ(run.code, ExitCode::kOk);

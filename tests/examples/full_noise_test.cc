@@ -28,7 +28,7 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
   static constexpr int kPrior = 1;
 
-  InverseDepthFeature<Representation> pixel;  // provides h, the valid domain and the inverse model
+  InverseDepthFeature<Representation> pixel;  // computes h, the valid domain and the inverse model
   double sigma_u_px, sigma_v_px, correlation;
 
   CorrelatedPixel(const Camera& camera, double sigma_u, double sigma_v, double rho)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/30_loop_closure: odometry drifts, and loop closures remove the drift.
+// Tests examples/30_loop_closure: the odometry drifts, and loop closures remove the drift.
 #include <gtest/gtest.h>
 
 #include <filesystem>

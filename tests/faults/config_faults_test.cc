@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Configs with one fault each: a base config of tests/faults/configs with a line or two changed,
-// and the exit code, line and words of the expected message.
+// Tests configs with one fault each. A config is a base config of tests/faults/configs with one or
+// two changed lines. Each row has the expected exit code, and the line and words of the expected
+// message.
 #include <gtest/gtest.h>
 
 #include "support/program.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Faulty data, processed by the whole program. The comment above each test has the number of its
+// Tests the whole program with faulty data. The comment above each test has the number of its
 // fault. The tests of the file readers are in tests/plugins/*/*_faults_test.cc.
 #include <cmath>
 

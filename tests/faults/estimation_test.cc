@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The covariance of a filter becomes invalid. The comment above each test has the number of its
+// Tests filters whose covariance becomes invalid. The comment above each test has the number of its
 // fault.
 #include <gtest/gtest.h>
 

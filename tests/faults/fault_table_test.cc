@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The tests that tests/faults/README.md lists exist.
+// Checks that all tests that tests/faults/README.md lists exist.
 #include <gtest/gtest.h>
 
 #include <regex>

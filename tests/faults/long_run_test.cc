@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The memory of a run does not grow with its length. The configs are those of bench/long_run.
+// Tests that the memory of a run does not grow with its length. The configs are those of
+// bench/long_run.
 #include <algorithm>
 
 #include "support/program.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Several runs and plugins in one process.
+// Tests several runs and plugins in the same process.
 #include <gtest/gtest.h>
 
 #include <optional>

@@ -36,7 +36,7 @@ void Emplace(double sigma, AlidadeInstance* instance) {
   alidade::detail::PublishSensor(std::make_unique<Holder>(Model(sigma)), instance);
 }
 
-/// Pixels of a landmark in the representation that `landmarks.representation` selects.
+/// Measures the pixels of a landmark in the representation that `landmarks.representation` selects.
 void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
   using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
   const int representation =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Faults of a run's environment: disk, signals, memory. The comment above each test has the number
-// of its fault. These faults are tested elsewhere:
+// Tests faults in the environment of a run: disk, signals and memory. The comment above each test
+// has the number of its fault. Other tests cover these faults:
 //   87  Recorder.AFullDiskKeepsTheRows, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
 //   93  OutputFolder.AFolderThatCannotBeWrittenToIsRefused

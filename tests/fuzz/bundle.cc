@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A bundle adjustment problem of any format: reading its BundleText gives the same problem.
+// The input is a bundle adjustment problem in any format. Reading its BundleText must give the same
+// problem.
 #include "alidade/bundle/bundle_file.h"
 #include "fuzz.h"
 

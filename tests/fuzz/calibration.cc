@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A camera calibration in the format of this project, OpenCV, ROS, Kalibr or EuRoC.
+// The input is a camera calibration in the format of this project, OpenCV, ROS, Kalibr or EuRoC.
 #include "fuzz.h"
 #include "plugins/common/calibration_file.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The files of a run folder that `alidade compare` reads; the estimator is `ekf`.
+// The input contains the files of a run folder that `alidade compare` reads. The estimator is
+// `ekf`.
 #include "alidade/compare/finished_run.h"
 #include "fuzz.h"
 

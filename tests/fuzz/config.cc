@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A config, `key=value` as of --set, and overrides: reading its ToYaml gives the same tree.
+// The input is a config, a `key=value` as for --set, and overrides. Reading the ToYaml of the
+// config must give the same tree.
 #include "alidade/config/config.h"
 
 #include "alidade/config/read_covariance.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The config of the source csv, and its table.
+// The input is the config of the source csv and the table that it reads.
 #include "plugins/csv/csv.h"
 
 #include "fuzz.h"

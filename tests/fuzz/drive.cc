@@ -2,9 +2,9 @@
 //
 // Replaces libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
 //
-// Runs each seed once, and then the given number of mutations of the seeds in the folder, the same
-// in every run. An input that ends the program is kept as crash-PROCESS in the working folder. Exit
-// code 2: a seed or the folder cannot be read.
+// Runs each seed once. With FOLDER, then runs the given number of mutations of the seeds. The
+// mutations are the same in every run. An input that ends the program is kept as crash-PROCESS in
+// the working folder. Exit code 2: a seed or the folder cannot be read.
 #include <fcntl.h>
 #include <signal.h>
 

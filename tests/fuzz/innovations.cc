@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The innovations.csv of a run folder.
+// The input is the innovations.csv of a run folder.
 #include "alidade/evaluate/evaluate.h"
 #include "fuzz.h"
 

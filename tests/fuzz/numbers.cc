@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Numbers and timestamps as text, compared with the results of the C library and of 128-bit
-// integers.
+// The input is a number or timestamp as text. The result is compared with that of the C library and
+// of 128-bit integers.
 #include <cmath>
 #include <cstring>
 

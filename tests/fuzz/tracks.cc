@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The config of the source tracks, the tracks, and the files next to them.
+// The input is the config of the source tracks, the tracks, and the files next to them.
 #include "plugins/tracks/tracks.h"
 
 #include "fuzz.h"

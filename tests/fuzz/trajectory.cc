@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Two bytes of options, then a reference and an estimate in any format.
+// The input has two bytes of options, then a reference and an estimate in any format.
 #include "alidade/evaluate/evaluate.h"
 #include "fuzz.h"
 

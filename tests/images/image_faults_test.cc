@@ -172,7 +172,7 @@ TEST_F(ImageFaults, AFrozenImageMovesNothing) {
 }
 
 TEST_F(ImageFaults, DuplicatedImagesAreFollowedBackAndForth) {
-  shown_[6] = shown_[5];  // each of two images is sent twice
+  shown_[6] = shown_[5];  // images 5 and 7 are each sent twice
   shown_[8] = shown_[7];
   shown_[11] = shown_[9];  // two images, then the same two images again
   shown_[12] = shown_[10];

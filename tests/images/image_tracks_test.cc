@@ -579,7 +579,7 @@ TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
   const double perfect =
       rmse_of("source={type: tracks, path: " + (folder_ / "room").string() + "}");
   EXPECT_GT(perfect, 0.0003);
-  EXPECT_LT(perfect, 0.002);  // m
+  EXPECT_LT(perfect, 0.002);  // in m
   RecordProperty("seen_and_perfect_m", std::to_string(seen) + ' ' + std::to_string(perfect));
   EXPECT_LT(seen, 1.5 * perfect);
 }

@@ -33,7 +33,7 @@ TEST(Constant, WalksWithTheRootOfTime) {
   EXPECT_EQ(StepWithJacobians(walk, x, nullptr, nullptr, 0.25).next, x)
       << "no noise given is zero noise";
   ExpectTrueJacobians(walk, x, nullptr, {0.1, -0.2, 0.3}, 0.25);
-  // 0.2^2 0.25 = 0.01
+  // The variance is 0.2^2 0.25 = 0.01.
   ExpectSame(Covariance(walk, x, 0.25), {0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01}, 1e-15);
 }
 

@@ -19,7 +19,7 @@ const double kPi = 3.14159265358979323846;
 // The x axis of the vehicle points forward and its z axis points up. The camera looks forward:
 // x_cam = -y, y_cam = -z, z_cam = x. The camera is 1 m in front of the vehicle's origin and 1.5 m
 // above it.
-const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
+const MapHost::Values kMounted{{"noise.kind", {1}},  // selects discrete noise
                                {"noise.linear_velocity", {0.03, 0.3, 0.3}},
                                {"noise.angular_velocity", {0.002}},
                                {"vehicle_from_cam.position", {1, 0, 1.5}},

@@ -34,7 +34,7 @@ TEST(QuaternionPose, MovesAndTurnsByWorkedNumbers) {
   EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(out.next[2], (std::vector<double>{1, 2, 0}));
   EXPECT_EQ(out.next[3], (std::vector<double>{0, 0, pi}));
-  const double q[4] = {0, 0, 0, 1};  // a half turn
+  const double q[4] = {0, 0, 0, 1};  // q is a half turn about z
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(out.next[1][i], q[i], 1e-15);
 }
 

@@ -16,7 +16,7 @@ SharedSensor DepthSensor(const Camera& camera) {
 }
 
 TEST(DepthFeature, PredictsWorkedNumbers) {
-  // The camera at (1, 0, 0) m looks along z; the point is at (0, 0.4, 2) m, so its depth is 2 m.
+  // The camera at (1, 0, 0) m looks along z. The point is at (0, 0.4, 2) m, so its depth is 2 m.
   // sigma_d = 0.01 + 0.003 2^2 = 0.022 m
   ForEachRepresentation([](auto representation) {
     using Representation = decltype(representation);

@@ -22,7 +22,7 @@ using testing::NumericSensorJacobian;
 using testing::Pointers;
 using testing::SensorJacobian;
 
-// lambda = 3 1/m, Z = 0.5 m: s = 1.5
+// lambda = 3 1/m and Z = 0.5 m, so s = 1.5.
 const MapHost::Values kScale{{"noise_model", {0}}, {"template_px", {300}}, {"sigma_px", {1}}};
 const Blocks kScaleRoles{{0.5}, {3.0}};
 
@@ -35,7 +35,7 @@ TEST(Scale2d, PredictsWorkedNumbers) {
   EXPECT_EQ(SensorJacobian(scale, kScaleRoles), (std::vector<double>{3.0, 0.5}));
   ExpectSame(SensorJacobian(scale, kScaleRoles), NumericSensorJacobian(scale, kScaleRoles),
              kNumeric);
-  // (2 1 / 300) 1.5^3 = 0.0225
+  // The sigma is (2 1 / 300) 1.5^3 = 0.0225.
   ASSERT_EQ(scale->SqrtNoise(roles.data(), &s, &sigma), Status::kOk);
   EXPECT_DOUBLE_EQ(sigma, 0.0225);
 }
@@ -68,8 +68,8 @@ TEST(Scale2d, InitialisesTheInverseDistance) {
   double* jx[] = {&j_depth, &untouched};
   ASSERT_EQ(scale->Initialise(roles, {&s}, nullptr, {.y = &y, .jx = jx, .jz = &j_s}), Status::kOk);
   EXPECT_DOUBLE_EQ(y, 3.0);
-  EXPECT_DOUBLE_EQ(j_depth, -6.0);  // -s / Z^2
-  EXPECT_DOUBLE_EQ(j_s, 2.0);       // 1 / Z
+  EXPECT_DOUBLE_EQ(j_depth, -6.0);  // lambda = s / Z, so d lambda / dZ = -s / Z^2
+  EXPECT_DOUBLE_EQ(j_s, 2.0);       // d lambda / ds = 1 / Z
   EXPECT_EQ(untouched, kPoison);
 }
 

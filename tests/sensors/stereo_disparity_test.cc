@@ -21,7 +21,7 @@ using testing::MapHost;
 using testing::NumericSensorJacobian;
 using testing::SensorJacobian;
 
-// f = 400 px, B = 0.065 m, Z = 0.5 m: d = 400 0.065 / 0.5 = 52 px
+// f = 400 px, B = 0.065 m and Z = 0.5 m, so d = 400 0.065 / 0.5 = 52 px.
 const MapHost::Values kStereo{
     {"focal_px", {400}}, {"baseline_m", {0.065}}, {"sigma_px", {1.5}}, {"min_range_m", {0.2}}};
 
@@ -62,7 +62,7 @@ TEST(StereoDisparity, BehindTheCameraIsOutOfDomainAndWritesNothing) {
 
 TEST(StereoDisparity, IsInvalidNearerThanTheLimit) {
   const auto stereo = AbiSensor<StereoDisparity>(kStereo);
-  // f B / near = 26 / 0.2 = 130 px
+  // The largest valid disparity is f B / near = 26 / 0.2 = 130 px.
   for (const double ok : {1e-9, 52.0, 129.999}) EXPECT_EQ(stereo->Valid({&ok}), Status::kOk) << ok;
   for (const double bad : {0.0, -1.0, 130.001, kNaN}) {
     EXPECT_EQ(stereo->Valid({&bad}), Status::kInvalid) << bad;

@@ -42,7 +42,7 @@ TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
     const Blocks roles = kPose + LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     std::vector<double> z(4), l(16, kPoison);
     ASSERT_EQ(sensor->SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
-    const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // u, v, u_right, v_right
+    const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // in the order u, v, u_right, v_right
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? diagonal[i / 5] : 0.0);
   });
 }

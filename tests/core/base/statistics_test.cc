@@ -15,7 +15,7 @@ namespace {
 
 // Compares the bounds with tabulated quantiles of chi-square.
 TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
-  // chi2(0.025; 200) = 162.728, chi2(0.975; 200) = 241.058: [BarShalom2001], table 1.5.4-1.
+  // chi2(0.025; 200) = 162.728 and chi2(0.975; 200) = 241.058 [BarShalom2001, table 1.5.4-1].
   const Interval bounds = ConsistencyBounds(2.0, 100.0);
   EXPECT_NEAR(bounds.low, 162.728 / 200.0, 1e-5);
   EXPECT_NEAR(bounds.high, 241.058 / 200.0, 1e-5);

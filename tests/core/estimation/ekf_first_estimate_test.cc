@@ -85,7 +85,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   ASSERT_NEAR(lambda, 2.0 / 0.35, 1e-12);
   const Eigen::Matrix3d p = ekf.state().covariance().Dense();
   const Eigen::RowVector3d h(lambda, 0.0, 0.35);
-  const double sigma = 2.0 / 300.0 * 8.0;  // sigma of the measurement 1/scale = 2
+  const double sigma = 2.0 / 300.0 * 8.0;  // sigma of an inverse scale of 2
   const UpdateReport& next = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
   EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
 }

@@ -124,7 +124,7 @@ TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
   // Each match is used only once, so P agrees with the error.
   const Eigen::Vector3d error = PositionOf(ekf) - Eigen::Vector3d(0.05, -0.03, 0.08);
   const Eigen::MatrixXd p = ekf.state().covariance().Block(0, 3, 0, 3);
-  EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // chi2(0.999, 3)
+  EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // the bound is chi2(0.999, 3)
 }
 
 // The R / w of a Cauchy loss grows as fast as r^2. If the test used R / w, any match would support

@@ -336,7 +336,7 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
     return Find(ekf.landmarks(), id)->generation;
   };
   EXPECT_EQ(see(1), 0);
-  EXPECT_EQ(see(2), 0);  // landmark 1 is pruned
+  EXPECT_EQ(see(2), 0);  // this frame prunes landmark 1
   EXPECT_EQ(see(1), 1);
   const Ekf saved = ekf;
   EXPECT_EQ(see(2), 1);
@@ -386,7 +386,7 @@ TEST(Landmarks, WhoseFirstEndIsGoneBackOverAreTheFirstOfTheirId) {
   };
   const Ekf saved = ekf;
   EXPECT_EQ(see(5), 0);
-  EXPECT_EQ(see(6), 0);  // landmark 5 is pruned
+  EXPECT_EQ(see(6), 0);  // this frame prunes landmark 5
   ekf = saved;
   EXPECT_EQ(see(5), 0);
 }

@@ -366,7 +366,7 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInitialised);
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
   EXPECT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), 2.0, 1e-15);
-  // lambda = s / Z: d lambda = ds / Z - s / Z^2 dZ, sigma_s = 2/300 at s = 1.
+  // lambda = s / Z, so d lambda = ds / Z - s / Z^2 dZ. At s = 1, sigma_s = 2/300.
   const double variance_z = std::pow(0.25 / 26.0, 2), variance_s = std::pow(2.0 / 300.0, 2);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), variance_z, 1e-15);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"),
@@ -397,7 +397,7 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"), 0.0);
-  // lambda = s / Z with an exact Z = 0.35, sigma_s = 2/300 at s = 1.
+  // lambda = s / Z with an exact Z = 0.35. At s = 1, sigma_s = 2/300.
   EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
               std::pow(2.0 / 300.0 / 0.35, 2), 1e-15);
 }

@@ -389,7 +389,7 @@ TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   ekf.Process(FrameAt(0.5, {}));
   EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 2.0, 1e-15);
   EXPECT_EQ(ValueOf(ekf.state(), "p.v"), 2.0);
-  // P = 4 + (dt^2/2)^2
+  // The variance is P = 4 + (dt^2/2)^2.
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0 + std::pow(0.125, 2), 1e-14);
 }
 

@@ -39,7 +39,7 @@ TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
   EXPECT_EQ(iekf.landmarks().size(), 5u);
 }
 
-/// Cost of an update with one landmark, in closed form:
+/// Computes the cost of an update with one landmark in closed form:
 /// c(dx) = dx' P^-1 dx + |z - h(x (+) dx)|^2 / sigma^2.
 struct Cost {
   const State& prior;

@@ -174,7 +174,7 @@ TEST(UnobservableDirections, OdometryThatChangesTellsALeverArm) {
   EXPECT_EQ(UnobservableDirections(CarWithMast()), std::vector<Names>{});
 }
 
-/// Each block is the derivative of the previous one.
+/// A motion model with four blocks. Each block is the derivative of the previous one.
 struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}, Quantity{"v"}, Quantity{"a"}, Quantity{"j"}};
   template <class T>

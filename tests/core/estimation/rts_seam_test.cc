@@ -54,7 +54,7 @@ Eigen::Vector3d Turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return sine > 0.0 ? Eigen::Vector3d(across * (std::atan2(sine, a.dot(b)) / sine)) : across;
 }
 
-/// Returns the basis of the tangent plane at n, 3 x 2.
+/// Returns the basis of the tangent plane at n as a 3 x 2 matrix.
 Eigen::Matrix<double, 3, 2> BasisAt(const double* n) {
   double basis[6];
   UnitVector::Basis(n, basis);
@@ -65,7 +65,7 @@ Eigen::Matrix<double, 3, 2> BasisAt(const double* n) {
 struct DirectionBatch {
   Prior prior;
   double sigma;                         ///< noise of a step, and of a measurement
-  std::vector<Eigen::Vector3d> n = {};  ///< current solution
+  std::vector<Eigen::Vector3d> n = {};  ///< solution of the last iteration
   /// One measurement per frame; empty if the frame has none.
   std::vector<std::vector<double>> z = {};
   /// Joint covariance of all directions, in the tangent planes at n.

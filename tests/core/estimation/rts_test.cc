@@ -26,7 +26,8 @@ struct DenseBatch {
     const int size = n + frames - 1;
     normal = Eigen::MatrixXd::Zero(size, size);
     right = Eigen::VectorXd::Zero(size);
-    normal.bottomRightCorner(frames - 1, frames - 1).setIdentity();  // w ~ N(0, 1)
+    // Prior of the noise inputs: w ~ N(0, 1).
+    normal.bottomRightCorner(frames - 1, frames - 1).setIdentity();
     map.push_back(Eigen::MatrixXd::Identity(n, size));
   }
   void Step(const Eigen::MatrixXd& f, const Eigen::VectorXd& g) {

@@ -61,7 +61,7 @@ Problem WanderersOf(std::uint32_t geometry, int n) {
   return problem;
 }
 
-/// Returns x (+) n with n ~ N(0, sigma^2 I).
+/// Returns x (+) n, n ~ N(0, sigma^2 I).
 std::vector<double> Disturbed(const Geometry& geometry, const std::vector<double>& x, double sigma,
                               Random& random) {
   std::vector<double> d(static_cast<std::size_t>(geometry.tangent)), moved(x.size());

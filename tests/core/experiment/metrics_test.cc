@@ -105,7 +105,7 @@ TEST(Metrics, TakesErrorsByHand) {
   EXPECT_DOUBLE_EQ(metrics.at("final_error:a.x"), 4.0);
   EXPECT_DOUBLE_EQ(metrics.at("coverage95:a.x"), 0.5);
   EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), (9.0 / 4.0 + 16.0 / 4.0) / 2.0);
-  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 0.5);  // 2.25 <= 3.84 < 4
+  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 0.5);  // 2.25 <= chi2(0.95, 1) = 3.84 < 4
   EXPECT_EQ(metrics.count("lag_ms:a.x"), 0u);
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
@@ -273,7 +273,7 @@ TEST(Metrics, NeesIsOfEstimatedBlocksAlone) {
   one.Add({{3.0}, {100.0}});
   const auto metrics = one.Finish();
   EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), 9.0 / 4.0);
-  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 1.0);  // 2.25 <= 3.84
+  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 1.0);  // 2.25 <= chi2(0.95, 1) = 3.84
   EXPECT_DOUBLE_EQ(metrics.at("rmse:a.y"), 100.0);
 }
 

@@ -13,7 +13,7 @@
 namespace alidade::testing {
 namespace {
 
-constexpr double kWindow_s = 0.2;  // six frame intervals of the simulator
+constexpr double kWindow_s = 0.2;  // equals six frame intervals of the simulator
 
 /// Config with all types of filter, and with a smoother, which waits for all frames.
 constexpr const char* kFilters = R"(alidade: 1

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kPoints = 200;
-// Rounding error of a dozen operations on numbers up to 10.
+// Tolerance for the rounding errors of a dozen operations on numbers up to 10.
 constexpr double kTolerance = 2e-14;
 
 using Values = std::array<double, 7>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A build tag of another ABI, of another processor or with another C++ ABI number, selected by
-// BAD_BUILD_TAG.
+// A plugin with a wrong build tag. BAD_BUILD_TAG selects another ABI, another processor or another
+// C++ ABI number.
 #include "alidade/model/plugin.h"
 #include "probe.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models with a member that is missing or cannot be called, one for each value of BAD_MEMBER; 0: a
-// model without this fault. The compiler must refuse each with a message: see bad_members_test.sh.
+// Models with a member that is missing or cannot be called. Each value of BAD_MEMBER selects one
+// fault; 0 selects a model without a fault. The compiler must refuse each fault with a message, as
+// bad_members_test.sh checks.
 #include "alidade/model/plugin.h"
 
 using alidade::MatrixRef;
@@ -24,7 +25,7 @@ struct Base : alidade::Sensor<Vec<1>, Vec<1>, Vec<2>> {
 };
 
 #if BAD_MEMBER == 20
-struct Seen : alidade::Sensor<Vec<1>, Vec<1>> {  // without kRoles and kMeasurement
+struct Seen : alidade::Sensor<Vec<1>, Vec<1>> {  // kRoles and kMeasurement are missing
   explicit Seen(Params&) {}
   template <class T>
   bool Predict(const T* a, T* z) const {
@@ -50,7 +51,7 @@ struct Seen : Base {
 #elif BAD_MEMBER == 1
   void Jacobian(const double*, MatrixRef, MatrixRef) const {}  // a role is missing
 #elif BAD_MEMBER == 2
-  void Jacobian(const double*, const double*, MatrixRef, MatrixRef) {}  // not const
+  void Jacobian(const double*, const double*, MatrixRef, MatrixRef) {}  // not a const member
 #elif BAD_MEMBER == 3
   template <class T>
   void Jacobian(const T*, const T*, T*, T*) const {}
@@ -61,7 +62,7 @@ struct Seen : Base {
 #elif BAD_MEMBER == 5
   bool Valid(double) const { return true; }
 #elif BAD_MEMBER == 6
-  void Valid(const double*) const {}  // does not return a value
+  void Valid(const double*) const {}  // returns no value
 #elif BAD_MEMBER == 7
   template <class T>
   bool Initialise(const T*, const T*, T*) const {
@@ -81,7 +82,7 @@ struct Seen : Base {
   }
 #elif BAD_MEMBER == 14
   template <class T>
-  void SqrtNoise(const T*, const T*, T* l) {  // not const
+  void SqrtNoise(const T*, const T*, T* l) {  // not a const member
     l[0] = T(1.0);
   }
 #elif BAD_MEMBER == 21
@@ -144,7 +145,7 @@ struct Moved : MotionBase {
 #elif BAD_MEMBER == 18
   static constexpr double kStepOrder = 2.0;
 #elif BAD_MEMBER == 19
-  int kStepOrder = 2;  // not the declared type
+  int kStepOrder = 2;  // not of the declared type
 #elif BAD_MEMBER == 24
   bool noise_kind() const { return true; }
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Models with one fault each, for tests/plugins/host/check_test.cc, and five models without a
-// fault.
+// Models for tests/plugins/host/check_test.cc. Five of them have no fault; each of the others has
+// one fault.
 #include <unistd.h>
 
 #include <cfenv>
@@ -162,7 +162,7 @@ struct NoNoise : Right {
   }
 };
 
-/// Computes x from z with a wrong factor.
+/// The inverse model multiplies z by a wrong factor.
 struct WrongInverse : Right {
   using Right::Right;
   static constexpr int kInitialises = 0;
@@ -428,7 +428,7 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   template <class T>
   void Step(const T* s, const T* q, const T* u, const T* w, double dt_s, T* s1, T* q1) const {
     s1[0] = s[0] + u[0] * (kWhat == 1 ? 0.1 : dt_s) + w[0];
-    if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // Euler step of s' = u - 0.3 s
+    if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // an Euler step of s' = u - 0.3 s
     if (kWhat == 3) s1[0] = s1[0] + T(1e-3);
     const T d[3] = {w[1], w[2] + 0.4 * dt_s, w[3]};
     UnitQuaternion::Plus(q, d, q1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model that detects concurrent creation of another instance.
+// A model that fails if another instance is created at the same time.
 #include <atomic>
 #include <chrono>
 #include <stdexcept>

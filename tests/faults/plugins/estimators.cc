@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// C++ plugin with an estimator that throws while its options are read, and one without a factory.
+// A C++ plugin with two faulty estimators. One throws while its options are read, and one has no
+// factory.
 #include <stdexcept>
 
 #include "alidade/experiment/estimator_plugin.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// C++ plugin with working sources and one that throws.
+// A C++ plugin with working sources, and with a source that throws.
 #include <stdexcept>
 
 #include "alidade/experiment/source_plugin.h"

@@ -225,7 +225,7 @@ TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
   EXPECT_EQ(e.position_nees->poses, 9);
   EXPECT_NEAR(e.position_nees->mean, 2.0, 1e-9);
   EXPECT_NEAR(e.position_nees->within95, 1.0, 1e-12);  // 4 <= chi2(0.95, 2) = 5.99
-  // 0.1^2 / 0.05^2 = 4 > chi2(0.95, 1) = 3.84
+  // 0.1^2 / 0.05^2 = 4 is above chi2(0.95, 1) = 3.84.
   EXPECT_EQ(e.orientation_nees->dof, 1);
   EXPECT_EQ(e.orientation_nees->poses, 10);
   EXPECT_NEAR(e.orientation_nees->mean, 4.0, 1e-9);
@@ -294,7 +294,7 @@ TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   EXPECT_EQ(all[0].sensor, "pixel");
   EXPECT_EQ(all[0].measurements, 10);
   EXPECT_DOUBLE_EQ(all[0].nis_mean, 6.0);
-  EXPECT_DOUBLE_EQ(all[0].nis_within95, 0.0);  // chi2(0.95, 1) = 3.84
+  EXPECT_DOUBLE_EQ(all[0].nis_within95, 0.0);  // 6 is above chi2(0.95, 1) = 3.84
   EXPECT_DOUBLE_EQ(all[0].autocorrelation, 1.0);
   EXPECT_DOUBLE_EQ(all[0].white_within, 1.96 / std::sqrt(8.0));
   EXPECT_EQ(all[1].sensor, "range");

@@ -85,7 +85,8 @@ TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
   EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // in rad, in the frame of the body
   EXPECT_EQ(cells[6] + cells[7], "00");
   EXPECT_EQ(cells[9], "0.01");
-  EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);  // wrapped to (-pi, pi]
+  // The error is wrapped to (-pi, pi].
+  EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);
   EXPECT_EQ(cells[12], "");
   EXPECT_EQ(Cells(lines[3])[1] + ' ' + Cells(lines[3])[3], " 0.5");
 }

@@ -60,7 +60,7 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   for (int i = 0; i < GetParam(); ++i) {
     EXPECT_EQ(texts["an_estimator_" + std::to_string(i)].size(), 1u) << i;
   }
-  EXPECT_EQ(texts["truth"].size(), 2u);  // one for each stream
+  EXPECT_EQ(texts["truth"].size(), 2u);  // there is one truth for each stream
 }
 
 // The last panel is lower than the others, because it also has texts below its axis.

@@ -15,8 +15,8 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-/// A point at cos t. Its measurements have an oscillating error, except in every fourth frame;
-/// optionally one is an outlier.
+/// Source with a point at cos t. Every fourth frame has no measurement. Measurements have an
+/// oscillating error. Optionally, one is an outlier.
 class Swing : public Source {
  public:
   explicit Swing(bool with_outlier = false) : with_outlier_(with_outlier) {}
@@ -92,7 +92,8 @@ double ValueOf(const std::map<std::string, Spread>& values, const std::string& k
   return found == values.end() ? std::nan("") : found->second.mean;
 }
 
-// In a linear problem a filter has no linearisation error, and the smoother equals the batch.
+// In a linear problem a filter has no linearisation error, and the smoother equals the batch. The
+// error of the filter is then due to missing smoothing only.
 TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   const auto [run, comparison] = CompareLinear(false);
   ASSERT_EQ(comparison.decomposition.size(), 3u);
@@ -142,8 +143,8 @@ TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   EXPECT_NEAR(ekf.ratios.at("final_error:p.x").value(), 1.0, 1e-7);
 }
 
-/// Positions of the smoother and of the filter, and sigma^2 of p.x and p.v of the smoother, by
-/// frame.
+/// Values of p.x and p.v of the filter and of the smoother, and their covariance for the smoother,
+/// by frame.
 struct ByHand {
   std::vector<Eigen::Vector2d> filter, smoother;
   std::vector<Eigen::Matrix2d> p;
@@ -169,7 +170,8 @@ ByHand RunByHand() {
   return run;
 }
 
-// The distance between a filter and a smoother, in joint sigmas of position and velocity.
+// Compares the distance between a filter and a smoother, in joint sigmas of position and velocity,
+// with that calculated here.
 TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   const ByHand by_hand = RunByHand();
   double squares = 0.0, sigmas = 0.0;
@@ -184,7 +186,8 @@ TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   EXPECT_NEAR(ValueOf(smoothing.values, "rmsd.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
 }
 
-// The batch uses the outlier; the filter, and the estimators that use its accepted data, do not.
+// The batch uses the outlier. The filter rejects it, so the estimators that use the accepted data
+// of the filter do not use it either.
 TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
   const Comparison comparison = CompareLinear(true).comparison;
   EXPECT_LT(ValueOf(comparison.decomposition[0].values, "rmsd:p.x"), 1e-9);
@@ -222,7 +225,7 @@ TEST(BuildComparedExperiment, AddsWhatTheComparisonLacks) {
   EXPECT_EQ(estimators.At("full_information").At("mode").Text(), "filtering");
   EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
   EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
-  // The result is a valid config of a run.
+  // The resulting config is valid for a run.
   EXPECT_EQ(BuildExperiment(compared.config, Shipped()).estimators.size(), 5u);
 }
 
@@ -309,7 +312,8 @@ Comparison CompareScene(const std::string& more) {
   return comparer.Finish(run, {});
 }
 
-// With a full-information filter, which solves at every frame.
+// The full-information filter `now` solves at every frame. Its estimate at the last frame equals
+// that of the batch.
 TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   const DecompositionStep step = CompareScene("").decomposition[0];
   EXPECT_TRUE(step.at_end);

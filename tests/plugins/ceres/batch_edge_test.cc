@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_landmarks_fixture.h"
 
-/// Landmarks of a sparse batch whose optimum is at the boundary of their model's domain.
+/// Tests of landmarks whose optimum in a sparse batch is at the boundary of the domain of their
+/// model.
 namespace alidade {
 namespace {
 
@@ -13,7 +14,7 @@ using testing::Found;
 constexpr double kOffsetSigma = 0.1, kFirstSigma = 0.3, kPeriod = 0.1, kEdgeSlope = 0.5;
 constexpr int kViews = 4;
 
-/// z = p - r; a landmark is initialised only if z_z > z_x / 2.
+/// Sensor z = p - r. A landmark is initialised only if z_z > z_x / 2.
 struct OffsetBeyond : testing::Offset {
   OffsetBeyond() : Offset(kOffsetSigma) {}
   template <class T>
@@ -24,8 +25,8 @@ struct OffsetBeyond : testing::Offset {
   }
 };
 
-/// Returns the measurements of landmarks 7 and 8. Landmark 7 seems to leave its domain, or stays
-/// `inside`.
+/// Returns the measurements of landmarks 7 and 8. According to its measurements, landmark 7 leaves
+/// its domain, or stays inside if `inside` is true.
 std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
   std::vector<std::array<Vector3d, 2>> seen;
   for (int k = 0; k < kViews; ++k) {
@@ -36,7 +37,7 @@ std::vector<std::array<Vector3d, 2>> OffsetsOf(bool inside) {
   return seen;
 }
 
-/// Computes the linear problem A x = b in x = (r_0 .. r_3, p_7, p_8).
+/// Computes A and b of the linear problem A x = b, x = (r_0 .. r_3, p_7, p_8).
 void WriteOut(const std::vector<std::array<Vector3d, 2>>& seen, MatrixXd& a, VectorXd& b) {
   constexpr int kSize = 3 * (kViews + 2);
   a.setZero(kSize, kSize);
@@ -79,7 +80,7 @@ Found SolveSparse(const std::vector<std::array<Vector3d, 2>>& seen) {
 
 void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
   ASSERT_FALSE(found.failed);
-  // relative to about 0.1 m; landmark 7 stays 1e-9 sigma from the boundary
+  // The positions are of about 0.1 m. Landmark 7 stays 1e-9 sigma from the boundary.
   constexpr double kNear = 1e-8;
   for (int k = 0; k < kViews; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -96,9 +97,9 @@ void ExpectSolution(const Found& found, const VectorXd& x, const MatrixXd& p) {
   }
 }
 
-// The minimum under the constraint  p_z - r_0z = (p_x - r_0x) / 2  of landmark 7. The landmark
-// slides along the boundary, so its x changes after it reached it. The covariances are those
-// without the boundary.
+// Expects the minimum under the constraint  p_z - r_0z = (p_x - r_0x) / 2  of landmark 7. The
+// landmark slides along the boundary, so its x still changes after it has reached the boundary. The
+// covariances are those without the boundary.
 TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
   const auto seen = OffsetsOf(false);
   MatrixXd a;
@@ -123,7 +124,7 @@ TEST(CeresBatchEdge, OneLandmarkAtTheEdgeKeepsNoOtherFromItsOptimum) {
       << said;
 }
 
-// Landmark 7 reaches the boundary by the second frame and stays there.
+// Landmark 7 reaches the boundary in the second frame and stays there.
 TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   const auto seen = OffsetsOf(false);
   const Found batch = SolveSparse(seen);
@@ -146,7 +147,8 @@ TEST(CeresBatchEdge, WindowsAndFullInformationNameItOnce) {
   }
 }
 
-/// z = exp(-r_z): Gauss-Newton first goes much too far and then returns by 1 m a step.
+/// Sensor z = exp(-r_z). The first Gauss-Newton step is much too long; each of the next ones
+/// returns by 1 m.
 struct Exponential : Sensor<Vec<1>, Vec<3>> {
   static constexpr std::array kRoles{testing::kPosition};
   static constexpr Quantity kMeasurement{"z", "", "", ""};
@@ -162,8 +164,9 @@ struct Exponential : Sensor<Vec<1>, Vec<3>> {
   }
 };
 
-// During the iterations the camera is so far back that the landmark, 4 m ahead of it, tends to a
-// place behind the first camera. At the optimum the landmark is 1 m ahead, as in the dense solver.
+// During the iterations the camera is very far back. The landmark, 4 m ahead of this camera, then
+// tends to a place behind the first camera. At the optimum the landmark is 1 m ahead, as with the
+// dense solver.
 TEST(CeresBatchEdge, ALandmarkIsLetGoOnceItCostsLessInside) {
   Problem problem = testing::MapSystem(OffsetBeyond(), {});
   testing::AddSensor(problem, "e", MakeSensor(Exponential(), "exponential"), {"cam.position"});

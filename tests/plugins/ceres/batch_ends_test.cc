@@ -8,7 +8,7 @@
 #include "support/comma_locale.h"
 #include "support/landmark_models.h"
 
-/// Start and end of a batch, and its reports if it does not reach the optimum.
+/// Tests of the start and the end of a batch, and of its reports if it does not reach the optimum.
 namespace alidade {
 namespace {
 
@@ -18,7 +18,8 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-// The velocity is not measured at the first frame: its variance is that after the first step.
+// The first frame does not measure the velocity. Its variance is therefore that after the step from
+// the start to the first frame.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   const Problem problem = LinearSystem();
   const auto so_far = MakeBatch(problem, "mode: filtering\n"), batch = MakeBatch(problem);
@@ -37,8 +38,8 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport&) { expect_equal(state); });
 }
 
-// A dense system may have 4000 inputs: 1 of p.v, 1 of p.x and 3998 of steps. The initial value of
-// c.x exceeds the limit.
+// A dense system may have 4000 inputs: 1 for p.v, 1 for p.x and 3998 for the steps. The input for
+// the initial value of c.x exceeds the limit.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   Problem problem = LinearSystem();
   testing::AddMotion(problem, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
@@ -70,7 +71,7 @@ TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
 
 // ---- a model that fails -------------------------------------------------------------------------
 
-/// A random walk that fails after `budget` steps.
+/// Random walk that fails after `budget` steps.
 struct Failing : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x", "m"}};
   static inline int budget = 0;
@@ -115,15 +116,15 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
     for (int k = 0; k < 4; ++k) batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}}));
     if (!so_far) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
     ASSERT_FALSE(batch->failed());
-    // The last three steps compute the estimates, the three before them the covariances, and the
-    // three before those the noise at the solution.
+    // The last nine steps are made at the solution: three for the noise, three for the covariances
+    // and three for the estimates.
     const int steps = kMany - Failing::budget;
     for (int missing = 1; missing <= 9; ++missing) ExpectSaid(problem, steps - missing, so_far);
   }
 }
 
-// The filter of the batch cannot step to the second frame; the batch can, later. A block that waits
-// for its initial value never gets it, and the events report this once.
+// The filter of the batch cannot step to the second frame, but the batch can do so later. A block
+// that waits for its initial value never gets one. The events report this once.
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -155,7 +156,7 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   EXPECT_EQ(std::ranges::count(outcomes, Outcome::kNotReady), 3);
 }
 
-// The batch omits measurements that the filter could not predict: landmark 1 lies behind the
+// The batch omits measurements that its filter could not predict. Landmark 1 lies behind the
 // camera.
 TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
   LandmarkOptions options = testing::WithPrior();
@@ -176,7 +177,7 @@ TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
   }
 }
 
-// After a gap that is too long the batch cannot continue; later frames change nothing.
+// After a gap that is too long the batch cannot continue. Later frames change nothing.
 TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
   for (const bool so_far : {false, true}) {
     const auto batch = MakeBatch(
@@ -191,7 +192,8 @@ TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
   }
 }
 
-// Landmark measurements that the batch could have predicted are omitted, too.
+// After the end of its filter the batch also omits landmark measurements that it could have
+// predicted.
 TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   Problem problem = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -211,7 +213,7 @@ TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   }
 }
 
-// The filter ends at its last good state and reports this once.
+// The filter ends at its last good state, and reports the end once.
 TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   Problem problem;
   testing::AddMotion(problem, "p", MakeMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
@@ -249,7 +251,7 @@ TEST(CeresBatchEnds, TooFewIterationsNameTheKeyThatAllowsMore) {
       << said;
 }
 
-/// z = x^2 with a Jacobian of the wrong sign.
+/// Sensor z = x^2. Its Jacobian can have the wrong sign.
 struct WrongSign : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}};
   static constexpr Quantity kMeasurement{"z", "m2"};
@@ -285,8 +287,8 @@ TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
   }
 }
 
-// The steps that a loss requires after the solver ended never raise the cost. With a scale that
-// exceeds all residuals they leave the estimates at those without a loss.
+// A loss requires further steps after the end of the solver. These steps never raise the cost. If
+// the scale of the loss exceeds all residuals, the estimates remain those without a loss.
 TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
   const auto last_of = [](const RobustLoss& loss) {
     Problem problem = testing::MovingPoint(0.7);
@@ -315,7 +317,7 @@ TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
 
 constexpr double kSigma = 2e-3;  // rad
 
-/// n' = n (+) w
+/// Random walk n' = n (+) w.
 struct Wander : Motion<2, UnitVector> {
   static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
   template <class T>
@@ -339,7 +341,8 @@ struct Seen : Sensor<UnitVector, UnitVector> {
 };
 
 // The tangent basis changes at z = 0, which this walk crosses. The smoother linearises at the
-// filter's estimates: at z = 0.6, too, the two differ by 5e-6 sigma, and by up to 8e-4 in P.
+// estimates of the filter, so it differs from the batch. At z = 0.6, far from the change, both also
+// differ: by 5e-6 sigma, and by up to 8e-4 in P.
 TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
   Problem problem;
   const SharedMotion wander = MakeMotion(Wander(), "wander");
@@ -390,7 +393,7 @@ TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
 
 // ---- stopped ------------------------------------------------------------------------------------
 
-// Example 05 has 152 frames; the batch checks for a stop request after each.
+// Example 05 has 152 frames. The batch checks for a stop request after each frame.
 TEST(CeresBatchEnds, AStopWhileItSolvesKeepsTheOthers) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
   config.Set("estimators.batch.type", "ceres_batch", "--set");

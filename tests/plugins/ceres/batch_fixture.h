@@ -8,7 +8,7 @@
 #include "plugins/host/host_fixture.h"
 #include "support/systems.h"
 
-/// Helpers of the batch tests.
+/// Helpers for the tests of the batch.
 namespace alidade::testing {
 
 /// Returns the plugins of this build.
@@ -17,20 +17,21 @@ inline const PluginHost& Shipped() {
   return host;
 }
 
-/// Creates a batch with these options, one a line.
+/// Creates a batch. `options` contains one option per line.
 inline std::unique_ptr<Estimator> MakeBatch(const Problem& problem,
                                             const std::string& options = "") {
   const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
   return CreateEstimator(Shipped(), "ceres_batch", config.root())(problem, StreamsOf(problem));
 }
 
-/// Creates a fixed-lag smoother with these options, one a line.
+/// Creates a fixed-lag smoother. `options` contains one option per line.
 inline std::unique_ptr<Estimator> MakeFixedLag(const Problem& problem, const std::string& options) {
   const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
   return CreateEstimator(Shipped(), "fixed_lag", config.root())(problem, StreamsOf(problem));
 }
 
-/// A point with a linear sensor of 0.3 m; no sensor measures its second block.
+/// Returns the problem of a moving point. A linear sensor with 0.3 m of noise measures its
+/// position; no sensor measures its velocity.
 inline Problem LinearSystem() {
   Problem problem = MovingPoint(0.7);
   AddSensor(problem, "z", LinearSensor(2.0, 0.3), {"p.x"});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch and the fixed-lag smoother with a given noise instead of the models' noise.
+// Tests of the batch and the fixed-lag smoother with a given noise in place of the noise of the
+// models.
 #include <cmath>
 
 #include "batch_fixture.h"
@@ -11,8 +12,8 @@ namespace {
 
 using testing::FrameAt;
 
-/// Returns a problem with a held acceleration of 0.7 m/s^2 and a sensor of 0.3 m. The noises are
-/// those of the models, or they are `given` and replace other noises of the models.
+/// Returns a problem with a held acceleration of 0.7 m/s^2 and a sensor noise of 0.3 m. If `given`
+/// is true, the models have other noises, which given noises of these sizes replace.
 Problem HeldNoise(bool given) {
   Problem problem = testing::HeldPoint(given ? 5.0 : 0.7);
   if (given) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Batch and fixed lag over gaps that are split into steps: held noise is one input of each gap.
+// Tests of the batch and the fixed-lag smoother over gaps that are split into steps. Held noise is
+// one input of each gap.
 #include <cmath>
 
 #include "alidade/estimation/rts.h"
@@ -57,8 +58,8 @@ Problem HeldSystem() {
   return problem;
 }
 
-/// Returns frames with 10 measurements a second, each after `parts` - 1 frames without a
-/// measurement.
+/// Returns frames with 10 measurements per second. `parts` - 1 frames without a measurement precede
+/// each measurement.
 std::vector<Frame> Frames(int count, int parts) {
   std::vector<Frame> frames;
   for (int k = 0; k <= (count - 1) * parts; ++k) {
@@ -93,12 +94,12 @@ TEST(CeresBatchHeldNoise, AGapIsAGapHoweverItIsSplit) {
     const auto whole = EstimatesOf(*Make(c.type, c.options), Frames(25, 1), All);
     const std::string parts = std::string(c.options) + "max_dt_s: 0.021\n";
     ExpectNear(EstimatesOf(*Make(c.type, parts), Frames(25, 1), All), whole, 1e-9);
-    // The data of a window span the same time, except for the frames in between.
+    // Further frames without a measurement do not change the time that the data of a window span.
     ExpectNear(EstimatesOf(*Make(c.type, c.options), Frames(25, 4), Measured), whole, 1e-9);
   }
 }
 
-// Also compares the frames inside a gap, over which the noise is held.
+// The comparison includes the frames inside a gap, over which the noise is held.
 TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
   const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(12, 3);
@@ -107,7 +108,8 @@ TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
              EstimatesOf(rts, frames, All), 1e-9);
 }
 
-// The window equals the filter; at most frames the start of the window lies inside a gap.
+// The newest estimate of the window equals that of the filter. At most frames the start of the
+// window lies inside a gap.
 TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   const Problem problem = HeldSystem();
   const std::vector<Frame> frames = Frames(20, 4);
@@ -118,7 +120,8 @@ TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   }
 }
 
-// 1000 gaps of 10 parts: 2 inputs of the prior and one of each gap, below the limit of 4000.
+// 1000 gaps are split into 10 parts each. They have 2 inputs for the prior and one for each gap,
+// less than the limit of 4000.
 TEST(CeresBatchHeldNoise, HasOneInputForEachGap) {
   const auto batch = Make("ceres_batch", "max_dt_s: 0.011\n");
   const std::vector<Frame> frames = Frames(1001, 2);

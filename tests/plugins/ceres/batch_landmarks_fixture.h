@@ -11,7 +11,7 @@
 #include "batch_fixture.h"
 #include "support/landmark_models.h"
 
-/// Helpers of the tests of the batch with landmarks.
+/// Helpers for the tests of the batch with landmarks.
 namespace alidade::testing {
 
 using Eigen::MatrixXd;
@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// Results of a batch: the camera of each frame, the map and the events.
+/// Results of a batch: the state of each frame, the map and the events.
 struct Found {
   std::vector<State> states;
   std::vector<LandmarkEstimate> map;
@@ -55,8 +55,8 @@ inline Found Solve(const Problem& problem, const std::vector<Frame>& frames,
 
 inline constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;
 
-/// A camera that moves in front of points, and its measurements: the problem of MapSystem. The
-/// vector x holds its positions r_1.. and the points p_0.., 3 numbers each.
+/// Problem of a camera that moves in front of points, with its measurements, for MapSystem(). The
+/// vector x contains the positions of the camera, r_1.., and the points p_0.., with 3 numbers each.
 struct MapProblem {
   int steps, points;
   std::vector<Frame> frames;
@@ -98,7 +98,8 @@ struct MapProblem {
   Vector2d Pixel(const VectorXd& x, int k, std::int64_t i) const {
     return (Point(x, i) - Camera(x, k)).hnormalized();
   }
-  /// Returns all residuals divided by their sigma; `ends` receives the ends of the observations.
+  /// Returns all residuals, divided by their sigmas. `ends` receives the index after each
+  /// observation that does not initialise a point.
   VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* ends = nullptr) const {
     std::vector<double> r;
     for (int k = 1; k < steps; ++k) {
@@ -131,7 +132,8 @@ struct MapProblem {
     }
     return cost;
   }
-  /// Computes J' J and J' r by central differences. Each observation has its weight at x.
+  /// Computes J' J and J' r by central differences. Each observation is weighted with its loss at
+  /// x.
   void NormalEquations(const VectorXd& x, MatrixXd& a, VectorXd& b) const {
     std::vector<Eigen::Index> ends;
     const VectorXd r = Residuals(x, &ends);
@@ -163,7 +165,8 @@ struct MapProblem {
     }
     return x;
   }
-  /// Expects the minimum of the cost of this problem, and its covariance.
+  /// Expects that `found` is the minimum of the cost of this problem, and has the covariance at
+  /// this minimum.
   void ExpectSolved(const Found& found) const {
     ASSERT_FALSE(found.failed);
     ASSERT_EQ(found.states.size(), frames.size());
@@ -174,7 +177,8 @@ struct MapProblem {
     MatrixXd a;
     VectorXd b;
     NormalEquations(x, a, b);
-    // The remaining step in sigma. Third derivatives times 1e-10 give errors of 1e-8 in J.
+    // Compares the remaining step with sigma. Errors of J are third derivatives times 1e-10, about
+    // 1e-8.
     const MatrixXd p = a.inverse();
     EXPECT_LT(std::sqrt(b.dot(p * b)), 1e-5);
     const auto expect_equal = [&](const MatrixXd& its, Eigen::Index at) {

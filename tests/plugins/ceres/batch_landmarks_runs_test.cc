@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The landmarks of a batch, and the motion of its camera.
+// Tests of the landmarks of a batch, and of the motion of its camera.
 #include <map>
 #include <string>
 
@@ -29,7 +29,7 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   ASSERT_FALSE(found.failed);
   EXPECT_EQ(found.Landmark(4).generation, 1);
   EXPECT_EQ(found.Landmark(3).generation, 0);
-  // The result is the same as with a new id.
+  // The result is the same if the landmark returns with a new id.
   for (std::size_t k = 14; k < frames.size(); ++k) {
     for (Measurement& m : frames[k].measurements) {
       if (m.landmark == 4) m.landmark = 104;
@@ -40,7 +40,8 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
 }
 
-// Landmarks that wait in the filter are not passed on: the batch would delay them a second time.
+// The batch does not delay landmarks a second time: the filter passes them on only after they have
+// waited.
 TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
@@ -83,7 +84,7 @@ const std::string kDrawn =
     "points: {box: {min: [-0.8, -0.7, 1.6], max: [1.2, 0.7, 3.6]}, count: 40}, trajectory: "
     "{random: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
 
-// The noise has rank 6 in 12: v' and omega' determine the changes of r and q.
+// The noise has rank 6 of 12. v' and omega' therefore determine the changes of r and q.
 TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const testing::MadeScene made = testing::MakeScene(kDrawn);
   const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch with landmarks, compared with least squares in the states, calculated here.
+// Tests of the batch with landmarks. It is compared with least squares in the states, calculated
+// here.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -22,14 +23,15 @@ using testing::Observation;
 using testing::Offset;
 using testing::Solve;
 
-/// Normal equations of positions x_0, x_1, .. of 3 numbers each, from measured differences.
+/// Normal equations of positions x_0, x_1, .., with 3 numbers each, that measured differences
+/// determine.
 struct Differences {
   MatrixXd information;
   VectorXd right;
 
   explicit Differences(int count)
       : information(MatrixXd::Zero(3 * count, 3 * count)), right(VectorXd::Zero(3 * count)) {}
-  /// Adds a measurement of x_b - x_a, or of x_b if a < 0.
+  /// Adds a measurement of x_b - x_a. If a < 0, it is a measurement of x_b.
   void Add(int a, int b, const Vector3d& difference, double sigma) {
     const double w = 1.0 / (sigma * sigma);
     for (int e = 0; e < 3; ++e) {
@@ -45,8 +47,8 @@ struct Differences {
   }
 };
 
-/// Measured offsets to points. The priors of some points have 0.2 m, that of the first position 0.3
-/// m.
+/// The map consists of measured offsets to points. The prior sigma is 0.2 m for some points, and
+/// 0.3 m for the first position.
 TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   constexpr int kSteps = 12, kPoints = 6;
   constexpr double kNoise = 0.05, kStart = 0.3, kKnown = 0.2;
@@ -96,7 +98,8 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
-// Compares the problem without landmarks with the one of all residuals, for data without landmarks.
+// For data without landmarks, a problem that may have landmarks has the same solution as one that
+// has none.
 TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
   const auto expect_equal = [](const Problem& problem, const std::vector<Frame>& frames,
                                double tolerance) {
@@ -164,8 +167,8 @@ TEST(CeresBatchLandmarks, AnchorsGiveTheSameAsSixNumbers) {
   expect_equal(testing::AnchoredPixels<0>(kPixel));
 }
 
-// The solve of all data starts at a filter's estimates; the last solve of the filtering mode starts
-// at the previous frame's solution.
+// The smoothing mode starts from the estimates of a filter. The last solve of the filtering mode
+// starts from the solution of the previous frame.
 TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
   const MapProblem map(12, 8);
   const Found all = Solve(map.Filter(), map.frames);
@@ -180,7 +183,8 @@ TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
   }
 }
 
-// Exactly known points fix the scale. Noiseless measurements then give the truth.
+// Exactly known points determine the scale. Measurements without noise then determine the true
+// values.
 TEST(CeresBatchLandmarks, WhatIsSeenWithoutNoiseGivesTheTruth) {
   constexpr double kPixelSigma = 1e-7;
   MapProblem map(12, 12);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Problems without a noise input: neither prior nor process noise, so there is nothing to solve
-// for.
+// Tests of problems without a noise input. They have neither an uncertain prior nor process noise,
+// so there is nothing to solve for.
 #include <cmath>
 
 #include "alidade/experiment/estimator_plugin.h"
@@ -16,7 +16,7 @@ using testing::FrameAt;
 
 constexpr double kScale = 2.0, kNoise = 0.3;
 
-/// A constant p.x, seen by a linear sensor.
+/// Returns the problem of a constant p.x that a linear sensor measures.
 Problem ConstantSystem(BlockStatus status) {
   Problem problem;
   const SharedMotion still = MakeMotion(Constant<>(1), "constant");
@@ -32,7 +32,7 @@ Problem StartsFromItsSensor() {
   return problem;
 }
 
-/// The estimates of each frame or of a smoother, and the events' texts.
+/// Estimates of all frames, from a filter or a smoother, and the texts of the events.
 struct Estimated {
   std::vector<State> states;
   std::string said;
@@ -66,7 +66,7 @@ const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\nmode: filter
                                        "fixed_lag\nlag_s: 0.15",
                                        "fixed_lag\nlag_s: 0.15\noutput: lagged"};
 
-// The value is the mean of the measurements z / gain: P = sigma^2 / (gain^2 n).
+// The value is the mean of z / gain over n measurements, with P = sigma^2 / (gain^2 n).
 TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
   const std::vector<double> z = {3.1, 2.8, 3.3, 2.9};
   std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.1, {})};
@@ -79,7 +79,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
     for (std::size_t k = 0; k < found.size(); ++k) {
       EXPECT_EQ(found[k].layout()[0].present, k >= 2) << k;
       EXPECT_EQ(found[k].layout()[0].has_covariance(), k >= 2) << k;
-      EXPECT_EQ(found[k].covariance().size(), 1) << k;  // it has a row from the start
+      EXPECT_EQ(found[k].covariance().size(), 1) << k;  // the block has a row from the start
     }
     EXPECT_NEAR(*found.back().value(0), 12.1 / 4.0 / kScale, 1e-9);
     EXPECT_NEAR(found.back().covariance().Variance(0), kNoise * kNoise / (kScale * kScale * 4.0),
@@ -87,7 +87,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
   }
 }
 
-// The model of the blocks has noise, but the noise has no effect.
+// The motion model has noise, but the noise has no effect on constant blocks.
 TEST(CeresBatchNoInputs, AllBlocksMayBeConstantThoughTheyMove) {
   const Problem problem = testing::WithStatus(testing::DepthFilter(), "", BlockStatus::kConstant);
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.1, {{0, 80.0}}),
@@ -109,7 +109,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
   }
 }
 
-// Three measurements give only the cost: r = (z - 3) / 0.3 = 1, -2 and 4.
+// The three measurements only determine the cost: r = (z - 3) / 0.3 = 1, -2 and 4.
 TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
                                      FrameAt(0.3, {{0, 4.2}})};
@@ -125,7 +125,8 @@ TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
             "cost 5.5, 0 iterations in 1 solve: converged");
 }
 
-// Offsets from a camera at rest: each point is their mean.
+// The offsets are measured from a camera at rest. The estimate of each point is the mean of its
+// offsets.
 TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   Problem problem = testing::MapSystem(testing::Offset(kNoise), {});
   problem.layout = {};

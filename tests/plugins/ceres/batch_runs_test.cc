@@ -17,7 +17,7 @@ RunResult RunDepth(int seed, const std::vector<std::pair<std::string, std::strin
   return Run(experiment, {});
 }
 
-// A prototype of the RTS smoother and of the batch: 1.03 mm over 1000 seeds, with 99 % coverage.
+// A prototype of the RTS smoother and of the batch had 1.03 mm over 1000 seeds, with 99 % coverage.
 TEST(CeresBatch, SmoothsDepthToAMillimetre) {
   double rmse = 0.0, coverage = 0.0;
   for (int seed = 1001; seed <= 1020; ++seed) {

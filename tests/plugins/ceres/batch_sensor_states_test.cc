@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch with sensors that have their own states, known numbers and several parts. On a nearly
-// linear problem it equals the smoother.
+// Tests of the batch with sensors that have their own states, known numbers or several parts. On a
+// nearly linear problem the batch equals the smoother.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -27,7 +27,7 @@ void ExpectSmootherIsBatch(const RunResult& run, const std::string& block, doubl
   EXPECT_NEAR(run.estimators.at(1).metrics.at(metric), smoother, relative * smoother) << block;
 }
 
-// Satellites are so far away that the ranges are linear to 1e-5 m.
+// The satellites are so far away that the ranges are linear to 1e-5 m.
 TEST(BatchSensorStates, OfAClockAmongSatellitesIsTheSmoother) {
   const RunResult run = RunOf(
       "alidade: 1\n"
@@ -47,7 +47,8 @@ TEST(BatchSensorStates, OfAClockAmongSatellitesIsTheSmoother) {
 }
 
 // The orientation has errors of about 0.006 rad, rotated by 0.3 rad. The smoother linearises at the
-// filter's estimates, so it differs from the optimum by a few thousandths of the errors.
+// estimates of the filter. It therefore differs from the optimum by a few thousandths of the
+// errors.
 TEST(BatchSensorStates, OfPosesIsTheSmoother) {
   const RunResult run = RunOf(
       "alidade: 1\n"

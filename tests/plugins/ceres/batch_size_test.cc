@@ -4,8 +4,8 @@
 namespace alidade {
 namespace {
 
-// The prior has two inputs and each step has one: the 1001st comes with the thousandth frame, at
-// 49.95 s.
+// The prior has two inputs, and each step has one. The 1001st input belongs to the thousandth
+// frame, at 49.95 s.
 TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
   const auto batch = testing::MakeBatch(testing::LinearSystem(), "solver: dense\n");
   std::vector<Event> events;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The sparse solver of the batch has the same results as the dense solver.
+// Tests that the sparse solver of the batch has the same results as the dense solver.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -19,15 +19,15 @@ using testing::FrameAt;
 using testing::MakeBatch;
 using testing::Shipped;
 
-constexpr double kStates = 1e-8;       // sigma
-constexpr double kCovariances = 1e-6;  // sigma_i sigma_j
+constexpr double kStates = 1e-8;       // tolerance, in sigma
+constexpr double kCovariances = 1e-6;  // tolerance, in sigma_i sigma_j
 
 double CostOf(const Found& found) {
   const std::string& text = found.events.back().text;
   return std::stod(text.substr(text.find("cost ") + 5));
 }
 
-/// Returns x (-) y of two states in the tangent space.
+/// Returns the difference x (-) y of two states.
 Eigen::VectorXd Apart(const State& x, const State& y) {
   Eigen::VectorXd d = Eigen::VectorXd::Zero(y.covariance().size());
   for (std::size_t i = 0; i < y.layout().blocks().size(); ++i) {
@@ -53,7 +53,7 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
     const Eigen::MatrixXd p = expected.states[k].covariance().Dense();
     const Eigen::MatrixXd e = found.states[k].covariance().Dense() - p;
     for (Eigen::Index i = 0; i < d.size(); ++i) {
-      // The sigma of an exact value is at most a rounding error.
+      // The sigma of an exact value is only a rounding error.
       const double sigma = std::max(std::sqrt(p(i, i)), 1e-5);
       worst_x = std::max(worst_x, std::abs(d[i]) / sigma);
       for (Eigen::Index j = 0; j < d.size(); ++j) {
@@ -76,12 +76,14 @@ void ExpectSame(const Found& found, const Found& expected, double states = kStat
     worst_c = std::max(worst_c, llt.solve(e).norm());
     if (!std::isnan(b.sigma)) worst_c = std::max(worst_c, std::abs(a.sigma / b.sigma - 1.0));
   }
-  // The dense solver stops moving a landmark once rounding hides the decrease of the cost.
+  // The tolerance is larger for landmarks: the dense solver stops moving them once rounding hides
+  // the decrease of the cost.
   EXPECT_LT(worst_y, 10.0 * states);
   EXPECT_LT(worst_c, covariances);
 }
 
-/// With a loss the dense solver continues below Ceres' tolerances: adds a loss without effect.
+/// Returns the problem with a loss that has no effect. With a loss the dense solver continues below
+/// the tolerances of Ceres.
 Problem WithLoss(Problem problem) {
   for (SensorBinding& sensor : problem.sensors) {
     if (sensor.loss.kind == LossKind::kNone) sensor.loss = {LossKind::kHuber, 1e9};
@@ -110,7 +112,7 @@ void SetPrior(Problem& problem, std::size_t prior, double sigma) {
   problem.priors[prior].covariance.setConstant(sigma * sigma);
 }
 
-/// Runs the two batches of a config over its whole source.
+/// Results of the sparse and the dense batch of a config.
 struct Both {
   Found sparse, dense;
 };
@@ -138,7 +140,7 @@ Config Example(const std::string& name) {
   return Config::FromFile(ALIDADE_SOURCE_DIR "/examples/" + name + "/config.yaml");
 }
 
-// Noise of rank 1 in 2 and of rank 0; a prior that is exact partly or entirely.
+// The noise has rank 1 of 2, or rank 0. The prior is uncertain, or exact partly or entirely.
 TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   for (const double acceleration : {0.7, 0.0}) {
     for (const double sigma_x : {2.0, 0.0}) {
@@ -154,8 +156,8 @@ TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
   }
 }
 
-// The covariance of the first rate is 1e10 times smaller than its prior. It must not be computed as
-// a difference of two numbers of the prior's size.
+// The variance of the first velocity is 1e10 times smaller than that of its prior. The batch must
+// not compute it as a difference of two numbers of the size of the prior.
 TEST(SparseBatch, AVagueStartCostsNoDigits) {
   Problem problem = testing::LinearSystem();
   for (std::size_t i = 0; i < problem.priors.size(); ++i) SetPrior(problem, i, 1e4);
@@ -172,7 +174,7 @@ TEST(SparseBatch, WhereAllIsKnownNothingIsSolved) {
   EXPECT_EQ(testing::ValueOf(found.states.back(), "p.x"), 2.0);
 }
 
-// The noise is held over frames without a measurement, so these frames lie inside a node.
+// The noise is held over frames without a measurement. These frames therefore lie inside a node.
 TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
   Problem problem = testing::HeldPoint(0.7);
   testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
@@ -210,8 +212,9 @@ TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
   }
 }
 
-/// A body with an inertial unit at 100 Hz and a position sensor, +- 0.1 m, at 2 Hz. The model
-/// generates its trajectory from the readings, which have biases and noise.
+/// Problem and data of a body with an inertial unit at 100 Hz and a position sensor, +- 0.1 m, at 2
+/// Hz. The model generates the trajectory from the readings of the unit, which have biases and
+/// noise.
 struct InertialRun {
   Problem problem;
   std::vector<Frame> frames;
@@ -273,7 +276,7 @@ struct InertialRun {
   }
 };
 
-// 0.8 s of data suit the dense solver; a minute has 72 015 inputs.
+// The dense solver can solve 0.8 s of data, but not a minute, which has 72 015 inputs.
 TEST(SparseBatch, SolvesInertialReadings) {
   const InertialRun little(80);
   ExpectSame(little.Solve("solver: sparse\n"), little.Solve("solver: dense\n"));
@@ -295,7 +298,7 @@ TEST(SparseBatch, SolvesInertialReadings) {
   expect("b.force_bias", minute.bias);
 }
 
-// If a position has seven digits before the point, rounding alone causes steps of 1e-6 sigma.
+// The position has seven digits before the point. Rounding alone then causes steps of 1e-6 sigma.
 TEST(SparseBatch, ConvergesFarFromTheOrigin) {
   Config config = Example("21_poses");
   config.Set("state.body.initial.position.mean", "[5e5, 5e6, 0]", "--set");
@@ -347,21 +350,22 @@ TEST(SparseBatch, SolvesTheSlamExamples) {
   }
 }
 
-// Driven by odometry, with fewer landmarks than frames.
+// The vehicle is driven by odometry. There are fewer landmarks than frames.
 TEST(SparseBatch, SolvesADriveWithControlInputs) {
   const Both both = SolveBoth(Example("15_slam_representations"), 60);
   ExpectSame(both.sparse, both.dense);
 }
 
-// A stereo measurement has four numbers, one more than a point.
+// A stereo measurement has four numbers, while a point has three.
 TEST(SparseBatch, SolvesWithStereoPairs) {
   const Both both = SolveBoth(
       Config::FromFile(ALIDADE_SOURCE_DIR "/examples/26_slam_three_sensors/stereo.yaml"), 30);
   ExpectSame(both.sparse, both.dense);
 }
 
-// With four frames the prior dominates the depths: a Gauss-Newton step is more than twice too long,
-// and the next one returns as far. Extrapolation from the last few steps makes it converge.
+// With a few frames the prior dominates the depths. A Gauss-Newton step is then more than twice too
+// long, and the next step returns as far. Extrapolation from the last few steps makes the solver
+// converge.
 TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   Config config = Example("16_slam_room");
   config.Set("source.seed", "1001", "--set");
@@ -380,8 +384,8 @@ TEST(SparseBatch, ConvergesWhereStepsGoTooFar) {
   EXPECT_LT(std::stoi(solution.substr(at + 2)), 60) << solution;
 }
 
-// At the dense solver's initial estimate an observation is not defined, so that solver cannot
-// continue.
+// At the initial estimate an observation is not defined. The dense solver cannot start there; the
+// sparse solver can.
 TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   Config config = Example("15_slam_representations");
   config.Set("estimators", "{batch: {type: ceres_batch, solver: sparse}}", "--set");
@@ -402,7 +406,7 @@ TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   EXPECT_EQ(undefined, 0);
 }
 
-// Solves at every frame with the data so far.
+// The filtering mode solves at every frame, with the data so far.
 TEST(SparseBatch, SolvesForTheDataSoFar) {
   const testing::MapProblem map(8, 10);
   const Problem problem = map.Filter();
@@ -438,7 +442,8 @@ TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   }
 }
 
-// The models propagate the states: x' = x + v dt + a dt^2 / 2, v' = v + a dt for some a.
+// Consecutive states agree with the motion model: x' = x + v dt + a dt^2 / 2, v' = v + a dt for
+// some a.
 TEST(SparseBatch, TheMotionHoldsToRounding) {
   Problem problem = testing::HeldPoint(0.7);
   testing::AddSensor(problem, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
@@ -451,7 +456,8 @@ TEST(SparseBatch, TheMotionHoldsToRounding) {
   }
 }
 
-// 5002 inputs exceed the limit of a dense system; a Kalman filter has the same last estimate.
+// 5002 inputs exceed the limit of a dense system, so the sparse solver is used. A Kalman filter has
+// the same last estimate.
 TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
   const Problem problem = testing::LinearSystem();
   const std::vector<Frame> frames = Wobble(5001);

@@ -18,7 +18,7 @@ using testing::LinearSystem;
 using testing::MakeBatch;
 using testing::Shipped;
 
-/// Estimates of a smoother: values and covariances of each frame, and its last events.
+/// Results of a smoother: values and covariances of each frame, and the events of the last frame.
 struct Smoothed {
   std::vector<Eigen::VectorXd> x;
   std::vector<Eigen::MatrixXd> p;
@@ -57,9 +57,9 @@ struct LinearRow {
   double z, r;
 };
 
-/// Kalman filter and Rauch-Tung-Striebel smoother, calculated here: P' = F P F' + Q, C = P F'
-/// P'^-1, x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first two elements move with
-/// constant velocity; the others are constant.
+/// Computes a Kalman filter and a Rauch-Tung-Striebel smoother: P' = F P F' + Q, C = P F' P'^-1,
+/// x_s = x + C (x_s' - x'), P_s = P + C (P_s' - P') C'. The first two elements are a position and
+/// its constant velocity; the others are constant.
 Smoothed WrittenOut(Eigen::VectorXd x, Eigen::MatrixXd p, double acceleration,
                     const std::vector<Frame>& frames,
                     const std::vector<std::vector<LinearRow>>& rows) {
@@ -104,7 +104,7 @@ void ExpectNear(const Smoothed& found, const Smoothed& expected, double toleranc
   }
 }
 
-// The process noise has rank 1 in 2: G = (dt^2/2, dt).
+// The process noise has rank 1 of 2: G = (dt^2/2, dt).
 TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
   const std::vector<Frame> frames = LinearFrames(60);
   std::vector<std::vector<LinearRow>> rows(frames.size());
@@ -126,8 +126,8 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
       << found.events[0].text;
 }
 
-/// Returns depth 0.3 + 0.1 sin(2.5 t) m: its disparity (BF = 26 px m) in most frames, and 1 / scale
-/// in all.
+/// Returns frames of a target at the depth 0.3 + 0.1 sin(2.5 t) m. Most frames contain its
+/// disparity (BF = 26 px m), and all contain 1 / scale.
 std::vector<Frame> DepthFrames(int count) {
   std::vector<Frame> frames;
   for (int k = 0; k < count; ++k) {
@@ -141,7 +141,8 @@ std::vector<Frame> DepthFrames(int count) {
   return frames;
 }
 
-// The smoother of the problem linearised at the optimum, with R there, gives the optimum.
+// The problem is linearised at the optimum, with R at the optimum. The smoother of this problem
+// must return the optimum.
 TEST(CeresBatch, IsAFixedPointOfTheLinearisedSmootherWithItsNoise) {
   const std::vector<Frame> frames = DepthFrames(60);
   const auto batch = MakeBatch(testing::DepthFilter());
@@ -189,7 +190,7 @@ TEST(CeresBatch, EndsWhereTheKalmanFilterDoes) {
   EXPECT_LT((found.p.back() - ekf.state().covariance().Dense()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
-// On a linear system the full-information filter equals the Kalman filter at every frame.
+// In a linear system the full-information filter equals the Kalman filter at every frame.
 TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
   const Problem problem = LinearSystem();
   const auto batch = MakeBatch(problem, "mode: filtering\n");
@@ -227,7 +228,7 @@ TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
   expect_equal({FrameAt(0.0, {{0, 2.1}}), FrameAt(0.3, {{0, 0.4}})}, 0.1);
 }
 
-// The third frame initialises p.x; the Kalman filter has the same initial value and correlation.
+// The third frame initialises p.x. The Kalman filter has the same initial value and correlations.
 TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   Problem problem = LinearSystem();
   problem.priors[0].sensor = "z";
@@ -264,8 +265,8 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   EXPECT_EQ(emitted, frames.size());
 }
 
-// A block that is known exactly stays constant: its sigma is zero without process noise, or it is
-// fixed.
+// An exactly known block stays constant. It is known exactly if its sigma is zero and it has no
+// process noise, or if it is fixed.
 TEST(CeresBatch, WhatIsKnownStays) {
   Problem zero = LinearSystem();
   zero.priors[1].covariance.setZero();
@@ -295,7 +296,7 @@ TEST(CeresBatch, WhatIsKnownStays) {
 
 // ---- manifolds ----------------------------------------------------------------------------------
 
-/// A constant value on a manifold.
+/// Model of a constant value on a manifold.
 template <class G>
 struct Still : Motion<0, G> {
   static constexpr std::array kBlocks{Quantity{"x"}};
@@ -307,11 +308,8 @@ struct Still : Motion<0, G> {
   void SqrtQ(double, MatrixRef) const {}
 };
 
-/// At the estimate x the derivative of
-/// x (-) m
-/// ^2 / 0.25 + sum
-/// z (-) x
-/// ^2 / 0.16 must vanish.
+/// Expects that the derivative of |x (-) m|^2 / 0.25 + sum |z (-) x|^2 / 0.16 vanishes at the
+/// estimate x.
 template <class G>
 void ExpectStationary(const Geometry& geometry) {
   const std::vector<double> mean = geometry.Identity();
@@ -346,8 +344,9 @@ void ExpectStationary(const Geometry& geometry) {
     }
     return sum;
   };
-  // Ceres stops if the cost, 20, falls by less than 1e-14 of itself: 45 d^2 / 2 = 2e-13 means a
-  // gradient of 45 d = 4e-6, and the last step removes most of it. Central differences: 2e-9.
+  // Ceres stops if the cost, which is 20, falls by less than 1e-14 of itself. Then 45 d^2 / 2 =
+  // 2e-13, so the gradient is 45 d = 4e-6. The last step removes most of this gradient. Central
+  // differences have an error of 2e-9.
   for (int i = 0; i < t; ++i) EXPECT_NEAR((cost(i, 1e-5) - cost(i, -1e-5)) / 2e-5, 0.0, 1e-6);
 }
 

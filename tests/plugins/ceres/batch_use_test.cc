@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A batch that uses the measurements accepted by a filter, and a batch as the truth.
+// Tests of a batch that uses the measurements accepted by a filter, and of a batch as the
+// reference.
 #include "alidade/experiment/run.h"
 #include "batch_fixture.h"
 #include "support/recording.h"
@@ -13,7 +14,8 @@ using testing::SwingingTarget;
 
 bool IsOutlier(int k) { return k % 13 == 6; }
 
-/// A swinging target. On some frames the disparity is 40 px off, or these measurements are omitted.
+/// Swinging target. In some frames the disparity is off by 40 px, or is omitted if `outliers` is
+/// false.
 class WithOutliers : public SwingingTarget {
  public:
   explicit WithOutliers(bool outliers) : SwingingTarget(80), outliers_(outliers) {}
@@ -34,7 +36,7 @@ class WithOutliers : public SwingingTarget {
   int next_ = 0;
 };
 
-/// A batch with recorded estimates.
+/// Batch that records its estimates.
 struct Told : Estimator {
   explicit Told(const Problem& problem) : batch(testing::MakeBatch(problem)) {}
   void Start(Timestamp timestamp) override { batch->Start(timestamp); }
@@ -57,7 +59,8 @@ struct Told : Estimator {
   std::vector<Eigen::MatrixXd> p;
 };
 
-/// Returns an ekf with a gate, and a batch that uses all data or the data accepted by the ekf.
+/// Returns an experiment of an ekf with a gate and a batch. The batch uses all data, or the data
+/// that the ekf accepted.
 Experiment MakeWithBatch(bool outliers, bool accepted) {
   Experiment experiment;
   experiment.source = std::make_unique<WithOutliers>(outliers);
@@ -83,7 +86,7 @@ TEST(CeresBatchUse, OfWhatAFilterAcceptedIsTheBatchWithoutTheOutliers) {
              spoiled = MakeWithBatch(true, false);
   const RunResult run = alidade::Run(filtered, {});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
-  // Of the frames with outliers, 6, 32 and 58 have a disparity.
+  // Three of the frames with outliers contain a disparity: frames 6, 32 and 58.
   EXPECT_EQ(run.estimators[0].counts.at("gated:disparity"), 3);
   EXPECT_EQ(run.estimators[0].counts.count("gated:inverse_scale"), 0u);
   ASSERT_EQ(alidade::Run(clean, {}).status, RunStatus::kOk);
@@ -111,7 +114,7 @@ RunResult RunDepth(const std::vector<std::pair<std::string, std::string>>& setti
 }
 
 TEST(CeresBatchUse, IsReadFromTheConfig) {
-  // A narrow gate: the batch must have the measurements that passed it.
+  // The gate is narrow. The batch must use exactly the measurements that passed the gate.
   const RunResult run = RunDepth({{"estimators.ekf.gate", "0.5"},
                                   {"estimators.batch.type", "ceres_batch"},
                                   {"estimators.batch.use.accepted_by", "ekf"}});
@@ -127,8 +130,8 @@ TEST(CeresBatchUse, AsTheReferenceGivesErrorsWithoutTruth) {
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   EXPECT_EQ(run.reference, "batch");
   EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
-  // The RMSE of the filter is 1.95 mm and that of the batch 1 mm; the remaining error lies in
-  // between.
+  // The RMSE relative to the truth is 1.95 mm for the filter and 1 mm for the batch. The RMSE of
+  // the filter relative to the batch lies in between.
   const double rmse = run.estimators[0].metrics.at("rmse:target.depth");
   EXPECT_GT(rmse, 0.8e-3);
   EXPECT_LT(rmse, 2.5e-3);

@@ -16,11 +16,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Pairs (x_k, lambda_k) along a chain, and points that some of the x_k observe:
+/// System of pairs (x_k, lambda_k) along a chain, and of points that some of the x_k observe:
 ///
 ///   [H A'; A -Q],   A x = (x_k - F_k x_{k-1}),   Q_k of rank 0, 1 or full
 ///
-/// The points and some rows are the only information on x_k.
+/// H contains only the observations of the points.
 class Chain {
  public:
   Chain(int steps, int points, int span = 4) {
@@ -45,7 +45,7 @@ class Chain {
   BlockLdl& ldl() { return ldl_; }
   const Groups& time() const { return time_; }
 
-  /// Sets an elimination order, the values, and the equal dense matrix.
+  /// Sets the elimination order and the values. Also sets the equal dense matrix.
   void Fill(const Groups& order) {
     ldl_.Use(Elimination(ldl_.graph(), order));
     Random random(3);
@@ -59,7 +59,7 @@ class Chain {
       ldl_.Block(lx_[k]).setIdentity();
       if (k > 0) ldl_.Block(before_[k]) = -0.5 * matrix(3, 3);
     }
-    for (const std::size_t yy : yy_) ldl_.Block(yy).setIdentity();  // a prior
+    for (const std::size_t yy : yy_) ldl_.Block(yy).setIdentity();  // prior of the point
     for (const auto& [i, k, block] : seen_) {
       const MatrixXd j_x = matrix(2, 3), j_y = matrix(2, 2);
       ldl_.Block(xx_[static_cast<std::size_t>(k)]) += j_x.transpose() * j_x;
@@ -128,7 +128,7 @@ TEST(BlockLdl, EqualsTheDenseInverseInAnyOrderOfWholePairs) {
   chain.ExpectSolvesAndInverts();
 }
 
-// Many points that stay in view border all pairs of a chain.
+// All pairs of the chain observe the same 60 points. The border of each pair is therefore wide.
 TEST(Elimination, ChainsWithAWideBorderAreMerged) {
   Chain chain(60, 60, 60);
   const Groups& time = chain.time();
@@ -149,7 +149,7 @@ TEST(BlockLdl, ASingularPivotIsSaidNotPerturbed) {
   EXPECT_FALSE(ldl.Factorise());
 }
 
-// A point that all steps observe connects all of them if it is eliminated first.
+// All steps observe one point. If it is eliminated first, it connects all steps with each other.
 TEST(MinimumDegree, PutsAHubLast) {
   Chain chain(200, 1, 200);
   Groups hub_first = chain.time();
@@ -162,7 +162,7 @@ TEST(MinimumDegree, PutsAHubLast) {
 TEST(MinimumDegree, LeavesTheLastWhereItIs) {
   Chain chain(50, 1, 50);
   Groups groups = chain.time();
-  std::ranges::reverse(groups);  // the end of a chain, with one neighbour, comes last
+  std::ranges::reverse(groups);  // the last group is then an end of the chain
   const Groups ordered = MinimumDegree(chain.ldl().graph(), groups);
   EXPECT_EQ(ordered.back(), groups.back());
   EXPECT_EQ(ordered.size(), groups.size());

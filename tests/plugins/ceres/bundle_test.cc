@@ -29,8 +29,8 @@ double Distance(const std::array<double, 3>& a, const std::array<double, 3>& b) 
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-/// Pixels determine everything except the scale. Results are compared in units of the distance from
-/// the first camera to the first point.
+/// Pixels determine everything except the scale. The results are therefore compared in units of the
+/// distance from the first camera to the first point.
 TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   const BundleProblem truth = TrueBundle().problem;
   BundleProblem problem = truth;
@@ -61,7 +61,7 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
     for (std::size_t k = 0; k < 3; ++k)
       EXPECT_NEAR(problem.intrinsics[i][k], truth.intrinsics[i][k], k == 0 ? 1e-5 : 1e-7);
   }
-  // 6 cameras of 9 unknowns, except 3 of the first, and 40 points
+  // Each of 6 cameras has 9 unknowns, but the first only 3. The 40 points have 120 unknowns.
   EXPECT_EQ(result.unknowns, 5 * 9 + 3 + 120);
   EXPECT_EQ(result.rank, result.unknowns - 1);
   const std::vector<std::string> words = DescribeUndetermined(problem, *sensor, result);
@@ -147,7 +147,7 @@ TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
   EXPECT_LT(BundleRms(*sensor, problem), 0.5 * before) << "what is reached is kept";
 }
 
-// All unknowns together are then so large that every step is relatively small.
+// A very distant point makes the norm of all unknowns so large that every step is relatively small.
 TEST(CeresBundle, APointFarAwayDoesNotEndIt) {
   double cost[2] = {};
   for (const double far : {1e9, 1e15}) {
@@ -163,8 +163,8 @@ TEST(CeresBundle, APointFarAwayDoesNotEndIt) {
   EXPECT_NEAR(cost[1] / cost[0], 1.0, 0.1);
 }
 
-/// The scale is restored after the solution, with one product and two sums for each coordinate:
-/// accurate to a few epsilon.
+/// The scale is restored after the solution, by one product and two sums for each coordinate. It is
+/// therefore accurate to a few epsilon.
 TEST(CeresBundle, HoldsTheScaleThatPixelsDoNotTell) {
   BundleProblem problem = TrueBundle().problem;
   testing::AddOutliers(problem);
@@ -186,7 +186,7 @@ TEST(CeresBundle, HoldsTheScaleThatPixelsDoNotTell) {
       << "no pixel has changed";
 }
 
-/// If all cameras are at one place, or for a single camera, the points define the scale.
+/// If all cameras are at one place, or if there is only one camera, the points define the scale.
 TEST(CeresBundle, HoldsTheScaleOfCamerasAtOnePlace) {
   for (const int cameras : {1, 4}) {
     BundleProblem problem = TrueBundle(cameras, 30).problem;
@@ -198,7 +198,7 @@ TEST(CeresBundle, HoldsTheScaleOfCamerasAtOnePlace) {
   }
 }
 
-/// The written text is evaluated with the formula of BAL, before and after.
+/// Before and after the adjustment, the written file is evaluated with the formula of BAL.
 TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   BundleFile file = testing::BundleOnBothSides();
   BundleProblem& problem = file.problem;
@@ -224,10 +224,9 @@ TEST(CeresBundle, ABalCameraSeesPointsBehindIt) {
   EXPECT_LT(after.Rms(), std::sqrt(0.5)) << "below the noise: unknowns take a part of it";
 }
 
-/// If all residuals exceed the scale of a loss, it is nearly
-/// r
-/// and converges slowly. A tolerance of 1e-12 would take over 500 more steps without a noticeable
-/// gain.
+/// If all residuals r exceed the scale of a loss, the loss is nearly proportional to |r|, and the
+/// solver converges slowly. A tolerance of 1e-12 would take over 500 more steps without a
+/// noticeable gain.
 TEST(CeresBundle, EndsByTheToleranceOfTheCost) {
   BundleFile file = testing::BundleOnBothSides();
   testing::AddOutliers(file.problem);
@@ -248,8 +247,8 @@ TEST(CeresBundle, EndsByTheToleranceOfTheCost) {
   EXPECT_NEAR(usual.cost_after / fine.cost_after, 1.0, 1e-4);
 }
 
-/// A change within rounding errors is not a decrease: a smaller tolerance does not prevent
-/// convergence.
+/// A change of the cost within rounding errors counts as convergence, even if the tolerance is
+/// smaller.
 TEST(CeresBundle, EndsWhereTheCostChangesByRoundingOnly) {
   BundleProblem problem = testing::BundleOnBothSides().problem;
   Disturb(problem);
@@ -292,7 +291,7 @@ TEST(CeresBundle, LeavesOutWhatIsBehindItsCamera) {
 
 TEST(CeresBundle, SaysWhatIsNotDetermined) {
   BundleProblem problem = TrueBundle(4, 20).problem;
-  // Two pairs of cameras without common points, and a point seen once.
+  // The two halves of the problem have no common observation, and one point is seen only once.
   std::erase_if(problem.observations, [](const BundleObservation& seen) {
     return (seen.camera < 2) != (seen.point < 10) || (seen.camera == 1 && seen.point == 3);
   });
@@ -317,7 +316,7 @@ TEST(CeresBundle, FindsTheRankBelowTheLimitOfUnknowns) {
   EXPECT_EQ(result.rank, result.unknowns - 1);
 }
 
-/// More than 1000 unknowns remain whichever are eliminated.
+/// More than 1000 unknowns remain, whether the cameras or the points are eliminated.
 TEST(CeresBundle, SolvesALargeProblem) {
   BundleProblem problem = TrueBundle(120, 400).problem;
   std::erase_if(problem.observations, [](const BundleObservation& seen) {
@@ -379,7 +378,7 @@ TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
   }
 }
 
-/// Real problems with the figures of docs/bundle_adjustment.md.
+/// Test of real problems, with the numbers of docs/bundle_adjustment.md.
 class CeresBundleData : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -388,7 +387,7 @@ class CeresBundleData : public ::testing::Test {
     folder_ = std::filesystem::path(data) / "bundle-adjustment";
     if (!std::filesystem::exists(folder_)) GTEST_SKIP() << "no " << folder_;
   }
-  /// Returns the RMS before and after, px.
+  /// Returns the RMS before and after the adjustment, px.
   std::pair<double, double> Rms(const std::string& name, const BundleOptions& options = {}) {
     BundleFile file = ReadBundle(folder_ / name);
     BundleProblem& problem = file.problem;
@@ -407,8 +406,8 @@ class CeresBundleData : public ::testing::Test {
     }
     return {before, after};
   }
-  /// Checks the RMS of `text` with the format's own formula. An RMS of 1e-13 px is a rounding
-  /// error: tolerance 1e-9 px.
+  /// Checks the RMS of `text` with the formula of its format. The tolerance is 1e-9 px, because an
+  /// RMS of 1e-13 px is a rounding error.
   static void ExpectFormula(const BundleFile& file, std::istream& text, double rms) {
     const testing::FormulaCost cost = file.format == BundleFormat::kBal
                                           ? testing::BalFormula(text)
@@ -420,7 +419,7 @@ class CeresBundleData : public ::testing::Test {
   BundleResult result_;
 };
 
-// 42 unknowns for 38 residuals: all residuals can vanish.
+// There are 42 unknowns for 38 residuals, so all residuals can vanish.
 TEST_F(CeresBundleData, Dubrovnik) {
   const auto [before, after] = Rms("dubrovnik-3-7-pre.txt");
   EXPECT_NEAR(before, 17.06, 0.005);

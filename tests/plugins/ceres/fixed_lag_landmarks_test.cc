@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The fixed-lag smoother with landmarks, compared with the Kalman filter on a linear map and with
-// the batch. It differs from the batch in the linearisation of data that left the window.
+// Tests of the fixed-lag smoother with landmarks. It is compared with the Kalman filter on a linear
+// map, and with the batch. It differs from the batch by the linearisation of data that have left
+// the window.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -61,8 +62,8 @@ TEST(FixedLagLandmarks, OverAllFramesIsTheBatchOfTheDataSoFar) {
   EXPECT_FALSE(lag->failed());
 }
 
-/// Offsets to points that leave and return. The priors of two points have 0.2 m; one point is known
-/// exactly.
+/// Problem and data of measured offsets to points that leave the view and return. The prior sigma
+/// of two points is 0.2 m, and one point is known exactly.
 struct LinearMap {
   Problem problem;
   std::vector<Frame> frames;
@@ -87,7 +88,7 @@ struct LinearMap {
     for (int k = 0; k < steps; ++k, r += vector(0.1 * std::sqrt(0.1))) {
       std::vector<Observation> observations;
       for (int i = 0; i < kPoints; ++i) {
-        const int phase = (k + 5 * i) % 17;  // absent for 10 frames: the filter then removes it
+        const int phase = (k + 5 * i) % 17;  // absent for 10 frames, so the filter removes it
         if (phase >= 7 || (phase == 2 && i % 3 == 0) || k % 9 == 4) continue;
         const Vector3d z = points[static_cast<std::size_t>(i)] - r + vector(kNoise);
         observations.push_back({i, {z[0], z[1], z[2]}});
@@ -117,13 +118,15 @@ TEST(FixedLagLandmarks, OfALinearMapIsTheKalmanFilterWhateverTheWindow) {
   }
 }
 
-/// Appends a late frame without measurements: all earlier frames leave the window before it.
+/// Appends a late frame without measurements. All earlier frames leave the window before this
+/// frame.
 std::vector<Frame> WithLateFrame(std::vector<Frame> frames) {
   frames.push_back(FrameOf(100.0, {}));
   return frames;
 }
 
-/// Data leave the window linearised at the solution of all data, so no information is lost.
+/// Expects that the smoother equals the batch. Data leave the window only after the solution of all
+/// data, at which they are linearised. Therefore no information is lost.
 void ExpectNothingIsLost(const Problem& problem, const std::vector<Frame>& frames) {
   const std::vector<Frame> all = WithLateFrame(frames);
   const auto batch = MakeBatch(problem, "solver: sparse\n");
@@ -165,13 +168,13 @@ TEST(FixedLagLandmarks, WhatLeavesHasTheWeightOfTheSolution) {
   ExpectNothingIsLost(map.Filter(), map.frames);
 }
 
-/// Returns the mean distance between the estimates of the newest frames and those of the filtering
-/// batch, in sigmas of the batch.
+/// Returns the mean distance, over all frames, between the newest estimate of `filter` and that of
+/// the filtering batch. It is in sigmas of the batch.
 double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<State>& batch) {
   double sum = 0.0;
   for (std::size_t k = 0; k < map.frames.size(); ++k) {
     filter.Process(map.frames[k]);
-    if (k == 0) continue;  // this state is known exactly
+    if (k == 0) continue;  // the state of the first frame is known exactly
     const Eigen::Map<const Vector3d> expected(batch[k].values().data());
     const Vector3d apart = testing::PositionOf(filter) - expected;
     sum += std::sqrt(apart.dot(batch[k].covariance().Dense().ldlt().solve(apart)));
@@ -180,7 +183,7 @@ double MeanDistance(Estimator& filter, const MapProblem& map, const std::vector<
   return sum / static_cast<double>(map.frames.size() - 1);
 }
 
-// Data that left the window were linearised at a less accurate estimate: a longer window helps.
+// Data that leave a longer window are linearised at a more accurate estimate.
 TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
   const MapProblem map(40, 20);
   std::vector<State> states;
@@ -201,8 +204,9 @@ TEST(FixedLagLandmarks, ALongerWindowIsNearerTheBatchThanAFilter) {
                                std::to_string(longest));
 }
 
-// A camera passes points that enter and leave its view, so the uncertainty of its position grows. A
-// prior with old linearisation points, as of fixed anchors, would reduce it wrongly.
+// A camera passes points that enter and leave its view. The uncertainty of its position therefore
+// grows. A prior with old linearisation points, such as fixed anchors, would wrongly reduce this
+// uncertainty.
 TEST(FixedLagLandmarks, OnAWayAlongPointsItKnowsNoMoreThanTheFilter) {
   constexpr int kSteps = 120, kPoints = 240;
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);

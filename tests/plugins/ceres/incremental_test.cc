@@ -9,10 +9,10 @@ using Eigen::Vector3d;
 using testing::MakeBatch;
 using testing::MapProblem;
 
-/// Distance of two estimates in sigmas, and the relative distance of their covariances.
+/// Distance of two estimates, in sigmas, and relative distance of their covariances.
 struct Apart {
   double state = 0.0, covariance = 0.0;
-  std::ptrdiff_t whole = 0;  ///< frames that were solved from scratch
+  std::ptrdiff_t whole = 0;  ///< number of frames that were solved from scratch
 };
 Apart Compare(const Estimator& found, const Estimator& expected) {
   const MatrixXd p = expected.state().covariance().Dense().topLeftCorner(3, 3);
@@ -22,7 +22,8 @@ Apart Compare(const Estimator& found, const Estimator& expected) {
   return {d.norm() / std::sqrt(p.trace()), (its - p).norm() / p.norm(), 0};
 }
 
-/// Returns the largest distance over the frames and of the final map.
+/// Returns the largest distances from the filtering batch, over all frames and the landmarks of the
+/// final map.
 Apart LargestOf(const Problem& problem, const std::vector<Frame>& frames,
                 const std::string& above) {
   const auto incremental =
@@ -60,7 +61,8 @@ Apart LargestOf(const MapProblem& map, const std::string& above) {
   return LargestOf(map.Filter(), map.frames, above);
 }
 
-// Everything is relinearised: the result equals the batch of the data so far.
+// Every change leads to a relinearisation. The result therefore equals the batch of the data so
+// far.
 TEST(IncrementalBatch, IsTheBatchOfTheDataSoFar) {
   const Apart apart = LargestOf(MapProblem(20, 12), "1e-10");
   EXPECT_LT(apart.state, 1e-7);
@@ -78,8 +80,8 @@ TEST(IncrementalBatch, OfARobustLossToo) {
   EXPECT_LE(apart.whole, 2);
 }
 
-// Blocks that moved by less than a share of their sigma are not relinearised: the result is close
-// but not equal.
+// Blocks that moved by less than 0.03 sigma are not relinearised. The result is therefore close to
+// that of the batch, but not equal.
 TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
   const Apart apart = LargestOf(MapProblem(20, 12), "0.03");
   EXPECT_LT(apart.state, 0.1);
@@ -88,8 +90,8 @@ TEST(IncrementalBatch, IsNearWhereItIsLinearisedNear) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Without relinearisation, landmarks follow their first cameras. For a linear map this is exact,
-// except for changes too small to be propagated to earlier frames.
+// Without relinearisation, a landmark moves with the camera of its first observation. For a linear
+// map this is exact, except for changes that are too small to be propagated to earlier frames.
 TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   Random random(3);
   std::vector<Frame> frames;
@@ -108,7 +110,8 @@ TEST(IncrementalBatch, OfALinearMapTheLandmarksFollowTheirCameras) {
   EXPECT_EQ(apart.whole, 0);
 }
 
-// Landmarks that were not seen for a while leave the last matrix and return to it later.
+// Landmarks that were not seen for a while leave the last matrix. They return to it when they are
+// seen again.
 TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   MapProblem map(45, 9);
   for (std::size_t k = 12; k < map.frames.size(); ++k) {
@@ -121,11 +124,11 @@ TEST(IncrementalBatch, TakesLandmarksBackThatWereGone) {
   EXPECT_LT(apart.state, 1e-7);
   EXPECT_LT(apart.covariance, 1e-6);
   EXPECT_EQ(apart.whole, 0);
-  // the part of the matrix to which they return is eliminated again
+  // The part of the matrix to which they return is eliminated again.
   EXPECT_LT(LargestOf(map, "0.3").state, 0.5);
 }
 
-// The full-information filter of a linear system equals the Kalman filter at every frame.
+// In a linear system the full-information filter equals the Kalman filter at every frame.
 TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
   const Problem problem = testing::LinearSystem();
   for (const char* mode : {"filtering", "incremental"}) {
@@ -148,7 +151,7 @@ TEST(IncrementalBatch, OfALinearSystemIsTheKalmanFilter) {
   }
 }
 
-// An exactly known landmark is not a variable, but its measurements still count.
+// An exactly known landmark is not a variable, but its measurements are still used and reported.
 TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   LandmarkOptions options;
   options.known = {{0, {0.5, -0.2, 2.0}, 0.0}, {1, {-0.4, 0.1, 1.5}, 0.1}};
@@ -171,7 +174,7 @@ TEST(IncrementalBatch, TellsWhatIsMeasuredOfALandmarkThatIsKnown) {
   }
 }
 
-// Exactly known values have zero variance, not a rounding error.
+// The variance of an exactly known value is zero, and is not a rounding error.
 TEST(IncrementalBatch, OfWhatIsKnownExactlyThereIsNoVariance) {
   Problem problem = testing::DepthFilter();
   for (Prior& prior : problem.priors) {
@@ -213,7 +216,7 @@ TEST(IncrementalBatch, OfAVaguePriorIsSolvedAsAWhole) {
       "time lose digits; so are all frames from here on");
 }
 
-// A stopped batch has no map; it does not report that of its filter.
+// A stopped batch has no map. It does not return the map of its filter.
 TEST(CeresBatchEnds, AStoppedBatchHasNoMap) {
   const MapProblem map(6, 8);
   for (const char* solver : {"sparse", "dense"}) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Keyframes: landmarks at earlier positions of the body, and later measurements relative to them.
+// Tests of keyframes. A keyframe is a landmark at an earlier position of the body; later
+// measurements are relative to it.
 #include "batch_landmarks_fixture.h"
 
 namespace alidade {
@@ -17,8 +18,9 @@ using testing::Solve;
 
 constexpr double kStart = 0.3, kNoise = 0.05;
 
-/// A walk in which every frame k is a keyframe, and offsets z = r_j - r_k + n from some frames to
-/// earlier keyframes: least squares in the positions only, calculated here.
+/// Walk in which every frame k is a keyframe. Offsets z = r_j - r_k + n are measured from some
+/// frames to earlier keyframes. The solution is calculated here, by least squares in the positions
+/// only.
 struct Walked {
   std::vector<Frame> frames;
   MatrixXd covariance;
@@ -82,7 +84,8 @@ TEST(RelativePoses, TheBatchIsLeastSquaresOfThePositionsAlone) {
   }
 }
 
-// An EKF has the clones in its state: at the end its estimates of all of them equal the batch's.
+// The state of an EKF contains the clones. At the end its estimates of all clones equal those of
+// the batch.
 TEST(RelativePoses, TheFilterWithClonesKnowsTheSameAtTheEnd) {
   const int steps = 30;
   const Walked walked(steps, 15);
@@ -108,15 +111,15 @@ TEST(RelativePoses, TheFilterWithClonesKnowsTheSameAtTheEnd) {
   expect(*window);
 }
 
-/// Returns the flops of an iteration from the event `solution`.
+/// Returns the number of flops of an iteration, read from the event `solution`.
 double FlopsOf(const Found& found) {
   const std::string& text = found.events.back().text;
   const std::size_t end = text.rfind(" flops"), begin = text.rfind(' ', end - 1);
   return std::stod(text.substr(begin, end - begin));
 }
 
-// A single loop over 2000 frames connects the last frame with the first. The fronts in between
-// contain only the additional rows of the loop.
+// A single loop closure connects the last of 2000 frames with the first. The fronts in between only
+// grow by the rows of this closure.
 TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   constexpr int kFrames = 2000;
   const auto frames = [&](bool closed) {
@@ -137,7 +140,7 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   };
   LandmarkOptions forgetful;
   forgetful.max_missed_frames = 3;
-  forgetful.known.push_back({0, {0.0, 0.0, 0.0}, 0.1});  // the filter never drops it
+  forgetful.known.push_back({0, {0.0, 0.0, 0.0}, 0.1});  // never removed by the filter
   const Problem problem = MapSystem(testing::Offset(kNoise), forgetful, kStart);
   const Found open = Solve(problem, frames(false), "solver: sparse\n");
   const Found closed = Solve(problem, frames(true), "solver: sparse\n");
@@ -145,7 +148,8 @@ TEST(RelativePoses, ALoopOverTwoThousandFramesStaysSparse) {
   RecordProperty("flops", std::to_string(FlopsOf(open)) + ' ' + std::to_string(FlopsOf(closed)));
   EXPECT_LT(FlopsOf(closed), 2.0 * FlopsOf(open));
   EXPECT_LT(FlopsOf(closed), 2e3 * kFrames);
-  // The loop improves the end: 2000 steps of 0.1 m/sqrt(s), compared with one offset of 0.05 m.
+  // The loop closure improves the last position. Without it there are 2000 steps of 0.1 m/sqrt(s),
+  // with it an offset of 0.05 m.
   const auto sigma = [](const Found& found) {
     return std::sqrt(found.states.back().covariance().Variance(0));
   };

@@ -19,7 +19,7 @@ using Values = std::vector<std::vector<double>>;
 template <class G>
 using Seen = testing::ManifoldSensor<G, 1.0>;
 
-/// z = x + b; the bias b is optional.
+/// Sensor z = x + b. The bias b is optional.
 struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"},
                                      Quantity{"b", "", "", "", ALIDADE_ROLE_OPTIONAL}};
@@ -47,7 +47,7 @@ std::vector<double> ResidualAt(const ceres::CostFunction& cost, const Values& va
   return r;
 }
 
-/// Residual and Jacobians of a cost, written to buffers that held garbage.
+/// Residual and Jacobians of a cost. Their buffers contained other numbers before the evaluation.
 struct Evaluated {
   std::vector<double> r;
   Values j;
@@ -62,8 +62,8 @@ Evaluated At(const ceres::CostFunction& cost, const Values& values) {
   return out;
 }
 
-/// Compares [J
-/// 0] [I; 0], as Ceres forms it, with central differences through the manifold.
+/// Compares [J | 0] [I; 0], the product that Ceres computes, with central differences on the
+/// manifold.
 void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
                          const std::vector<GeometryManifold>& manifolds, double tolerance) {
   const Evaluated at = At(cost, values);
@@ -97,7 +97,8 @@ void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
 
 GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geometry, false}}); }
 
-// d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = -1.5, dr/dZ = -10 / 2 / 2 = -2.5 per m
+// With d = 20 / 2 = 10 px, z = 13 px and sigma = 2 px:  r = -1.5,  dr/dZ = -10 / 2 / 2 = -2.5 per
+// m.
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   const SharedSensor by_abi = MakeSensor(model, "stereo_disparity");
@@ -107,7 +108,7 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const CostKind<SensorModel> behind(*by_abi, {{0, 0}}, {1}, w);
   const SensorCost<StereoDisparity> a(direct, &z);
   const SensorCost<SensorModel> b(behind, &z);
-  z = 77.0;  // the costs have their own measurement
+  z = 77.0;  // the costs have copied z
   for (const ceres::CostFunction* cost :
        {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
     const Evaluated at = At(*cost, {{2.0}});
@@ -119,7 +120,8 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   }
 }
 
-/// Pose and intrinsics in one block, not in the order of the roles; correlated noise.
+/// Pose and intrinsics are in one block, and not in the order of the roles. The noise is
+/// correlated.
 TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SelfCalibratingFeature<RadialLens> model(1.0);
   const SharedSensor by_abi = MakeSensor(model, "self_calibrating_feature");
@@ -137,7 +139,7 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
       Of(Geometry::Vector(3)), GeometryManifold({{Geometry::Vector(3), false},
                                                  {Geometry::Vector(3), false},
                                                  {Geometry::UnitQuaternion(), false}})};
-  // Rounding errors of pixels, 1e-13 px, divided by the step.
+  // The tolerance allows for rounding errors of pixels, 1e-13 px, divided by the step.
   ExpectTrueJacobians(a, values, manifolds, 1e-6);
   ExpectTrueJacobians(b, values, manifolds, 1e-6);
   ExpectTrueJacobians(c, values, manifolds, 1e-6);
@@ -204,7 +206,7 @@ TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
   EXPECT_THROW(Kind(model, {{0, 0}}, {1}, {1.0, 0.0}), ContractViolation);
 }
 
-// If two roles shared a number, the other column of the block would keep its old value.
+// If two roles shared an element of a block, one column of the Jacobian would not be written.
 TEST(SensorCost, RefusesRolesThatShareAPlace) {
   const SharedSensor sensor = MakeSensor(Biased(), "biased");
   using Kind = CostKind<SensorModel>;
@@ -238,7 +240,7 @@ TEST(GeometryManifold, MovesPartsByTheirGeometryAndHoldsOthers) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(back[i], d[i], 1e-14);
   ASSERT_TRUE(manifold.PlusJacobian(x.data(), j.data()));
   ASSERT_TRUE(manifold.MinusJacobian(x.data(), inverse.data()));
-  const std::size_t rows[4] = {2, 3, 4, 6};  // by tangent column
+  const std::size_t rows[4] = {2, 3, 4, 6};  // row of the 1 in each tangent column
   for (std::size_t r = 0; r < 7; ++r) {
     for (std::size_t c = 0; c < 4; ++c) {
       EXPECT_EQ(j[4 * r + c], r == rows[c] ? 1.0 : 0.0);

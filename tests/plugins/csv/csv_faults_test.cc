@@ -10,7 +10,7 @@ namespace {
 
 // ---- bad data -----------------------------------------------------------------------------------
 
-// FAULTS 27
+// Fault 27 of tests/faults/README.md.
 TEST_F(Csv, WrongNumberOfColumns) {
   ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
                 "FILE:4:6: 3 columns; expected 4 columns, as in line 2");
@@ -26,14 +26,14 @@ TEST_F(Csv, BytesThatAreNoText) {
   ExpectBadData(std::string("t\0_\0s\0\n", 7), expected);
 }
 
-// FAULTS 34
+// Fault 34 of tests/faults/README.md.
 TEST_F(Csv, TruncatedLastLine) {
   ExpectBadData(
       std::string(kHeader) + "0,1,2,3\n1,2",
       "FILE:3:4: the last line is cut short: 2 columns; expected 4 columns, as in line 1");
 }
 
-// FAULTS 28
+// Fault 28 of tests/faults/README.md.
 TEST_F(Csv, NotANumber) {
   const auto expect = [&](const std::string& cell) {
     ExpectBadData(
@@ -53,7 +53,7 @@ TEST_F(Csv, ShowsHostileCellsHarmlessly) {
                 "FILE:2:3 disparity_px: '?' is not a number; expected a finite number");
 }
 
-// FAULTS 29
+// Fault 29 of tests/faults/README.md.
 TEST_F(Csv, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
@@ -65,7 +65,7 @@ TEST_F(Csv, NotFinite) {
                 "FILE:2:1 t_s: 'nan' is not finite; expected a finite number");
 }
 
-// FAULTS 30
+// Fault 30 of tests/faults/README.md.
 TEST_F(Csv, Overflow) {
   for (const std::string cell : {"1e400", "-1e400", "1e-400"}) {
     ExpectBadData(std::string(kHeader) + "0,1,2," + cell + "\n",
@@ -79,7 +79,7 @@ TEST_F(Csv, ReciprocalOfZero) {
                 "FILE:2:5 scale: '0' has no finite reciprocal; expected a finite number");
 }
 
-// FAULTS 33
+// Fault 33 of tests/faults/README.md.
 TEST_F(Csv, LineTooLong) {
   // "0,1,2," and a number: 4096 bytes are accepted, one more is an error; the line end does not
   // count.
@@ -105,7 +105,7 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
                           ":1 t_s: 'x' is not a number; expected a finite number");
 }
 
-// FAULTS 35, 36
+// Faults 35 and 36 of tests/faults/README.md.
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is before line 3; expected increasing times, or "
@@ -124,7 +124,7 @@ TEST_F(Csv, TimeBeyondTheTimestamps) {
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }
 
-// FAULTS 43
+// Fault 43 of tests/faults/README.md.
 TEST_F(Csv, NothingAtAll) {
   ExpectBadData("", "FILE: no header line; expected a line that names the columns");
   ExpectBadData("# c\n\n", "FILE: no header line; expected a line that names the columns");

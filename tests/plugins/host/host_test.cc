@@ -191,7 +191,7 @@ TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
   ExpectRefused(Built("no_build_tag"), {"has no alidade build tag"});
 }
 
-// FAULTS 53
+// Fault 53 of tests/faults/README.md.
 TEST_F(HostTest, AnotherAbiIsRefused) {
   ExpectRefused(Built("other_abi"),
                 {"built for plugin ABI 99.0", "this program has 1.0", "rebuild the plugin"});
@@ -215,7 +215,7 @@ TEST_F(HostTest, ACppPluginOfAnotherAbiNumberIsRefusedWithBothNumbers) {
       {"a C++ plugin for ABI number 'other', but this program has '" ALIDADE_CPP_ABI "'"});
 }
 
-// FAULTS 55
+// Fault 55 of tests/faults/README.md.
 TEST_F(HostTest, AMissingSymbolIsNamedAtLoad) {
   ExpectRefused(Built("undefined_symbol"), {"cannot be loaded", "a_function_nobody_defines"});
 }

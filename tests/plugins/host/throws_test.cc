@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 58: plugins written against the C header throw, which the header forbids.
+// Fault 58 of tests/faults/README.md: plugins written against the C header throw, which the header
+// forbids.
 #include "alidade/io/log.h"
 #include "alidade/plugin/create.h"
 #include "host_fixture.h"

@@ -19,7 +19,7 @@ constexpr uid_t kStranger = 54321;
 constexpr std::size_t npos = std::string::npos;
 
 /// A plugin that another user could have written is not opened.
-// FAULTS 70
+// Fault 70 of tests/faults/README.md.
 class TrustTest : public HostTest {
  protected:
   static void Allow(const fs::path& path, fs::perms who) {

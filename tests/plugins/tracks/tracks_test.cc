@@ -188,7 +188,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
   EXPECT_FALSE(source->Next(frame));
 }
 
-// FAULTS 47
+// Fault 47 of tests/faults/README.md.
 TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
   // A pipe of 2e6 rows, about 30 MB, written by a thread; the peak may grow by 4 MB.
   const auto peak_kb = [] {

@@ -46,8 +46,8 @@ struct BothAtOnce : Sensor<Product<A, B>, A, B> {
   }
 };
 
-/// Returns a problem with one block of each of two geometries. Both blocks perform a random walk.
-/// Their priors are correlated.
+/// Returns a problem with a block of geometry A and one of geometry B. Both blocks perform a random
+/// walk. Their priors are correlated.
 template <class A, class B>
 Problem Walking() {
   Problem problem;

@@ -354,7 +354,7 @@ TEST(Live, ExpectsALandmarkByItsId) {
   EXPECT_FALSE(ekf.Expect("tracks", 0));
 }
 
-// The thread sanitizer finds errors in this test.
+// With the thread sanitizer this test detects data races.
 TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
   Ekf ekf = MakeLive<Ekf>();
   const std::vector<Frame> frames = Swinging(30, 5);

@@ -386,19 +386,4 @@ constexpr const MetricInfo* FindMetric(std::string_view name) {
   return nullptr;
 }
 
-static_assert(
-    [] {
-      for (const MetricInfo& metric : kMetrics) {
-        const bool is_of_block = metric.block != nullptr, is_of_owner = metric.owner != nullptr;
-        const bool is_of_sensor = metric.sensor != nullptr || metric.implied != nullptr;
-        if (FindMetric(metric.name) != &metric) return false;
-        if (is_of_block + is_of_owner + is_of_sensor > 1) return false;
-        if (is_of_block && metric.subject != MetricSubject::kBlock) return false;
-        if (is_of_owner && metric.subject != MetricSubject::kOwner) return false;
-        if (is_of_sensor && metric.subject != MetricSubject::kSensor) return false;
-      }
-      return true;
-    }(),
-    "names are unique, and a sampled metric has one sample function, which fits its subject");
-
 }  // namespace alidade

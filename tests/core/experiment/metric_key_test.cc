@@ -20,6 +20,23 @@ TEST(MetricKey, IsItsTextAndBack) {
   EXPECT_EQ(MetricKey::Parse("map.rmse").subject, "");
 }
 
+TEST(MetricTable, HasAtMostOneSampleFunctionWhichFitsTheSubject) {
+  for (const MetricInfo& metric : kMetrics) {
+    const bool is_of_block = metric.block != nullptr, is_of_owner = metric.owner != nullptr;
+    const bool is_of_sensor = metric.sensor != nullptr, is_implied = metric.implied != nullptr;
+    EXPECT_LE(is_of_block + is_of_owner + is_of_sensor + is_implied, 1) << metric.name;
+    if (is_of_block) {
+      EXPECT_EQ(metric.subject, MetricSubject::kBlock) << metric.name;
+    }
+    if (is_of_owner) {
+      EXPECT_EQ(metric.subject, MetricSubject::kOwner) << metric.name;
+    }
+    if (is_of_sensor || is_implied) {
+      EXPECT_EQ(metric.subject, MetricSubject::kSensor) << metric.name;
+    }
+  }
+}
+
 TEST(MetricTable, HasEachNameOnceAndAPriorityOnce) {
   for (std::size_t i = 0; i < kMetrics.size(); ++i) {
     EXPECT_EQ(FindMetric(kMetrics[i].name), &kMetrics[i]) << kMetrics[i].name;

@@ -9,21 +9,21 @@
 #include "alidade/model/model_members.h"
 #include "alidade/model/status.h"
 
-/// Evaluates models and their Jacobians in the tangent. The Jacobians are the author's analytic
-/// ones if the model has them, else they come from forward-mode automatic differentiation through
-/// (+) and (-). Plugins, the static filter, costs of a batch and tests share this code. Matrices
-/// are row-major with a row stride. Outputs are untouched unless the result is kOk.
+/// Evaluates models and their Jacobians in the tangent space. If the model has analytic Jacobians,
+/// they are used. Otherwise forward-mode automatic differentiation through (+) and (-) computes the
+/// Jacobians. Plugins, the static filter, costs of a batch and tests share this code. Matrices are
+/// row-major with a row stride. Outputs are unchanged unless the result is kOk.
 
 /// Disables vectorised loops in a function. A model has just written its outputs as single numbers.
-/// Reading them as vectors would wait for those stores.
+/// Vector loads of these outputs would have to wait for the stores.
 #if defined(__GNUC__) && !defined(__clang__)
 #define ALIDADE_SCALAR_LOOPS __attribute__((optimize("no-tree-loop-vectorize")))
 #else
 #define ALIDADE_SCALAR_LOOPS
 #endif
 
-/// Inlines all callees into a function, down to the arithmetic of the model. Disabled under
-/// sanitizers: with their checks the compiler would need minutes and gigabytes.
+/// Inlines all callees into a function, including the arithmetic of the model. Disabled if
+/// sanitizers are active, because the compiler would then need minutes and gigabytes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ALIDADE_FLATTEN
 #else
@@ -33,10 +33,11 @@
 namespace alidade {
 namespace detail {
 
-/// Skips no block.
+/// Returns false: no block is skipped.
 constexpr bool SkipNone(int) { return false; }
 
-/// Computes x (+) d at d = 0 as dual numbers. The elements of d are the variables from `seed` on.
+/// Computes x (+) d at d = 0 in dual numbers. The elements of d are the variables `seed`, `seed` +
+/// 1, ...
 template <class G, class Jet>
 void LiftBlock(const double* x, int seed, Jet* lifted) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
@@ -55,8 +56,8 @@ void LiftBlock(const double* x, int seed, Jet* lifted) {
   }
 }
 
-/// Computes x (+) 0 of all blocks as dual numbers, seeded in order. A block for which kSkip is true
-/// is assigned neither a value nor a seed.
+/// Computes x (+) 0 of all blocks in dual numbers. Each block has its own variables, numbered in
+/// the order of the blocks. Blocks for which kSkip is true have no dual numbers and no variables.
 template <class Model, bool (*kSkip)(int) = SkipNone, class Jet>
 void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   int seed = 0, offset = 0;
@@ -74,7 +75,8 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
   ForEach(lift, typename Blocks<Model>::Indices{});
 }
 
-/// Reads d value / d seeds [first, first + count), in the tangent of G at the value itself.
+/// Reads the derivatives of a value by the variables [first, first + count), in the tangent space
+/// of G at the value.
 template <class G, class Jet>
 void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
   if constexpr (G::kGeometry == ALIDADE_VECTOR) {
@@ -106,9 +108,9 @@ void CopyUnrolled(MatrixRef source, MatrixRef destination, std::index_sequence<I
   ((destination(I / kColumns, I % kColumns) = source(I / kColumns, I % kColumns)), ...);
 }
 
-/// Copies a matrix whose size is known to the compiler. A small one is copied number by number, so
-/// that it can stay in registers. A load of two numbers cannot be forwarded from two stores of one
-/// number: it waits until they have left the store buffer.
+/// Copies a matrix whose size is known at compile time. A small matrix is copied number by number,
+/// so that it can stay in registers. A load of two numbers cannot be forwarded from two separate
+/// stores: the load would wait until both have left the store buffer.
 template <int kRows, int kColumns>
 void CopyFixed(MatrixRef source, MatrixRef destination) {
   if constexpr (kRows * kColumns <= 64) {
@@ -125,8 +127,8 @@ bool CallPredict(const Model& model, const T* const* x, const double* known, T* 
   return WithRoles<Model>(predict, x, known, indices, z);
 }
 
-/// Computes analytic Jacobians in a buffer, so that a Jacobian that throws leaves `jacobians`
-/// untouched.
+/// Computes analytic Jacobians in a buffer first. If Jacobian throws, `jacobians` is therefore
+/// unchanged.
 template <class Model, std::size_t... I>
 void AnalyticJacobians(const Model& model, const double* const* x, const double* known,
                        double* const* jacobians, const int* strides,
@@ -155,9 +157,9 @@ void AnalyticJacobians(const Model& model, const double* const* x, const double*
 
 }  // namespace detail
 
-/// Computes z = h(roles) and, unless `jacobians` is null, jacobians[i] = d z / d role_i. Null
-/// entries and unbound roles are skipped. `known`: numbers that come with the measurement, used
-/// only by a model with kKnown.
+/// Computes z = h(roles). Unless `jacobians` is null, also computes jacobians[i] = d z / d role_i,
+/// except for null entries and unbound roles. `known` are the known numbers of the measurement,
+/// which only models with kKnown use.
 template <class Model>
 Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
                 const int* strides, const double* known = nullptr) {
@@ -197,12 +199,13 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
   return Status::kOk;
 }
 
-// Motion models.
+// Evaluation of motion models.
 
 namespace detail {
 
-/// Calls step(next) and returns its result. Static blocks are buffered, so that a step that fails
-/// or throws leaves `next` untouched. Models with dynamic blocks ensure that themselves.
+/// Calls step(next) and returns its result. If all blocks have a static size, the step writes to a
+/// buffer, so that `next` is unchanged if the step fails or throws. Models with dynamic blocks must
+/// ensure this themselves.
 template <class Model, class F>
 bool CallBuffered(double* const* next, const F& step) {
   using Blocks = detail::Blocks<Model>;
@@ -229,7 +232,7 @@ bool CallBuffered(double* const* next, const F& step) {
   }
 }
 
-/// Computes F and G by the model's StepJacobian, buffered like `next`.
+/// Computes F and G by StepJacobian of the model. Uses a buffer in the same way as CallBuffered.
 template <class Model, std::size_t... I>
 void AnalyticStep(const Model& model, const double* const* x, const double* w, double dt_s,
                   MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
@@ -239,7 +242,7 @@ void AnalyticStep(const Model& model, const double* const* x, const double* w, d
     const MatrixRef f_new{f_buffer, n}, g_new{g_buffer, n_w};
     model.StepJacobian(x[I]..., w, dt_s, f_new, g_new);
     Copy(f_new, n, n, f);
-    Copy(g_new, n, NoiseSizeOf(model), g);  // a model may use fewer noise elements than kNoise
+    Copy(g_new, n, NoiseSizeOf(model), g);  // NoiseSizeOf(model) may be less than kNoise
   } else {
     const int n = TangentSizeOf(model);
     Zero(f, n, n);
@@ -248,7 +251,7 @@ void AnalyticStep(const Model& model, const double* const* x, const double* w, d
   }
 }
 
-/// Computes x', F and G by dual numbers.
+/// Computes x', F and G with dual numbers.
 template <class Model>
 Status StepJets(const Model& model, const double* const* x, const double* u, const double* w,
                 double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
@@ -280,7 +283,7 @@ Status StepJets(const Model& model, const double* const* x, const double* u, con
   return Status::kOk;
 }
 
-/// Computes B by dual numbers.
+/// Computes B = d x' / d u with dual numbers.
 template <class Model>
 Status InputJets(const Model& model, const double* const* x, const double* u, const double* w,
                  double dt_s, MatrixRef b) {
@@ -319,7 +322,7 @@ Status InputJets(const Model& model, const double* const* x, const double* u, co
   return Status::kOk;
 }
 
-/// Calls f(w) with zeros that have the size of the model's noise.
+/// Calls f(w) with w = 0 of the size of the model's noise.
 template <class Model, class F>
 Status WithZeroNoise(const Model& model, const F& f) {
   if constexpr (Model::kNoise == kDynamic) {
@@ -332,7 +335,7 @@ Status WithZeroNoise(const Model& model, const F& f) {
   }
 }
 
-/// Computes a step for a non-null `w`.
+/// Computes a step. `w` must not be null.
 template <class Model>
 Status StepWithNoise(const Model& model, const double* const* x, const double* u, const double* w,
                      double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
@@ -357,14 +360,14 @@ Status StepWithNoise(const Model& model, const double* const* x, const double* u
 
 }  // namespace detail
 
-/// Computes x' = f(x, u, w, dt), F = d x' / d x (n x n) and G = d x' / d w (n x n_w). w may be null
-/// (zero); F and G may be empty.
+/// Computes x' = f(x, u, w, dt), F = d x' / d x (n x n) and G = d x' / d w (n x n_w). A null w
+/// means w = 0. F and G may be empty.
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   static_assert(detail::CheckMotionMembers<Model>());
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
-  std::vector<double> unused;  // the caller rarely requests only F or only G
+  std::vector<double> unused;  // used only if the caller requests only F or only G
   if (static_cast<bool>(f) != static_cast<bool>(g) && n_w > 0) {
     unused.resize(static_cast<std::size_t>(n) * std::max(n, n_w));
     (f ? g : f) = MatrixRef{unused.data(), f ? n_w : n};
@@ -375,7 +378,7 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
   return w != nullptr ? step(w) : detail::WithZeroNoise(model, step);
 }
 
-/// Also computes B = d x' / d u (n x n_u) of a model with a control input.
+/// Does the same, and also computes B = d x' / d u (n x n_u) of a model with a control input.
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g, MatrixRef b) {

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace detail {
 
-/// Sizes of y, the roles that Initialise computes.
+/// Sizes of y, which contains the roles that Initialise computes.
 template <class Model>
 struct InitialisedSizes {
   static constexpr int Sum(bool ambient) {
@@ -48,7 +48,7 @@ bool CallInitialise(const Model& model, const T* const* x, const double* known, 
   }
 }
 
-/// Reads d y / d seeds [first, first + count), role by role.
+/// Reads the derivatives of y by the variables [first, first + count), role by role.
 template <class Model, class Jet>
 void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
   int offset = 0, row = 0;
@@ -65,10 +65,11 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 
 }  // namespace detail
 
-/// Computes y from the other roles, z and prior (inverse measurement model). y is the role
-/// Model::kInitialises; for a landmark, y is its roles one after the other. Also computes the
-/// Jacobians jx[i] = d y / d role_i, jz = d y / d z and jp = d y / d prior; each may be null.
-/// Returns kInvalid if the model needs a prior and `prior` is null. `known`: see Evaluate.
+/// Evaluates the inverse measurement model: computes y from the other roles, z and the prior. y is
+/// the value of the role Model::kInitialises. For a landmark, y contains the values of all its
+/// roles, one after the other. Also computes the Jacobians jx[i] = d y / d role_i, jz = d y / d z
+/// and jp = d y / d prior. Each of them may be null. Returns kInvalid if the model needs a prior
+/// and `prior` is null. `known` is the same as in Evaluate.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,

@@ -6,7 +6,7 @@
 
 #include "alidade/model/plugin_abi.h"
 
-/// Build tag of a binary: how it was built. It can be read from the file without loading the
+/// Build tag: describes how a binary was built. It can be read from the file without loading the
 /// library.
 namespace alidade::detail {
 
@@ -15,8 +15,8 @@ constexpr void CopyText(const char* text, char (&destination)[N]) {
   for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) destination[i] = text[i];
 }
 
-/// Returns ALIDADE_ISA_* of the instruction sets that the compiler may use by itself in this
-/// translation unit, with registers of up to 256 bits.
+/// Returns the flags ALIDADE_ISA_* of instruction sets with registers of up to 256 bits. Includes
+/// those that the compiler may use without intrinsics in this translation unit.
 constexpr std::uint32_t InstructionSetsTo256() {
   std::uint32_t isa = 0;
 #if defined(__SSE3__)
@@ -61,7 +61,7 @@ constexpr std::uint32_t InstructionSetsTo256() {
   return isa;
 }
 
-/// Returns ALIDADE_ISA_* of the remaining instruction sets.
+/// Returns the flags ALIDADE_ISA_* of all other instruction sets.
 constexpr std::uint32_t InstructionSetsBeyond256() {
   std::uint32_t isa = 0;
 #if defined(__AVX512F__)
@@ -130,7 +130,7 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
   return f;
 }
 
-/// Names of a plugin's entries, each followed by a zero.
+/// Names of the entries of a plugin, each followed by a zero byte.
 template <std::size_t kSize>
 struct EntryNames {
   char text[kSize] = {};
@@ -172,8 +172,8 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
 
 }  // namespace alidade::detail
 
-/// Defines the build tag in its section. `kind`: ALIDADE_PLUGIN_*; `build`: text that must equal
-/// the host's.
+/// Defines the build tag in its section of the binary. `kind` is ALIDADE_PLUGIN_*. `build` is a
+/// text that must equal the text of the host.
 #define ALIDADE_BUILD_TAG(kind, build)                                                    \
   extern "C" {                                                                            \
   __attribute__((section(ALIDADE_BUILD_TAG_SECTION), used,                                \
@@ -181,7 +181,7 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuil
       alidade::detail::MakeBuildTag(kind, build);                                         \
   }
 
-/// Defines the names of `entries`, a constexpr array, in their section.
+/// Defines the names of the constexpr array `entries` in their section of the binary.
 #define ALIDADE_ENTRY_NAMES(entries)                                                          \
   __attribute__((section(ALIDADE_NAMES_SECTION), used)) static constexpr auto alidade_names = \
       alidade::detail::NamesOf<alidade::detail::SizeOfNames(entries)>(entries);

@@ -7,16 +7,16 @@
 #include "alidade/model/params.h"
 #include "alidade/model/radial_polynomial.h"
 
-/// Camera models: they map rays to pixels and back. The scalar is a template parameter, double or a
-/// dual number. Derivatives are also correct for equations that are solved by iteration.
+/// Camera models, which map rays to pixels and pixels to rays. The scalar is a template parameter:
+/// double or a dual number. Derivatives are also correct if an equation is solved by iteration.
 namespace alidade {
 
-/// Projections. All but the pinhole have radial coefficients k.
+/// Projection with its lens distortion. All except kPinhole have radial coefficients k.
 enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 
-/// A camera: projection, lens distortion and image size.
+/// Camera with projection, lens distortion and image size.
 ///
-///   pixel             u = cx + fx x,  v = cy + fy y          (x, y) by the model from h
+///   pixel             u = cx + fx x,  v = cy + fy y          the model computes (x, y) from h
 ///   pinhole           (x, y) = (hx, hy) / hz =: (x0, y0)
 ///   radtan            x = x0 s(q) + 2 p1 x0 y0 + p2 (q + 2 x0^2)
 ///                     y = y0 s(q) + p1 (q + 2 y0^2) + 2 p2 x0 y0,     q = x0^2 + y0^2
@@ -25,17 +25,18 @@ enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
 ///                     s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4
 ///
 ///   symbol        shape  unit  frame  meaning
-///   h             3      any   cam    the point, up to a positive factor; x right, y down, z ahead
-///   (u, v)        2      px    -      the centre of the upper left pixel is (0, 0)
+///   h             3      any   cam    the point times a positive factor; x right, y down, z ahead
+///   (u, v)        2      px    -      pixel; (0, 0) is the centre of the upper left pixel
 ///   fx, fy        1      px    -      focal length; > 0
 ///   cx, cy        1      px    -      principal point
-///   k1 to k4      1      -     -      radial: radtan k1 to k3, equidistant k1 to k4,
+///   k1 to k4      1      -     -      radial distortion: radtan k1 to k3, equidistant k1 to k4,
 ///                                     photogrammetric k1, k2
-///   p1, p2        1      -     -      tangential: radtan
+///   p1, p2        1      -     -      tangential distortion of radtan
 ///
-/// radtan and equidistant agree with OpenCV and Kalibr. photogrammetric is the 2-parameter model of
-/// MonoSLAM, whose closed form is the inverse: from the image to the ray. Its k1 is often stated
-/// per mm^2 of the sensor. Multiply it by the squared focal length in mm (k2: by the fourth power).
+/// radtan and equidistant equal the models of OpenCV and Kalibr. photogrammetric is the model of
+/// MonoSLAM with two parameters. Only its inverse, from pixel to ray, has a closed form. In the
+/// literature, its k1 is often in 1/mm^2 and k2 in 1/mm^4, on the image sensor. Multiply k1 by the
+/// squared focal length in mm, and k2 by the fourth power of the focal length.
 ///
 /// Defined for  hz > 0 (equidistant: h not on the negative z axis), within the radius up to which
 ///              the distorted radius increases, so that no two rays share a pixel.
@@ -79,7 +80,7 @@ struct Camera {
     z[1] = cy + fy * x[1];
     return true;
   }
-  /// Computes a vector h, of any positive length, that is seen at z = (u, v). Returns false if no
+  /// Computes a vector h, of any positive length, whose pixel is z = (u, v). Returns false if no
   /// such vector exists.
   template <class T>
   bool Unproject(const T* z, T* h) const {
@@ -88,15 +89,16 @@ struct Camera {
     h[2] = T(1.0);
     return Undistort(x, h);
   }
-  /// Returns true if z = (u, v) lies on the image.
+  /// Returns whether the pixel z = (u, v) is inside the image.
   bool Contains(const double* z) const {
     return z[0] >= -0.5 && z[0] <= width - 0.5 && z[1] >= -0.5 && z[1] <= height - 0.5;
   }
 
  private:
   static constexpr double kPi = 3.14159265358979323846;
-  static constexpr double kMaxSquaredRadius = 1e4;    ///< of x0^2 + y0^2: 89.4 degrees
-  static constexpr double kSmallSquaredAngle = 1e-6;  ///< rad^2; below, the series are exact
+  static constexpr double kMaxSquaredRadius = 1e4;  ///< limit of x0^2 + y0^2: 89.4 degrees
+  static constexpr double kSmallSquaredAngle =
+      1e-6;  ///< rad^2; below this, series replace the functions
 
   Camera(Params& params, CameraModel type)
       : Camera(params.Integer("camera.width", "image width in px", 1, 1 << 20),
@@ -154,15 +156,15 @@ struct Camera {
     x[1] = x0[1] * s + p[0] * (q + 2.0 * x0[1] * x0[1]) + 2.0 * p[1] * xy;
     return true;
   }
-  /// Solves by Newton's method, from the solution without tangential distortion. The last step adds
-  /// the derivatives of x.
+  /// Solves DistortRadtan(x0) = x by Newton's method. Starts at the solution without tangential
+  /// distortion. The last step also computes the derivatives of x0.
   template <class T>
   bool UndistortRadtan(const T* x, T* x0) const {
     const double target[2] = {detail::ValueOf(x[0]), detail::ValueOf(x[1])};
     double q, solution[2], distorted[2];
     if (!radial.Invert(target[0] * target[0] + target[1] * target[1], &q)) return false;
     for (int i = 0; i < 2; ++i) solution[i] = target[i] / radial.Factor(q);
-    constexpr int kSteps = 20;  // about 5 suffice
+    constexpr int kSteps = 20;  // about 5 steps are sufficient
     for (int k = 0; k < kSteps; ++k) {
       if (!DistortRadtan(solution, distorted)) return false;
       SolveRadtan(solution, target, distorted, solution);
@@ -173,7 +175,7 @@ struct Camera {
     SolveRadtan(solution, x, distorted, x0);
     return true;
   }
-  /// Computes next = solution + J^-1 (target - distorted), one Newton step. J is the Jacobian of
+  /// Computes one Newton step, next = solution + J^-1 (target - distorted). J is the Jacobian of
   /// DistortRadtan at `solution`.
   template <class T>
   void SolveRadtan(const double* solution, const T* target, const double* distorted,

@@ -9,7 +9,8 @@
 #include "alidade/model/plugin_abi.h"
 
 /// Geometries of state blocks, measurements and inputs. A geometry defines the sum of a value and a
-/// small vector, y = x (+) d, and the difference of two values, d = y (-) x. For every geometry
+/// small vector, y = x (+) d, and the difference of two values, d = y (-) x. Every geometry
+/// satisfies
 ///
 ///   (1)  x (+) 0 = x
 ///   (2)  (x (+) d) (-) x = d          for small d
@@ -20,20 +21,20 @@
 /// A geometry of fixed size is a struct with
 ///
 ///   kGeometry                number in the C table (plugin_abi.h)
-///   kAmbient, kTangent       sizes of a value and of d
+///   kAmbient, kTangent       number of elements of a value and of d
 ///   kIdentity                the neutral element
 ///   Plus, Minus              the operations (+) and (-)
-///   Normalise(x)             moves x back to the manifold after rounding errors
-///   Distance(x)              optional: distance of x from the manifold; default 0
+///   Normalise(x)             returns x to the manifold after rounding errors
+///   Distance(x)              optional: distance of x from the manifold; default: 0
 ///   Transport(x, y, j)       optional: j (kTangent x kTangent, row-major) transports a tangent
-///                            vector at x to the tangent space of y; default the identity
+///                            vector at x to the tangent space of y; default: the identity
 ///   PlusJacobian(x, d, j)    optional: j = d(x (+) d)/dd, in the tangent space at x (+) d; default
 ///                            automatic differentiation of Plus and Minus
 ///
-/// and a row in alidade/state/geometry_table.h.
+/// and an entry in alidade/state/geometry_table.h.
 namespace alidade {
 
-/// Size that is known only at run time.
+/// Size of a block if the size is known only at run time.
 inline constexpr int kDynamic = -1;
 
 /// R^N: y = x + d.
@@ -52,19 +53,19 @@ struct Vec {
   }
 };
 
-/// SO(2) as one number in (-pi, pi]: y = wrap(x + d).
+/// SO(2), stored as one number in (-pi, pi]: y = wrap(x + d).
 struct Angle {
   static constexpr std::uint32_t kGeometry = ALIDADE_ANGLE;
   static constexpr int kAmbient = 1, kTangent = 1;
   static constexpr std::array<double, 1> kIdentity{0.0};
 
-  /// Returns a - 2 pi k in (-pi, pi], k an integer.
+  /// Returns a - 2 pi k with the integer k for which the result is in (-pi, pi].
   template <class T>
   static T Wrap(const T& a) {
     constexpr double kPi = 3.14159265358979323846;
     using std::ceil;
     const T wrapped = a - 2.0 * kPi * ceil((a - kPi) / (2.0 * kPi));
-    // The result may be outside the interval by an ulp because of rounding.
+    // Rounding may move the result out of the interval by one ulp.
     if (wrapped > T(kPi)) return wrapped - 2.0 * kPi;
     if (wrapped <= T(-kPi)) return wrapped + 2.0 * kPi;
     return wrapped;
@@ -82,11 +83,11 @@ struct Angle {
 
 namespace detail {
 
-/// Base of a geometry G of unit length.
+/// Base of a geometry G whose values have unit length.
 template <class G, int N>
 struct UnitLength {
-  /// Replaces x by x / |x|, or by the neutral element if x = 0. Does not change x if |x| is 1 to
-  /// rounding, or not finite.
+  /// Replaces x by x / |x|, or by the neutral element if x = 0. Does not change x if |x| is not
+  /// finite, or differs from 1 only by rounding.
   static void Normalise(double* x) {
     constexpr double kRounding = 4e-16;
     const double norm = Norm(x);
@@ -106,9 +107,9 @@ struct UnitLength {
 
 }  // namespace detail
 
-/// S^3, Hamilton, stored w x y z: q (+) d = q Exp(d), Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|).
-/// q and -q are the same rotation: (-) returns the shorter difference, |d| <= pi.
-/// [Sola2017] ch. 4.
+/// S^3: unit quaternions of Hamilton's convention, stored as w x y z. q (+) d = q Exp(d), with
+/// Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|). q and -q are the same rotation, and (-) returns the
+/// shorter difference, |d| <= pi. Source: [Sola2017] ch. 4.
 struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_QUATERNION;
   static constexpr int kAmbient = 4, kTangent = 3;
@@ -122,7 +123,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
     c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
   }
-  /// Computes q = Exp(d), d in rad; accurate to rounding also near d = 0.
+  /// Computes q = Exp(d), d in rad. The result is accurate to rounding errors, also near d = 0.
   template <class T>
   static void Exp(const T* d, T* q) {
     using std::cos;
@@ -140,7 +141,7 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
     }
     for (int i = 0; i < 3; ++i) q[i + 1] = s * d[i];
   }
-  /// Computes d = Log(q), |d| <= pi.
+  /// Computes d = Log(q) with |d| <= pi.
   template <class T>
   static void Log(const T* q, T* d) {
     using std::atan2;
@@ -204,9 +205,9 @@ struct UnitQuaternion : detail::UnitLength<UnitQuaternion, 4> {
   }
 };
 
-/// S^2: y = cos|d| x + sin|d|/|d| B(x) d, with B(x) (3x2) an orthonormal basis of the plane normal
-/// to x. All geodesics to the antipode of x are equally long: (-) returns (pi, 0) there.
-/// Basis: [Duff2017].
+/// S^2: y = cos|d| x + sin|d|/|d| B(x) d. B(x) (3x2) is an orthonormal basis of the plane normal to
+/// x [Duff2017]. If y is the antipode of x, all geodesics are equally long, and y (-) x returns
+/// (pi, 0).
 struct UnitVector : detail::UnitLength<UnitVector, 3> {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_VECTOR;
   static constexpr int kAmbient = 3, kTangent = 2;
@@ -257,7 +258,7 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
     D k;  // angle / sin(angle)
     if (c > D(0.0) && !(s2 > D(1e-12))) {
       k = 1.0 + s2 / 6.0;
-    } else if (s2 > D(1e-300)) {  // below, sqrt has lost its digits
+    } else if (s2 > D(1e-300)) {  // sqrt(s2) is inaccurate below this limit
       const D s = sqrt(s2);
       k = atan2(s, c) / s;
     } else {
@@ -269,8 +270,8 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
     d[1] = k * p[1];
   }
   /// Computes the parallel transport j = B(y)' R B(x) (2x2, row-major). R is the smallest rotation
-  /// of x to y, R v = v - (x + y) (y . v) / (1 + x . y). All geodesics to the antipode are equally
-  /// long; there, the transport follows the first basis vector.
+  /// of x to y, R v = v - (x + y) (y . v) / (1 + x . y). If y is the antipode of x, the transport
+  /// follows the geodesic in the direction of the first basis vector.
   static void Transport(const double* x, const double* y, double* j) {
     double b_x[6], b_y[6];
     Basis(x, b_x);
@@ -291,8 +292,8 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
       }
     }
   }
-  /// Computes the derivative of the exponential map of S^2, followed by the parallel transport to
-  /// x (+) d. It preserves lengths along d and multiplies lengths across d by sin |d| / |d|.
+  /// Computes the derivative of the exponential map of S^2 in the tangent space at x (+) d. The
+  /// derivative preserves lengths along d, and multiplies lengths across d by sin |d| / |d|.
   static void PlusJacobian(const double* x, const double* d, double* j) {
     const double t2 = d[0] * d[0] + d[1] * d[1], t = std::sqrt(t2);
     constexpr double kSeries = 1e-4;
@@ -311,8 +312,8 @@ struct UnitVector : detail::UnitLength<UnitVector, 3> {
   }
 };
 
-/// Composite value whose parts each have a geometry: a measurement with correlated noise, such as a
-/// pose, or a range with a bearing.
+/// Composite value; each part has its own geometry. Used for measurements with correlated noise,
+/// such as a pose, or a range with a bearing.
 template <class... Parts>
 struct Product {
   static_assert(sizeof...(Parts) > 0 && ((Parts::kTangent > 0) && ... && true) &&
@@ -349,7 +350,8 @@ struct HasTransport<G, std::void_t<decltype(G::Transport(
 
 }  // namespace detail
 
-/// True if the tangent basis of G rotates with the point, so that a covariance rotates with it.
+/// Whether the tangent basis of G depends on the point. A covariance must then be rotated when the
+/// point moves.
 template <class G>
 inline constexpr bool kHasTransport = detail::HasTransport<G>::value;
 

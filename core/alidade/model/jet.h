@@ -7,16 +7,17 @@
 
 namespace alidade {
 
-/// Dual number: a value with its derivatives with respect to N variables. A model is a template of
-/// the scalar, so a call with dual numbers also returns its derivatives.
+/// Dual number: a value and its derivatives with respect to N variables. The scalar type of a model
+/// is a template parameter, so a call with dual numbers also computes the derivatives of the model.
 ///
 ///   f(x)     = (f(a), f'(a) v)                          a: value, v: derivatives
 ///   f(x, y)  = (f(a_x, a_y), df/da_x v_x + df/da_y v_y)
 ///
-/// A constant converts implicitly to a dual number with derivatives of zero. Comparisons, isfinite,
-/// isnan and isinf use only the value. Call functions by argument-dependent lookup, as in
-/// `using std::sin; sin(x)`. Eigen matrices may have such elements. If a function has no finite
-/// slope, as sqrt, hypot and atan2 at 0 and asin at 1, the derivatives are infinite or NaN.
+/// A constant converts implicitly to a dual number whose derivatives are zero. Comparisons,
+/// isfinite, isnan and isinf use only the value. Call functions by argument-dependent lookup, as in
+/// `using std::sin; sin(x)`. Dual numbers may be elements of Eigen matrices. If a function has no
+/// finite slope, such as sqrt, hypot and atan2 at 0 and asin at 1, the derivatives are infinite or
+/// NaN.
 template <class T, int N>
 struct Jet {
   static_assert(std::is_floating_point_v<T> && N > 0, "a number, and at least one variable");
@@ -25,8 +26,9 @@ struct Jet {
   T v[N]{};  ///< derivatives
 
   constexpr Jet() = default;
-  constexpr Jet(const T& value) : a(value) {}  // NOLINT(google-explicit-constructor): a constant
-  /// Constructs the k-th variable.
+  constexpr Jet(const T& value)
+      : a(value) {}  // NOLINT(google-explicit-constructor): converts a constant
+  /// Constructs the variable with the index k.
   constexpr Jet(const T& value, int k) : a(value) { v[k] = T(1); }
 
   constexpr Jet& operator+=(const Jet& y) { return *this = *this + y; }
@@ -89,7 +91,7 @@ struct Jet {
     return Chain(std::pow(x.a, p), p == T(0) ? T(0) : p * std::pow(x.a, p - T(1)), x);
   }
   friend Jet pow(const Jet& x, const Jet& p) {
-    if (p.IsConstant()) return pow(x, p.a);  // defined for x < 0 as well
+    if (p.IsConstant()) return pow(x, p.a);  // also defined for x < 0
     const T f = std::pow(x.a, p.a);
     const T exponent_slope = f == T(0) ? T(0) : f * std::log(x.a);
     return Chain(f, p.a * std::pow(x.a, p.a - T(1)), x, exponent_slope, p);
@@ -136,7 +138,7 @@ struct Jet {
     return Chain(f, T(1) - f * f, x);
   }
 
-  // Piecewise functions: the derivative is that of the piece which contains the value.
+  // Piecewise functions. The derivative is the derivative of the piece that contains the value.
   friend Jet abs(const Jet& x) { return std::signbit(x.a) ? -x : x; }
   friend Jet fabs(const Jet& x) { return abs(x); }
   friend Jet copysign(const Jet& x, const Jet& y) {
@@ -161,7 +163,7 @@ struct Jet {
     }
     return true;
   }
-  /// Applies the chain rule: returns a value with the derivatives dx v_x, or dx v_x + dy v_y.
+  /// Applies the chain rule: returns `value` with the derivatives dx v_x, or dx v_x + dy v_y.
   static constexpr Jet Chain(const T& value, const T& dx, const Jet& x) {
     Jet f(value);
     for (int i = 0; i < N; ++i) f.v[i] = dx * x.v[i];
@@ -176,11 +178,11 @@ struct Jet {
 
 }  // namespace alidade
 
-/// Limits of the value.
+/// Numeric limits of a dual number: those of its value type.
 template <class T, int N>
 class std::numeric_limits<alidade::Jet<T, N>> : public std::numeric_limits<T> {};
 
-// Traits of a dual number, for models that use Eigen matrices.
+// Traits of dual numbers for Eigen, for models that use Eigen matrices.
 // NOLINTBEGIN(readability-identifier-naming): the names are Eigen's
 namespace Eigen {
 
@@ -211,7 +213,7 @@ struct NumTraits<alidade::Jet<T, N>> {
   static constexpr int digits10() { return std::numeric_limits<T>::digits10; }
 };
 
-/// Allows products of matrices of dual numbers and matrices of numbers.
+/// Allows products of a matrix of dual numbers and a matrix of numbers.
 template <class T, int N, class Operation>
 struct ScalarBinaryOpTraits<alidade::Jet<T, N>, T, Operation> {
   using ReturnType = alidade::Jet<T, N>;

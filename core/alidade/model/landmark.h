@@ -11,22 +11,23 @@
 #include "alidade/model/jet.h"
 #include "alidade/model/params.h"
 
-/// Representations of a landmark: parametrisations of a point of the world in the state. Every
-/// representation provides the point as p = a + m / rho. All other code uses only this form:
+/// Representations of a landmark: ways to store a point of the world in the state. Every
+/// representation is a struct that converts its values y to a ray p = a + m / rho. All other code
+/// uses only this ray:
 ///
-///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, a point infinitely far
+///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, for a point at infinity
 ///
-/// with the camera at r and its orientation q = world_from_cam. A representation has
+/// r is the position of the camera and q = world_from_cam its orientation. A representation has
 ///
 ///   using Spaces = std::tuple<...>;                      geometries of its blocks
 ///   static constexpr std::array kRoles{Quantity{...}};   one per block, ALIDADE_ROLE_LANDMARK
 ///   static constexpr const char* kName = "...";          name in configs
-///   static constexpr bool kIsXyz = false;                true: y is the point p itself
-///   static Ray<T> ToRay(const T* y);                     y: values of the blocks, concatenated
-///   static bool FromRay(const Ray<T>& ray, T* y);        false: the ray has no such y
+///   static constexpr bool kIsXyz = false;                true: y is the point p
+///   static Ray<T> ToRay(const T* y);                     y: values of all blocks, in order
+///   static bool FromRay(const Ray<T>& ray, T* y);        false: no y represents the ray
 ///
-/// Unless kIsXyz, the last element of its tangent is rho. To add a representation, add a struct
-/// here, a value of LandmarkRepresentation, and an entry of LandmarkRepresentations.
+/// Unless kIsXyz is true, the last tangent element is rho. To add a representation, add a struct
+/// here, a value to LandmarkRepresentation, and the struct to LandmarkRepresentations.
 namespace alidade {
 
 /// Ray to a point p = a + m / rho.
@@ -37,13 +38,14 @@ struct Ray {
   T rho;           ///< 1/m if m has unit length
 };
 
-/// Inverse-depth representation of MonoSLAM, six numbers: the position of the camera at the first
-/// observation, azimuth and elevation of the ray, and the inverse distance along the ray.
+/// Inverse-depth representation of MonoSLAM. The six numbers are the position of the camera at the
+/// first observation, azimuth and elevation of the ray, and the inverse distance along the ray.
 ///
 ///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
 ///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
 ///
-/// At the poles, the directions of the world's y axis, theta is undefined: FromRay returns false.
+/// The poles are the two directions of the world's y axis. FromRay returns false at a pole, because
+/// theta is undefined there.
 /// Source  [MonoSlam2015] sec. 4.3, [Civera2008] sec. II-B.
 struct InverseDepth {
   using Spaces = std::tuple<Vec<6>>;
@@ -53,7 +55,7 @@ struct InverseDepth {
       Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
                "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
 
-  /// Convert y to its ray, and a ray to its y.
+  /// ToRay converts y to a ray, and FromRay a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     using std::cos;
@@ -77,13 +79,13 @@ struct InverseDepth {
   }
 };
 
-/// Anchored inverse-distance representation: an anchor, a unit vector and the inverse distance from
-/// the anchor. Landmarks that were first observed in the same frame share their anchor, so each
-/// landmark adds three degrees of freedom. The representation has no pole.
+/// Anchored inverse-distance representation: an anchor a, a unit vector m and the inverse distance
+/// rho from the anchor. Landmarks that were first observed in the same frame share one anchor. Each
+/// landmark therefore adds only three degrees of freedom. The representation has no pole.
 ///
 ///   y = (a, m, rho)
 ///
-/// Source  [Sola2012], anchored points.
+/// Source  [Sola2012], anchored landmark points.
 struct Anchored {
   using Spaces = std::tuple<Vec<3>, UnitVector, Vec<1>>;
   static constexpr const char* kName = "anchored";
@@ -96,7 +98,7 @@ struct Anchored {
       Quantity{"inverse_distance", "1/m", "inverse distance from the anchor", "",
                ALIDADE_ROLE_LANDMARK}};
 
-  /// Convert y to its ray, and a ray to its y.
+  /// ToRay converts y to a ray, and FromRay a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {y[3], y[4], y[5]}, y[6]};
@@ -110,8 +112,8 @@ struct Anchored {
   }
 };
 
-/// Representation by the point itself, y = p. Its ray has m = 0 and rho = 1, so that (1) is
-/// h = R_CW (p - r). FromRay returns false unless rho > 0.
+/// Representation by the coordinates of the point, y = p. The ray has a = p, m = 0 and rho = 1, so
+/// (1) becomes h = R_CW (p - r). FromRay returns false unless rho > 0.
 struct Xyz {
   using Spaces = std::tuple<Vec<3>>;
   static constexpr const char* kName = "xyz";
@@ -119,7 +121,7 @@ struct Xyz {
   static constexpr std::array kRoles{Quantity{"landmark", "m", "position of the point in the world",
                                               "x,y,z", ALIDADE_ROLE_LANDMARK}};
 
-  /// Convert y to its ray, and a ray to its y.
+  /// ToRay converts y to a ray, and FromRay a ray to y.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {T(0.0), T(0.0), T(0.0)}, T(1.0)};
@@ -132,7 +134,7 @@ struct Xyz {
   }
 };
 
-/// Choices of `landmarks.representation`.
+/// Values of the key `landmarks.representation`.
 enum class LandmarkRepresentation { kInverseDepth, kAnchored, kXyz };
 
 /// Structs of the representations, in the order of LandmarkRepresentation.
@@ -148,7 +150,7 @@ struct RepresentationTraits<std::tuple<Representations...>> {
       Representations::kName...};
   static constexpr int kMaxTangent = std::max({Blocks<Representations>::kTangent...});
 
-  /// Calls f(Representation{}) with the representation at this index.
+  /// Calls f(Representation{}) for the representation with this index.
   template <class F>
   static auto Visit(int index, const F& f) {
     using First = std::tuple_element_t<0, std::tuple<Representations...>>;
@@ -172,14 +174,14 @@ inline LandmarkRepresentation ReadLandmarkRepresentation(Params& params) {
                     "representation of a landmark in the state", 0));
 }
 
-/// Calls f(Representation{}) with the struct of a representation, and returns its result.
+/// Calls f(Representation{}) with the struct of a representation, and returns the result of f.
 template <class F>
 auto WithRepresentation(LandmarkRepresentation representation, const F& f) {
   return detail::RepresentationTraits<LandmarkRepresentations>::Visit(
       static_cast<int>(representation), f);
 }
 
-/// Computes h of (1), 3 numbers.
+/// Computes the three elements of h by (1).
 template <class T>
 void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) {
   T difference[3];
@@ -189,9 +191,9 @@ void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) 
   UnitQuaternion::RotateBack(orientation, difference, h);
 }
 
-/// Inverse measurement model: computes y of the point that a camera observes along h at the inverse
-/// distance rho, 1/m. h is a direction in the camera frame, of any length. Returns false if the
-/// representation has no such y.
+/// Inverse measurement model. Computes y of the point that a camera observes in the direction h at
+/// the inverse distance rho, 1/m. h is in the camera frame and may have any length. Returns false
+/// if no y represents the point.
 template <class Representation, class T>
 bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;
@@ -217,8 +219,8 @@ Ray<double> RayOf(const double* const* blocks) {
   return Representation::ToRay(y);
 }
 
-/// Computes p = a + m / rho of a landmark, and unless J_p_y is empty also the Jacobian J_p_y
-/// (3 x tangent of its blocks). Returns kOutOfDomain unless rho > 0.
+/// Computes the point p = a + m / rho of a landmark. Unless J_p_y is empty, also computes the
+/// Jacobian J_p_y (3 x tangent size of the blocks). Returns kOutOfDomain unless rho > 0.
 template <class Representation>
 Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   constexpr int n = detail::Blocks<Representation>::kTangent;
@@ -232,11 +234,12 @@ Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}
   return Status::kOk;
 }
 
-/// Returns L_d = 4 sigma_rho |cos alpha| / (rho^2 d1) with d1 = |p - r|. alpha is the angle between
-/// the rays to p from the anchor and from the camera at r; sigma_rho is in 1/m. L_d is small if p
-/// is almost Gaussian, infinite at rho = 0, and zero for Xyz.  [Civera2008] sec. III.
+/// Returns the linearity index L_d = 4 sigma_rho |cos alpha| / (rho^2 d1) with d1 = |p - r|
+/// [Civera2008] sec. III. alpha is the angle between the rays to p from the anchor and from the
+/// camera at r; sigma_rho is in 1/m. L_d is small if the distribution of p is almost Gaussian. It
+/// is infinite at rho = 0, and zero for Xyz.
 inline double LinearityIndex(const Ray<double>& ray, double sigma_rho, const double* position) {
-  double dot = 0.0, length2 = 0.0;  // of rho (p - r), which avoids a division by rho^2
+  double dot = 0.0, length2 = 0.0;  // computed from rho (p - r), to avoid a division by rho^2
   for (int i = 0; i < 3; ++i) {
     const double scaled = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
     dot += scaled * ray.direction[i];

@@ -13,33 +13,33 @@ struct PoseAnd<Z, std::tuple<G...>> {
   using Type = Sensor<Z, Vec<3>, UnitQuaternion, G...>;
 };
 
-/// Returns the roles of a camera's pose, followed by those of a landmark.
+/// Returns the roles of the pose of a camera, followed by the roles of a landmark.
 template <std::size_t N>
 constexpr std::array<Quantity, N + 2> PrependPose(const std::array<Quantity, N>& landmark) {
   std::array<Quantity, N + 2> roles{
-      Quantity{"position", "m", "of the camera in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}};
+      Quantity{"position", "m", "position of the camera in the world", "x,y,z"},
+      Quantity{"orientation", "", "orientation of the camera, world_from_cam", "w,x,y,z"}};
   for (std::size_t i = 0; i < N; ++i) roles[i + 2] = landmark[i];
   return roles;
 }
 
 }  // namespace detail
 
-/// Base of a sensor that sees landmarks of one `Representation` from a camera. Its roles are
-/// position and orientation, followed by those of the representation. The model does not depend on
-/// the representation. It has
+/// Base of a sensor that observes landmarks with one `Representation` from a camera. The roles are
+/// position and orientation of the camera, followed by the roles of the representation. The code of
+/// the model does not depend on the representation. The model has
 ///
 ///   template <class T> bool PredictInCamera(const T* h, const T& rho, T* z) const;
 ///   template <class T> void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const;
 ///
-/// for the point h / rho in the camera frame (infinitely far at rho = 0), and Initialise as any
-/// sensor. The noise is not evaluated if Predict returns false.
+/// for the point h / rho in the camera frame, which is at infinity if rho = 0. It also has
+/// Initialise, as in Sensor. The noise is not evaluated if Predict returns false.
 template <class Model, class Z, class Representation>
 struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Type {
   static constexpr auto kRoles = detail::PrependPose(Representation::kRoles);
   static constexpr int kInitialises = 2;
 
-  /// Computes z if the representation is one block.
+  /// Computes z for a representation that consists of one block.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* y, T* z) const {
     T h[3];
@@ -47,7 +47,7 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Typ
     InCamera(ray, position, orientation, h);
     return static_cast<const Model&>(*this).PredictInCamera(h, ray.rho, z);
   }
-  /// Computes L, m x m row-major, if the representation is one block.
+  /// Computes L, m x m row-major, for a representation that consists of one block.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* y, T* L) const {
     T h[3];
@@ -55,14 +55,14 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Typ
     InCamera(ray, position, orientation, h);
     static_cast<const Model&>(*this).SqrtNoiseInCamera(h, ray.rho, L);
   }
-  /// Computes z if the representation is three blocks.
+  /// Computes z for a representation that consists of three blocks.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* anchor, const T* direction,
                const T* inverse_distance, T* z) const {
     return Predict(position, orientation, JoinedBlocks<T>(anchor, direction, inverse_distance).y,
                    z);
   }
-  /// Computes L, m x m row-major, if the representation is three blocks.
+  /// Computes L, m x m row-major, for a representation that consists of three blocks.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* anchor, const T* direction,
                  const T* inverse_distance, T* L) const {

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace detail {
 
-/// Returns the value of a number that may be dual.
+/// Returns the value of a number or of a dual number.
 template <class T>
 double ValueOf(const T& x) {
   if constexpr (std::is_arithmetic_v<T>) {
@@ -18,14 +18,16 @@ double ValueOf(const T& x) {
   }
 }
 
-/// Radial polynomial r -> r s(r^2),  s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4. It is increasing
-/// on its domain 0 <= r^2 <= q_max. Functions of r^2 are smooth at r = 0.
+/// Radial polynomial r s(r^2) with s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4. The polynomial
+/// increases on its domain 0 <= r^2 <= q_max. The members are functions of q = r^2, because these
+/// are smooth at r = 0.
 struct RadialPolynomial {
   std::array<double, 4> k{};
   double q_max = 0.0;
 
   RadialPolynomial() = default;
-  /// Sets q_max to `limit`, or to the first maximum of r s(r^2), within 1 %, if that is smaller.
+  /// Sets q_max to `limit`, or to the first maximum of r s(r^2) if it is below `limit`. The maximum
+  /// is found to 1 %.
   RadialPolynomial(const std::array<double, 4>& coefficients, double limit) : k(coefficients) {
     for (double q = 1e-6; q < limit && Slope(q) > 0.0; q *= 1.01) q_max = q;
     if (q_max > 0.98 * limit) q_max = limit;
@@ -42,14 +44,14 @@ struct RadialPolynomial {
   /// Returns d (r s(r^2)) / dr at r^2 = q.
   double Slope(double q) const { return Factor(q) + 2.0 * q * FactorSlope(q); }
 
-  /// Computes the q with q s(q)^2 = square. Returns false if [0, q_max] does not contain it.
+  /// Solves q s(q)^2 = square for q. Returns false if [0, q_max] contains no solution.
   template <class T>
   bool Invert(const T& square, T* q) const {
     const double target = ValueOf(square);
     const auto excess = [&](double x) { return x * Factor(x) * Factor(x) - target; };
     if (!(target >= 0.0) || !(excess(q_max) >= 0.0)) return false;
     double low = 0.0, high = q_max, x = target < high ? target : high;
-    constexpr int kMaxIterations = 100;  // Newton needs about 5, bisection about 60
+    constexpr int kMaxIterations = 100;  // Newton's method needs about 5, bisection about 60
     for (int i = 0; i < kMaxIterations; ++i) {
       const double f = excess(x);
       (f > 0.0 ? high : low) = x;
@@ -59,8 +61,8 @@ struct RadialPolynomial {
       x = next;
       if (!(step > 1e-16 * x)) break;
     }
-    // One Newton step with `square` as a dual number makes the derivatives of *q exact (implicit
-    // function theorem).
+    // One more Newton step with `square` as a dual number computes the exact derivatives of *q
+    // (implicit function theorem).
     *q = x - (x * Factor(x) * Factor(x) - square) / (Factor(x) * Slope(x));
     return true;
   }

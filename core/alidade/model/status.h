@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// Result of one evaluation of a model. Any result except kOk leaves the outputs untouched.
+/// Result of one evaluation of a model. Unless the result is kOk, the outputs are unchanged.
 enum class [[nodiscard]] Status : int{
     kOk = ALIDADE_OK,
-    kOutOfDomain = ALIDADE_OUT_OF_DOMAIN,  ///< the model is not defined there
-    kInvalid = ALIDADE_INVALID,            ///< the measurement itself is unusable
+    kOutOfDomain = ALIDADE_OUT_OF_DOMAIN,  ///< the model is not defined at the arguments
+    kInvalid = ALIDADE_INVALID,            ///< the measurement cannot be used at any state
     kError = ALIDADE_ERROR,                ///< the plugin failed
 };
 

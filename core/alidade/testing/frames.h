@@ -12,10 +12,10 @@
 #include "alidade/estimation/estimator.h"
 #include "alidade/estimation/problem.h"
 
-/// Helpers for tests of filters: frames, and access to reports and states.
+/// Helpers for tests of filters: create frames, and read reports and states.
 namespace alidade::testing {
 
-/// Returns a stream for each sensor of the problem, in their order.
+/// Returns one stream for each sensor of the problem, in the order of the sensors.
 inline std::vector<StreamInfo> StreamsOf(const Problem& problem) {
   std::vector<StreamInfo> streams;
   for (const SensorBinding& sensor : problem.sensors) {
@@ -25,7 +25,7 @@ inline std::vector<StreamInfo> StreamsOf(const Problem& problem) {
   return streams;
 }
 
-/// Returns a frame with one scalar measurement for each (stream, value).
+/// Returns a frame with one scalar measurement for each pair (stream, value).
 inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
   Frame frame;
   frame.timestamp = TimestampFromSeconds(t_s);
@@ -40,19 +40,19 @@ inline bool HasEvent(const UpdateReport& report, EventKind kind) {
   return std::ranges::count(report.events, kind, &Event::kind) > 0;
 }
 
-/// Returns the block with this name. ContractViolation for an unknown name.
+/// Returns the block with this name. ContractViolation if the name is unknown.
 inline const Block& BlockOf(const State& state, std::string_view name) {
   const BlockId id = state.layout().Find(name);
   ALIDADE_EXPECTS(id >= 0);
   return state.layout()[id];
 }
 
-/// Returns the value of a scalar block. ContractViolation for an unknown name.
+/// Returns the value of a scalar block. ContractViolation if the name is unknown.
 inline double ValueOf(const State& state, std::string_view block) {
   return state.values()[static_cast<std::size_t>(BlockOf(state, block).value_offset)];
 }
 
-/// Returns the covariance of two scalar blocks. ContractViolation for an unknown name.
+/// Returns the covariance of two scalar blocks. ContractViolation if a name is unknown.
 inline double CovarianceOf(const State& state, std::string_view a, std::string_view b) {
   return state.covariance().Block(BlockOf(state, a).tangent_offset, 1,
                                   BlockOf(state, b).tangent_offset, 1)(0);

@@ -10,7 +10,7 @@
 #include "alidade/base/error.h"
 #include "alidade/estimation/models.h"
 
-/// Helpers for tests of models: Jacobians from the model and from numeric differentiation.
+/// Helpers for tests of models: Jacobians that the model computes, and numeric Jacobians.
 namespace alidade::testing {
 
 /// Ambient values of roles or blocks, one after the other.
@@ -44,9 +44,9 @@ inline Blocks Filled(const std::vector<Space>& spaces, double value) {
   return blocks;
 }
 
-/// Returns d f / d x in the tangent spaces of both, row-major. x is in `inputs`, f(x) in `outputs`.
-/// Central differences by (+) and (-) with one Richardson step, (4 D(h/2) - D(h)) / 3, have an
-/// error of order h^4 f'''''.
+/// Returns d f / d x, row-major, in the tangent spaces of x and f(x). `inputs` are the spaces of x,
+/// and `outputs` those of f(x). Computed by central differences D(h) with (+) and (-) and one
+/// Richardson step, (4 D(h/2) - D(h)) / 3. The error is of order h^4 f'''''.
 template <class F>
 std::vector<double> NumericJacobian(const std::vector<Space>& inputs, const Blocks& x,
                                     const std::vector<Space>& outputs, const F& f,
@@ -81,13 +81,14 @@ std::vector<double> NumericJacobian(const std::vector<Space>& inputs, const Bloc
   return j;
 }
 
-/// Returns an output with NaN in all elements, which a model has to overwrite.
+/// Returns memory for an output. All elements are NaN, so a test detects elements that a model does
+/// not write.
 inline std::vector<double> UnwrittenOutput(int size) {
   return std::vector<double>(static_cast<std::size_t>(size),
                              std::numeric_limits<double>::quiet_NaN());
 }
 
-/// Returns the Jacobian of h that the model computes, m x n row-major, with the columns of all
+/// Returns the Jacobian of h that the model computes: m x n, row-major, with the columns of all
 /// roles side by side. ContractViolation if h is not defined at the roles.
 inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Blocks& roles,
                                           const double* known = nullptr) {
@@ -107,8 +108,8 @@ inline std::vector<double> SensorJacobian(const SharedSensor& sensor, const Bloc
   return j;
 }
 
-/// Returns the Jacobian of h from numeric differentiation. ContractViolation if h is not defined at
-/// the roles, or at a distance of 1e-3.
+/// Returns the Jacobian of h, computed by numeric differentiation. ContractViolation if h is not
+/// defined at the roles or up to 1e-3 away.
 inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, const Blocks& roles,
                                                  const double* known = nullptr) {
   const auto predict = [&](const Blocks& x) {
@@ -120,16 +121,16 @@ inline std::vector<double> NumericSensorJacobian(const SharedSensor& sensor, con
   return NumericJacobian(sensor->roles(), roles, {sensor->measurement()}, predict);
 }
 
-/// Step of a motion model.
+/// Result of a step of a motion model.
 struct StepResult {
   Blocks next;
   std::vector<double> f;  ///< d next / d x, n x n row-major
   std::vector<double> g;  ///< d next / d w, n x n_w row-major
 };
 
-/// Steps from x with control input u (null if the model has no control input) and noise w (null:
-/// zero). Returns x' and the Jacobians that the model computes. ContractViolation if the step is
-/// not defined.
+/// Returns x' and the Jacobians that the model computes for a step from x. u is the control input,
+/// or null if the model has no control input. A null w means w = 0. ContractViolation if the step
+/// is not defined.
 inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x, const double* u,
                                     const double* w, double dt_s) {
   const int n = motion->tangent_size();
@@ -142,8 +143,8 @@ inline StepResult StepWithJacobians(const SharedMotion& motion, const Blocks& x,
   return result;
 }
 
-/// As StepWithJacobians, but with Jacobians from numeric differentiation. ContractViolation if the
-/// step is not defined at x and w, or at a distance of 1e-3.
+/// Does the same as StepWithJacobians, but computes the Jacobians by numeric differentiation.
+/// ContractViolation if the step is not defined at x and w or up to 1e-3 away.
 inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const double* u,
                               const double* w, double dt_s) {
   Space noise;
@@ -165,7 +166,7 @@ inline StepResult NumericStep(const SharedMotion& motion, const Blocks& x, const
                           [&](const Blocks& drawn) { return step(x, drawn); })};
 }
 
-/// Returns max |a_i - b_i| / (1 + |b_i|). Infinite if the sizes differ or an element is NaN.
+/// Returns max |a_i - b_i| / (1 + |b_i|), or infinity if the sizes differ or an element is NaN.
 inline double LargestDifference(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (a.size() != b.size()) return kInfinity;

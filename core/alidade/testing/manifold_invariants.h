@@ -10,18 +10,18 @@
 
 #include "alidade/state/manifold.h"
 
-/// Assertion of GoogleTest for geometries. No other header of alidade needs GoogleTest.
+/// GoogleTest assertion for geometries. No other header of alidade includes GoogleTest.
 namespace alidade::testing {
 
-/// Checks that the invariants of a manifold hold at its points x, y and for the step d, each to
-/// `tolerance`. The failure message names the first one that does not hold.
+/// Checks that each invariant of a manifold holds to `tolerance`, for its points x and y and the
+/// step d. The failure message names the first invariant that does not hold.
 ///
 ///   (1)  x (+) 0 = x
-///   (2)  (x (+) d) (-) x = d      for rotations only if |d| < pi
+///   (2)  (x (+) d) (-) x = d      (for rotations only if |d| < pi)
 ///   (3)  x (+) (y (-) x) = y
 ///   (4)  x (+) d is a point of the manifold
 ///
-/// Points are compared by (-): a quaternion and its negative are one rotation.
+/// Points are compared by (-), because a quaternion and its negative are the same rotation.
 inline ::testing::AssertionResult ManifoldInvariantsHold(const Geometry& geometry,
                                                          const std::vector<double>& x,
                                                          const std::vector<double>& d,
@@ -52,7 +52,7 @@ inline ::testing::AssertionResult ManifoldInvariantsHold(const Geometry& geometr
               {"(3) x (+) (y (-) x) = y", distance(minus(plus(minus(y, x)), y), zero)},
               {"(4) x (+) d is a point of the manifold", DistanceFrom(geometry, moved.data())}};
   for (const auto& [law, defect] : laws) {
-    if (defect <= tolerance) continue;  // false if the defect is NaN
+    if (defect <= tolerance) continue;  // a defect that is NaN fails
     return ::testing::AssertionFailure()
            << law << " does not hold for " << ToString(geometry) << ": off by " << defect
            << ", more than " << tolerance << "; x = " << ::testing::PrintToString(x)
